@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings as DiagnosisSettings
     from analysis.diagnosis.first_model.choose_structure import choose_structure as first_structure
     from analysis.diagnosis.result.findings import Findings as Findings
-    from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_pictures as diagnosis_pictures
+    from analysis.figures.diagnosis.diagnosis_pictures import draw_diagnosis_pictures as diagnosis_pictures
     from analysis.figures.study_pictures import study_pictures as study_pictures
     from analysis.look.overview import make_overview as overview
     from analysis.psychophysics.study_analysis import StudyAnalysis as StudyAnalysis
@@ -35,7 +35,7 @@ _HOME = {
     "StudyAnalysis": "analysis.psychophysics.study_analysis:StudyAnalysis",
     "analyse_study": "analysis.psychophysics.study_analysis:analyse_study",
     "diagnose": "analysis.diagnosis.diagnose_values:diagnose_values",
-    "diagnosis_pictures": "analysis.figures.diagnosis.diagnosis_pictures:diagnosis_pictures",
+    "diagnosis_pictures": "analysis.figures.diagnosis.diagnosis_pictures:draw_diagnosis_pictures",
     "first_structure": "analysis.diagnosis.first_model.choose_structure:choose_structure",
     "overview": "analysis.look.overview:make_overview",
     "study_pictures": "analysis.figures.study_pictures:study_pictures",

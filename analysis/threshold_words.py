@@ -1,8 +1,9 @@
 """Wording of figures, tables and warnings for the two kinds of thresholds of a run.
 
 A staircase's threshold is the mean of its last reversal levels; that of the Bayesian Psi method is the mean of the
-posterior distribution. `select_threshold_words` selects the wording by the protocol's rule, so that no other module
-has to distinguish the two. The thresholds are computed in `analysis.psychophysics.thresholds`.
+posterior distribution. `select_threshold_words` selects the wording by the protocol's rule, so that no other module has
+to distinguish the two. Called by the figures, tables and warnings of thresholds. These are computed in
+`analysis.psychophysics.thresholds`.
 """
 
 from dataclasses import dataclass
@@ -14,21 +15,21 @@ from protocols.definition.staircase_rule import StaircaseRule
 class ThresholdWords:
     """Sentences and nouns about a run's threshold, for one kind of rule."""
 
-    means: str
+    noun: str
     """Name of the thresholds, in the plural; begins with a lower-case letter."""
-    cut: str
+    cut_clause: str
     """Relative clause: effect of the cap (largest level) on a threshold that is marked as cut (limited by the cap)."""
     cut_note: str
     """Note below a table in which thresholds are marked as cut."""
-    too_low: str
+    tobit_caveat: str
     """Reason why Tobit's model of cut thresholds is only a sensitivity analysis."""
     measured_in: str
     """Trials in which accelerations and displacements were measured, as a noun phrase."""
-    levels: str
+    misfit_note: str
     """Sentence: why observed shares of correct answers deviate from the psychometric function of a correct model."""
-    track: str
+    run_caption: str
     """Caption of the figure of a run's levels."""
-    sensitivity: str
+    d_prime_note: str
     """Sentence: what the observed d' says when it is compared with the d' of a cue."""
 
 
@@ -37,37 +38,38 @@ CENSORING_NOTE = (
     "side."
 )
 REVERSAL_WORDS = ThresholdWords(
-    means="reversal means",
-    cut="which cut off peaks of the staircase",
+    noun="reversal means",
+    cut_clause="which cut off peaks of the staircase",
     cut_note=f"cut: the cap cut off peaks of the staircase. {CENSORING_NOTE}",
-    too_low="reversal means near the cap are too low before they are cut, and a cut mean is not a bound of the "
+    tobit_caveat="reversal means near the cap are too low before they are cut, and a cut mean is not a bound of the "
     "threshold",
     measured_in="the trials of the averaged reversals",
-    levels="A staircase stops descending where answers happen to be wrong, so the lowest points lie somewhat below the "
-    "curve even of a correct model.",
-    track="Level of every counted trial, right and wrong answers, and the reversals; the black ones are averaged into "
-    "the threshold (solid line).",
-    sensitivity="A staircase keeps d' of the answers near 1.6 for any cue.",
+    misfit_note="A staircase stops descending where answers happen to be wrong, so the lowest points lie somewhat "
+    "below the curve even of a correct model.",
+    run_caption="Level of every counted trial, right and wrong answers, and the reversals; the black ones are averaged "
+    "into the threshold (solid line).",
+    d_prime_note="A staircase keeps d' of the answers near 1.6 for any cue.",
 )
 
 
 def _make_psi_words(rule: StaircaseRule) -> ThresholdWords:
     """Make the words for the Psi method. Physical units are measured in the last `averaged_reversals` trials."""
-    trials = rule.averaged_reversals
+    trial_count = rule.averaged_reversals
     return ThresholdWords(
-        means="Psi's posterior means",
-        cut="above which they lie by Psi's posterior with a probability over 10 %",
+        noun="Psi's posterior means",
+        cut_clause="above which they lie by Psi's posterior with a probability over 10 %",
         cut_note="cut: by Psi's posterior the threshold lies above the cap with a probability over 10 %; the value is "
         "the posterior's mean, at most the cap.",
-        too_low="a posterior mean is biased towards the cap before it is cut, and a cut one is not a bound of the "
+        tobit_caveat="a posterior mean is biased towards the cap before it is cut, and a cut one is not a bound of the "
             "threshold",
-        measured_in=f"the last {trials} trials of each run, taken in proportion to the threshold" if trials > 1
+        measured_in=f"the last {trial_count} trials of each run, taken in proportion to the threshold"
+        if trial_count > 1
         else "the last trial of each run, taken in proportion to the threshold",
-        levels="Levels followed the answers, so the lowest points deviate somewhat from the curve even of a correct "
-        "model.",
-        track="Level of every counted trial, chosen by Psi, with right and wrong answers; the line is the threshold, "
-        "the mean of the posterior after the last answer.",
-        sensitivity="Levels follow the answers, so d' of the answers hardly depends on the cue.",
+        misfit_note="Levels followed the answers, so the lowest points deviate somewhat from the curve even of a "
+        "correct model.",
+        run_caption="Level of every counted trial, chosen by Psi, with right and wrong answers; the line is the "
+        "threshold, the mean of the posterior after the last answer.",
+        d_prime_note="Levels follow the answers, so d' of the answers hardly depends on the cue.",
     )  # fmt: skip
 
 

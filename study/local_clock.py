@@ -6,8 +6,8 @@ from study.session.views.local_time import format_time_in_zone
 
 
 def convert_to_machine_zone(time: datetime) -> datetime:
-    """Convert a moment to the local time of this computer, summer time included; a
-    `study.session.views.local_time.Zone`.
+    """Convert a moment to the local time of this computer, summer time included. The function is a
+    `study.session.views.local_time.Zone`. A moment without UTC offset is taken as local time.
 
     Raises ValueError, OverflowError or OSError for a moment that cannot be converted.
     """

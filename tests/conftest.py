@@ -213,10 +213,10 @@ def stub(vendor, compiled_stub, tmp_path, monkeypatch):
 @pytest.fixture
 def validated_here(monkeypatch) -> None:
     """By a thread, where a test is not about the process of its own: that one reads files that end their reader, see
-    `test_validate_apart.py`, and takes seconds to start."""
-    from study.workflows.files import validate_apart
+    `test_validate_in_process.py`, and takes seconds to start."""
+    from study.workflows.files import validate_in_process
 
-    monkeypatch.setattr(validate_apart, "_start_worker", lambda: ThreadPoolExecutor(max_workers=1))
+    monkeypatch.setattr(validate_in_process, "_start_worker", lambda: ThreadPoolExecutor(max_workers=1))
 
 
 @pytest.fixture

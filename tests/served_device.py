@@ -7,7 +7,7 @@ import threading
 from multiprocessing import Pipe
 
 from study.devices.device import Device, DeviceSettings
-from study.devices.loop_process.line import LINE_NAMES, Line
+from study.devices.loop_process.call_pipe import PIPE_NAMES, CallPipe
 from study.devices.loop_process.remote_device import RemoteDevice
 from study.devices.loop_process.serve import DeviceServer
 
@@ -16,9 +16,9 @@ class ServedHere:
     """In the place of the loop's process."""
 
     def __init__(self, device: Device) -> None:
-        pairs = [Pipe() for _ in LINE_NAMES]
+        pairs = [Pipe() for _ in PIPE_NAMES]
         self.theirs = tuple(theirs for _, theirs in pairs)
-        self.lines = [Line(ours, name) for (ours, _), name in zip(pairs, LINE_NAMES, strict=True)]
+        self.lines = [CallPipe(ours, name) for (ours, _), name in zip(pairs, PIPE_NAMES, strict=True)]
         self.work, self.signs, self.look, self.stop, self.close = self.lines
         self.server = DeviceServer(device, self.theirs)
         self._thread = threading.Thread(target=self._serve, daemon=True)
@@ -29,7 +29,7 @@ class ServedHere:
 
     def hang_up(self) -> None:
         for line in self.lines:
-            line.end()
+            line.close_after_calls()
 
     def end(self, patience_s: float) -> str:
         self.patience_s.append(patience_s)

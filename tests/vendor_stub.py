@@ -22,8 +22,8 @@ from study.devices.force_dimension.connect import make_ready
 from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import Library
+from study.devices.force_dimension.open_rig import read_info
 from study.devices.force_dimension.rig import ForceDimensionRig
-from study.devices.force_dimension.rigs import read_info
 
 SOURCE = Path(__file__).parent / "study" / "devices" / "force_dimension" / "dhd_stub.c"
 FILE = "libdrd.so.3.17.5"

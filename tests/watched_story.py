@@ -15,7 +15,7 @@ from study.session.facts.events import (
 from study.session.state.due_trial import PresentTrial
 from study.session.state.machine import Finish, TakeRest, find_next_action
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from tests.session_facts import opened, presented
 
@@ -78,12 +78,14 @@ class Story:
             self.answer(next(answers))
         return self.tell(SessionClosed(at(self.seconds + 4), "completed"))
 
-    def view(self, live: Live | None = None, later: float = 4.0, before=None, writer: bool | None = None):
+    def view(self, live: LiveState | None = None, later: float = 4.0, before=None, writer: bool | None = None):
         return make_watch_view(self.watched, LiveInfo(live, writer), at(self.seconds + later), before)
 
-    def live(self, activity="trial", age_s: float = 0.1, since_s: float = 1.0, later: float = 4.0, **changes) -> Live:
+    def live(
+        self, activity="trial", age_s: float = 0.1, since_s: float = 1.0, later: float = 4.0, **changes
+    ) -> LiveState:
         now = self.seconds + later
-        quiet = Live(at(now - age_s), activity, at(now - since_s), "", 0.5, True, 1.0, False, 0)
+        quiet = LiveState(at(now - age_s), activity, at(now - since_s), "", 0.5, True, 1.0, False, 0)
         return replace(quiet, **changes)
 
 

@@ -1,5 +1,6 @@
 """Spectra of a probe (a short multisine, with a hand on the handle): force, acceleration and position at each spectral
-line, and the spectrum of dry friction along the probe's motion. `probe_drift` compares them within a session.
+line, and the spectrum of dry friction along the probe's motion. Called by `probe_drift`, which compares the probes of a
+session, by `study.workflows.results.session_drift` and by `study.workflows.trial.play_probe`.
 
 Friction follows Dahl's law (P. R. Dahl, "A solid friction model", 1968) at a level of 1 N,
 
@@ -19,23 +20,23 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_DRIVEN_SHARE = 0.1
 """Least amplitude of a driven line, relative to the strongest of its axis: weaker lines are due to rounding and to the
-virtual spring. By hand."""
+virtual spring. Chosen by hand."""
 
-INTEGRATION_FROM_HZ = 3.0
-"""Lower end of the lines at which the acceleration is integrated twice: below it, the result is the sensor's drift. By
-hand."""
+LOWEST_INTEGRATED_HZ = 3.0
+"""Lower end of the lines at which the acceleration is integrated twice: below it, the result is the sensor's drift.
+Chosen by hand."""
 
-POSITION_TO_HZ = 150.0
-"""Upper end of the lines that make up the position: above it, the handle hardly moves. By hand."""
+HIGHEST_POSITION_HZ = 150.0
+"""Upper end of the lines that make up the position: above it, the handle hardly moves. Chosen by hand."""
 
 BREAK_AWAY_LENGTHS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
 """Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. Too large a length gives
 too large a level of friction, too small a length too small a level: by some 10 % where lengths differ by a factor of
-1.6, by 40 % for a factor of 2.5. By hand."""
+1.6, by 40 % for a factor of 2.5. Chosen by hand."""
 
 INTEGRATED_PERIODS = 3
 """Number of periods over which Dahl's law is integrated; the last is used. Its initial state decays within a few
-break-away lengths of motion, so that the force is then periodic."""
+break-away lengths of motion, so that the force is then periodic. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,52 +52,52 @@ class ProbeLines:
     acceleration_mps2: ComplexArray
     """(lines, axes): as measured, in m/s^2."""
     position_m: ComplexArray
-    """(lines, axes): from the encoders, in m; NaN where there are none."""
+    """(lines, axes): from the encoders, in m; NaN without encoders, or with another number of them than of axes."""
 
 
 def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     """Compute the spectra of the mean period of a probe; of its first segment where the recording has segments.
-    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples are
-    missing."""
+    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples of
+    command or response are missing."""
     period_samples = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
     excitation_signal = recording.command if recording.excitation is None else recording.excitation
     start, stop = 0, len(recording)
     if recording.segments:
         start, stop = recording.segments[0].start, recording.segments[0].stop
-    if stop - start > 2 * period_samples:  # the first of many periods holds the transient
+    if stop - start > 2 * period_samples:  # of more than two periods, the first holds the transient
         start += period_samples
-    excitation, force, acceleration = (
+    excitation, force_n, acceleration_mps2 = (
         _compute_mean_spectrum(signal.samples[start:stop], period_samples)
         for signal in (excitation_signal, recording.command, recording.response)
     )
-    if not np.isfinite(force).all() or not np.isfinite(acceleration).all():
+    if not np.isfinite(force_n).all() or not np.isfinite(acceleration_mps2).all():
         raise ValueError("the recording has missing samples")
-    position = np.full(force.shape, np.nan, dtype=complex)
-    if recording.position is not None and recording.position.samples.shape[1] == force.shape[1]:
-        position = _compute_mean_spectrum(recording.position.samples[start:stop], period_samples)
-    amplitude = np.abs(excitation)
+    position_m = np.full(force_n.shape, np.nan, dtype=complex)
+    if recording.position is not None and recording.position.samples.shape[1] == force_n.shape[1]:
+        position_m = _compute_mean_spectrum(recording.position.samples[start:stop], period_samples)
+    excitation_amplitude = np.abs(excitation)
     return ProbeLines(
-        frequency_hz=np.arange(1, len(force) + 1) / period_s,
-        driven=amplitude > LEAST_DRIVEN_SHARE * amplitude.max(axis=0),
-        force_n=force,
-        acceleration_mps2=acceleration,
-        position_m=position,
+        frequency_hz=np.arange(1, len(force_n) + 1) / period_s,
+        driven=excitation_amplitude > LEAST_DRIVEN_SHARE * excitation_amplitude.max(axis=0),
+        force_n=force_n,
+        acceleration_mps2=acceleration_mps2,
+        position_m=position_m,
     )
 
 
 MASS_BAND_HZ = (30.0, 60.0)
 """Band in Hz in which the response is nearly that of a mass: friction and springs matter below it, the modes of the
-linkage above it. By hand."""
+linkage above it. Chosen by hand."""
 
 
-def estimate_apparent_mass_kg(lines: ProbeLines) -> float:
+def estimate_apparent_mass_kg(probe: ProbeLines) -> float:
     """Estimate the apparent mass in kg: median of the real part of force over acceleration, over the driven lines in
     `MASS_BAND_HZ`, each on its driven axis. A hand on the handle adds to it. Raises ValueError where there is no such
-    line, or the median is not positive."""
+    line, or the median is not a positive number."""
     low_hz, high_hz = MASS_BAND_HZ
-    in_band = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
-    line_indices, axis_indices = np.nonzero(lines.driven & in_band[:, None])
+    in_band = (probe.frequency_hz >= low_hz) & (probe.frequency_hz <= high_hz)
+    line_indices, axis_indices = np.nonzero(probe.driven & in_band[:, None])
     if not len(line_indices):
         raise ValueError(
             f"it has no driven line between {low_hz:g} and {high_hz:g} Hz, from which the handle's mass is estimated"
@@ -104,7 +105,7 @@ def estimate_apparent_mass_kg(lines: ProbeLines) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):  # a dead sensor reads zero
         mass_kg = float(
             np.median(
-                (lines.force_n[line_indices, axis_indices] / lines.acceleration_mps2[line_indices, axis_indices]).real
+                (probe.force_n[line_indices, axis_indices] / probe.acceleration_mps2[line_indices, axis_indices]).real
             )
         )
     if not np.isfinite(mass_kg) or mass_kg <= 0:
@@ -113,8 +114,8 @@ def estimate_apparent_mass_kg(lines: ProbeLines) -> float:
 
 
 def _compute_mean_spectrum(samples: FloatArray, period_samples: int) -> ComplexArray:
-    """Compute (lines, axes): spectrum of the mean of the last whole periods, without the lines at zero and half the
-    rate. samples: (n, axes). Raises ValueError where they are shorter than a period."""
+    """Compute (lines, axes): spectrum of the mean of the last whole periods, lines 1 to below half the sample rate.
+    samples: (n, axes). Raises ValueError where they are shorter than a period."""
     period_count = len(samples) // period_samples
     if not period_count:
         raise ValueError("less than one whole period was recorded")
@@ -137,16 +138,16 @@ def compute_friction_spectra(probes: tuple[ProbeLines, ...], period_samples: int
     lengths_m = np.array(BREAK_AWAY_LENGTHS_M)[:, None, None]
     friction_n = np.zeros((len(BREAK_AWAY_LENGTHS_M), *position_m.shape[1:]))
     last_period_n = np.zeros((period_samples, *friction_n.shape))
-    for sample in range(INTEGRATED_PERIODS * period_samples):
-        step = step_m[sample % period_samples][None]
+    for sample_index in range(INTEGRATED_PERIODS * period_samples):
+        step = step_m[sample_index % period_samples][None]
         direction = np.sign(step)
         # Exact over a step of constant direction, so that the force never leaves -1 to 1, however long the step.
         sliding_force = direction - (direction - friction_n) * np.exp(-np.abs(step) / lengths_m)
         friction_n = np.where(step == 0, friction_n, sliding_force)
-        last_period_n[sample % period_samples] = friction_n
+        last_period_n[sample_index % period_samples] = friction_n
     spectrum: ComplexArray = 2 / period_samples * np.fft.rfft(last_period_n, axis=0)[1 : period_samples // 2]
-    shapes: ComplexArray = np.moveaxis(spectrum, 0, 2)
-    return shapes
+    friction_spectra: ComplexArray = np.moveaxis(spectrum, 0, 2)
+    return friction_spectra
 
 
 def _estimate_position_m(probe: ProbeLines, period_samples: int) -> FloatArray:
@@ -154,9 +155,9 @@ def _estimate_position_m(probe: ProbeLines, period_samples: int) -> FloatArray:
     acts; without them, the acceleration integrated twice."""
     frequency_hz = probe.frequency_hz[:, None]
     if np.isfinite(probe.position_m).all():
-        position_lines_m = np.where(frequency_hz <= POSITION_TO_HZ, probe.position_m, 0)
+        position_lines_m = np.where(frequency_hz <= HIGHEST_POSITION_HZ, probe.position_m, 0)
     else:
-        in_band = (frequency_hz >= INTEGRATION_FROM_HZ) & (frequency_hz <= POSITION_TO_HZ)
+        in_band = (frequency_hz >= LOWEST_INTEGRATED_HZ) & (frequency_hz <= HIGHEST_POSITION_HZ)
         position_lines_m = np.where(in_band, probe.acceleration_mps2 / -((2 * np.pi * frequency_hz) ** 2), 0)
     spectrum = np.zeros((period_samples // 2 + 1, position_lines_m.shape[1]), dtype=complex)
     spectrum[1 : period_samples // 2] = position_lines_m * period_samples / 2

@@ -1,4 +1,4 @@
-"""The whole diagnosis as one function of values: recordings in, findings out, with or without a model.
+"""Diagnose recordings in one function of values: recordings in, findings out, with or without a model.
 
 Checks and prepares the recordings, fits a linear first model where none is given, and calls `diagnose`. This is
 `analysis.diagnose` of the Python interface.
@@ -20,7 +20,7 @@ from equalizer.signals.recording import Recording
 
 
 def _ignore_progress(step: str, share: float) -> None:
-    """No progress is shown."""
+    """Do nothing: the default where no progress is shown."""
 
 
 def diagnose_values(
@@ -30,13 +30,13 @@ def diagnose_values(
     map_: Mapper = map,
     progress: Progress = _ignore_progress,
 ) -> Findings:
-    """Findings about the physics that a model of the device lacks.
+    """Find the physics that a model of the device lacks.
 
     recordings: of one device, alike in channels, units and rate. model: None = a linear model is fitted to them, or to
     the clean recordings where there are any. settings: effects left out of the search, clean recordings of the device,
     compared signals. map_: as `map`, may run in parallel. progress: receives a description of the current step and the
-    share that is done. Raises NothingToDiagnose with the error in the recordings, IncomparableRecordingsError where
-    clean recordings cannot be compared with them."""
+    share of it that is done, 0 to 1. Raises NothingToDiagnose with the errors in the recordings or the model,
+    IncomparableRecordingsError where clean recordings cannot be compared with them."""
     recording_list = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or DiagnosisSettings()
     names = settings.names or tuple(f"recording {number}" for number in range(1, len(recording_list) + 1))
@@ -44,23 +44,26 @@ def diagnose_values(
     require_comparable((*recording_list, *settings.clean), (*names, *clean_names))
     prepared = prepare_recordings(recording_list, names, model is None and not settings.clean)
     clean = prepare_recordings(settings.clean, clean_names, False).recordings if settings.clean else ()
-    common = keep_common_signals((*prepared.recordings, *clean))
-    compared, remarks = common.recordings[: len(recording_list)], (*prepared.remarks, *common.remarks)
-    settings = replace(settings, names=names, clean=common.recordings[len(recording_list) :])
+    common_signals = keep_common_signals((*prepared.recordings, *clean))
+    compared_recordings, remarks = (
+        common_signals.recordings[: len(recording_list)],
+        (*prepared.remarks, *common_signals.remarks),
+    )
+    settings = replace(settings, names=names, clean=common_signals.recordings[len(recording_list) :])
     if model is None:
-        first = _first_model(compared, settings, map_, progress)
-        model, remarks = first.model, (*remarks, *first.remarks)
-        settings = replace(settings, fitted=True, balances=first.balances)
+        first_model = _fit_first_model(compared_recordings, settings, map_, progress)
+        model, remarks = first_model.model, (*remarks, *first_model.remarks)
+        settings = replace(settings, fitted=True, balances=first_model.balances)
     else:
-        require_model_of(model, compared)
-    findings = diagnose(compared, model, settings, map_, progress)
+        require_model_of(model, compared_recordings)
+    findings = diagnose(compared_recordings, model, settings, map_, progress)
     return replace(findings, remarks=(*remarks, *findings.remarks))
 
 
-def _first_model(
+def _fit_first_model(
     recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper, progress: Progress
 ) -> FirstModel:
-    """A linear model with remarks: of these recordings with their force balances, or of the clean ones alone."""
+    """Fit a linear model, with remarks: to these recordings, with their force balances, or to the clean ones alone."""
     if not settings.clean:
         return fit_first_model(recordings, settings.without, settings.time_left, progress, map_)
     step = "fitting a linear model, as none was given"

@@ -1,6 +1,7 @@
 """Plain words for the effects of the vocabulary: nouns, places, units, and how their parameters are printed.
 
-Used by the sentences, tables and figures of a diagnosis (`analysis/diagnosis/result`, `analysis/reports`).
+Called for the sentences, tables and figures of a diagnosis, by `analysis.diagnosis.result`, `analysis.reports`,
+`analysis.figures.diagnosis` and others.
 """
 
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.signals.unit_system import UnitSystem
 
 _VALUE_ALONE = "{}"
+"""Format of a parameter that is printed without words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +21,10 @@ class EffectWords:
     """Words for an effect of the vocabulary: its noun, and how its parameters are printed."""
 
     noun: str
+    """With its article, as in a sentence: "a sensor offset"."""
     parameters: Mapping[str, str] = field(default_factory=dict)
-    """Words by parameter, in the order of printing; other parameters are not printed. Empty text: the main
-    parameter."""
+    """Format by parameter, "{}" for its value, in the order of printing; other parameters are not printed. Empty: the
+    main parameter alone is printed."""
     shares: tuple[str, ...] = ()
     """Parameters that are printed in per cent."""
 
@@ -104,6 +107,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "logger_offset": EffectWords("a delay of the logger", {"offset": _VALUE_ALONE}),
     "lost_samples": EffectWords("lost samples", {"fraction": "{} of all"}, ("fraction",)),
 }
+"""Words by name of the effect in the vocabulary; without parameters: the main parameter alone is printed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +121,11 @@ class LawWords:
 
 
 _FORCE, _DAMPING, _STIFFNESS = ("N", "N m"), ("N s/m", "N m s/rad"), ("N/m", "N m/rad")
+"""SI units of a translational and of a rotational model."""
 _CHANGE = "by {} from the middle to the end"
+"""Format of a change during a recording."""
 _PER_CONDITION = "{} per standard deviation of the condition"
+"""Format of the change of a law with a recorded condition."""
 LAW_WORDS: Mapping[str, LawWords] = {
     "viscoelastic_relaxation": LawWords(
         EffectWords(
@@ -190,48 +197,52 @@ SIMULATED_AS_FORMULA = (
     "actuator_curve", "condition_dependent_friction", "condition_dependent_damping", "condition_dependent_stiffness",
     "condition_dependent_force",
 )  # fmt: skip
-"""Those of them that are simulated as a discovered law."""
+"""Laws of `LAW_WORDS` that are simulated as a discovered law, by their formula."""
 
 WHOLE_DEVICE_FAULTS = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
 """Faults of the whole sensor or logger, for which no place is named where all channels share them."""
 
 
 def get_noun(effect: str) -> str:
-    """The plain noun of an effect; its name with spaces where it has none."""
+    """Return the plain noun of an effect; its name with spaces for underscores where it has none."""
     words = _find_words(effect)
     return words.noun if words else effect.replace("_", " ")
 
 
 def get_place(effect: str) -> Place:
-    """Place (mechanism, actuator, sensor or hand) at which an effect of the vocabulary, or a law outside it, acts."""
-    entry = EFFECTS_BY_NAME.get(effect)
-    law = LAW_WORDS.get(effect)
-    return entry.place if entry is not None else "mechanism" if law is None else law.place
+    """Return the place (mechanism, actuator, sensor or hand) at which an effect of the vocabulary, or a law outside it,
+    acts; "mechanism" for an unknown name."""
+    catalogue_entry = EFFECTS_BY_NAME.get(effect)
+    law_words = LAW_WORDS.get(effect)
+    return (
+        catalogue_entry.place if catalogue_entry is not None else "mechanism" if law_words is None else law_words.place
+    )
 
 
 def _find_words(effect: str) -> EffectWords | None:
-    """Words for an effect of the vocabulary or a law of `LAW_WORDS`; None for any other name."""
-    law = LAW_WORDS.get(effect)
-    return EFFECT_WORDS.get(effect) if law is None else law.words
+    """Find the words for an effect of the vocabulary or a law of `LAW_WORDS`; None for any other name."""
+    law_words = LAW_WORDS.get(effect)
+    return EFFECT_WORDS.get(effect) if law_words is None else law_words.words
 
 
 def get_parameter_unit(effect: str, parameter: str, system: UnitSystem) -> str:
-    """The unit of an effect's parameter; "1" where it is not known."""
+    """Return the unit of an effect's parameter in the unit system; "1" where it is not known."""
     if effect in LAW_WORDS:
-        linear, rotational = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
-        return rotational if system.rotational else system.express(linear)
-    entry = EFFECTS_BY_NAME.get(effect)
-    units = {} if entry is None else {p.name: p.find_unit(system, "1") for p in entry.parameters}
+        linear_unit, rotational_unit = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
+        return rotational_unit if system.rotational else system.express(linear_unit)
+    catalogue_entry = EFFECTS_BY_NAME.get(effect)
+    units = {} if catalogue_entry is None else {p.name: p.find_unit(system, "1") for p in catalogue_entry.parameters}
     return units.get(parameter, "1")
 
 
-def format_place(place: Place, axis: str | None, single: bool = False) -> str:
-    """Where an effect acts, in words. single: the device has one axis, which then needs no name."""
+def format_place(place: Place, axis: str | None, is_single_axis: bool = False) -> str:
+    """Describe where an effect acts, in words. axis: its axis or channel; None = all. is_single_axis: the device has
+    one axis, which then needs no name."""
     if place == "hand":
-        return "at the handle" if axis is None or single else f"at the handle, along {axis}"
+        return "at the handle" if axis is None or is_single_axis else f"at the handle, along {axis}"
     one_place, all_places = _PLACE_PHRASES[place]
     if axis is None:
-        return one_place.format("").replace("  ", " ") if single else all_places
+        return one_place.format("").replace("  ", " ") if is_single_axis else all_places
     return one_place.format(axis)
 
 
@@ -240,28 +251,31 @@ _PLACE_PHRASES: Mapping[str, tuple[str, str]] = {
     "actuator": ("in the {} actuator", "in all actuators"),
     "sensor": ("in the {} channel", "in all channels"),
 }
+"""Phrases for one axis or channel and for all, by place."""
 
 
 def format_parameters(effect: str, parameters: Mapping[str, Estimate]) -> str:
-    """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
+    """Format the parameters of an effect, as "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest". An effect
+    without words for them: its main parameter, or the first one where the vocabulary lacks the effect. A
+    parameter "side" is added as a direction."""
     effect_words = _find_words(effect)
-    wording = dict(effect_words.parameters) if effect_words else {}
-    if not wording:
-        main = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]
-        wording = dict.fromkeys(main, _VALUE_ALONE)
-    shares = effect_words.shares if effect_words else ()
-    texts = [
-        words.format(format_estimate(parameters[name], name in shares))
-        for name, words in wording.items()
+    format_by_parameter = dict(effect_words.parameters) if effect_words else {}
+    if not format_by_parameter:
+        main_parameter = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]
+        format_by_parameter = dict.fromkeys(main_parameter, _VALUE_ALONE)
+    percent_parameters = effect_words.shares if effect_words else ()
+    parameter_texts = [
+        parameter_format.format(format_estimate(parameters[name], name in percent_parameters))
+        for name, parameter_format in format_by_parameter.items()
         if name in parameters
     ]
     if "side" in parameters:
-        texts.append(f"reached in the {'positive' if parameters['side'].value > 0 else 'negative'} direction")
-    return ", ".join(texts)
+        parameter_texts.append(f"reached in the {'positive' if parameters['side'].value > 0 else 'negative'} direction")
+    return ", ".join(parameter_texts)
 
 
-def format_estimate(estimate: Estimate, share: bool = False) -> str:
-    """An estimate with its unit and 95 % interval. share: print it in per cent."""
-    if share:
+def format_estimate(estimate: Estimate, is_percent: bool = False) -> str:
+    """Format an estimate with its unit and 95 % interval. is_percent: print it in per cent."""
+    if is_percent:
         return format_percent(estimate.value, estimate.ci95)
     return format_value(estimate.value, estimate.unit, estimate.ci95)

@@ -1,4 +1,4 @@
-"""Formats physical values for reports: SI prefixes, raised exponents, and as many digits as the confidence interval
+"""Format physical values for reports: SI prefixes, raised exponents, and as many digits as the confidence interval
 allows. Used by the sentences, tables and figures of a diagnosis.
 """
 
@@ -12,7 +12,7 @@ from analysis.wording import typeset
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
 """SI prefixes with their factors."""
 _RANGE_WITHOUT_PREFIX = (0.01, 1e4)
-"""Values within this range are shown in the unit itself."""
+"""Values from the first to below the second are shown in the unit itself. Chosen by hand."""
 _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
 """Units for which a prefix is usual within that range too: 54 mm, not 0.054 m."""
 _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
@@ -20,22 +20,25 @@ _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
 _NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
 """Units that begin with a reciprocal or a power: a prefix would be raised to it as well."""
 _SUPERSCRIPTS = {"^2": "²", "^3": "³"}
+"""Raised exponents by their ASCII notation."""
 _SYMBOLS = {"deg": "°"}
+"""Symbols of units that are not shown by their ASCII name."""
 _MOST_DIGITS, _USUAL_DIGITS = 5, 3
-"""Most significant digits of a number, and the usual ones."""
+"""Most significant digits of a number, and the usual number of them. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How a unit is shown: a value in SI, times `factor`, is in `unit`."""
+    """Displayed unit: a value in SI, times `factor`, is in `unit`."""
 
     factor: float
     unit: str
 
 
 _INERTIA_SCALES = (Scale(1.0, "kg m²"), Scale(1e4, "kg cm²"), Scale(1e7, "g cm²"))
+"""Displayed units of inertia, from the largest to the smallest."""
 _LEAST_INERTIA = 0.1
-"""Smallest value shown in a unit of inertia; below it the next smaller unit is used."""
+"""Smallest value shown in a unit of inertia; below it the next smaller unit is used. Chosen by hand."""
 
 
 def choose_scale(unit: str, magnitude: float) -> Scale:
@@ -56,6 +59,7 @@ def choose_scale(unit: str, magnitude: float) -> Scale:
     in_range = _RANGE_WITHOUT_PREFIX[0] <= absolute_value < _RANGE_WITHOUT_PREFIX[1] and unit not in _ALWAYS_PREFIXED
     if in_range or absolute_value == 0 or unit in _NEVER_PREFIXED or _NO_PREFIX.match(unit):
         return Scale(1.0, typeset_unit(unit))
+    # The tolerance is for values that rounding leaves just below a power of 1000.
     factor, prefix = max(
         (prefixed for prefixed in _PREFIXES if prefixed[0] <= absolute_value * (1 + 1e-9)), default=_PREFIXES[0]
     )
@@ -121,6 +125,7 @@ def _choose_decimals(value: float, interval: tuple[float, float] | None) -> int:
     if interval is None or not interval[1] > interval[0]:
         return int(max(0, _USUAL_DIGITS - 1 - order_of_magnitude))
     half_width = (interval[1] - interval[0]) / 2
+    # Slightly widened, so that rounding below a power of ten adds no digit.
     decimals = -int(np.floor(np.log10(half_width * 1.0001)))
     return int(np.clip(decimals, 0, max(0, _MOST_DIGITS - 1 - order_of_magnitude)))
 

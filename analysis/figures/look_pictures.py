@@ -22,7 +22,8 @@ from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 
 ENVELOPE_COLUMNS = 1200
-"""Columns of a drawn time series, each from its lowest to its highest sample."""
+"""Columns of a drawn time series, each from its lowest to its highest sample. The numbers of this module are chosen by
+hand."""
 SHOWN_SAMPLES = 600
 """Samples that are shown where two time series are compared."""
 _FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
@@ -30,6 +31,7 @@ _FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 _SHOWN_DECADES = 8
 """Decades of amplitude that a spectrum shows, from its largest value down."""
 _ROLE_COLOURS = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
+"""Colour of a channel by its role."""
 
 
 def make_look_pictures(overview: Overview, number: int) -> tuple[Picture, ...]:
@@ -109,8 +111,11 @@ def _make_spectra_picture(overview: Overview, name: str) -> Picture:
         panel.plot(frequency_hz, np.where(amplitude > 0, amplitude, np.nan), color=_ROLE_COLOURS[channel.role], lw=1.0)
         panel.set_yscale("log")
         if amplitude.max() > 0:
-            top = float(amplitude.max())
-            panel.set_ylim(max(0.5 * float(amplitude[amplitude > 0].min()), top * 10.0**-_SHOWN_DECADES), 2 * top)
+            largest_amplitude = float(amplitude.max())
+            panel.set_ylim(
+                max(0.5 * float(amplitude[amplitude > 0].min()), largest_amplitude * 10.0**-_SHOWN_DECADES),
+                2 * largest_amplitude,
+            )
         _shade_bands(panel, overview)
     axes[0].set_xscale("log")
     axes[0].set_xlim(float(frequency_hz[0]), float(frequency_hz[-1]))
@@ -129,15 +134,15 @@ def _make_spectra_picture(overview: Overview, name: str) -> Picture:
 def _shade_bands(panel: Axes, overview: Overview) -> None:
     """Shade from the lowest to the highest driven frequency."""
     if overview.bands:
-        low, high = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
-        panel.axvspan(low, high, color=_BAND_COLOUR, zorder=0)
+        low_hz, high_hz = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
+        panel.axvspan(low_hz, high_hz, color=_BAND_COLOUR, zorder=0)
 
 
 def _select_band_lines(overview: Overview) -> Mask:
-    """(lines,): the spectral lines from the lowest to the highest driven frequency."""
+    """Select the spectral lines from the lowest to the highest driven frequency, as a mask (lines,)."""
     assert overview.spectra is not None
-    low, high = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
-    return np.asarray((overview.spectra.frequency_hz >= low) & (overview.spectra.frequency_hz <= high))
+    low_hz, high_hz = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
+    return np.asarray((overview.spectra.frequency_hz >= low_hz) & (overview.spectra.frequency_hz <= high_hz))
 
 
 def _make_coherence_picture(overview: Overview, name: str) -> Picture:
@@ -181,12 +186,14 @@ def _make_levels_picture(overview: Overview, name: str) -> Picture:
     panel = figure.subplots()
     style_axes(panel)
     numbers = [level.number for level in overview.levels]
-    strongest = [max(level.rms[k] for level in overview.levels) for k in range(len(overview.channels))]
+    largest_rms = [max(level.rms[k] for level in overview.levels) for k in range(len(overview.channels))]
     drawn_channels = [
-        k for k, channel in enumerate(overview.channels) if channel.role in ("command", "response") and strongest[k] > 0
+        k
+        for k, channel in enumerate(overview.channels)
+        if channel.role in ("command", "response") and largest_rms[k] > 0
     ]
     for position, k in enumerate(drawn_channels):
-        relative_rms = np.array([level.rms[k] for level in overview.levels]) / strongest[k]
+        relative_rms = np.array([level.rms[k] for level in overview.levels]) / largest_rms[k]
         panel.plot(
             numbers,
             np.where(relative_rms > 0, relative_rms, np.nan),
@@ -195,7 +202,7 @@ def _make_levels_picture(overview: Overview, name: str) -> Picture:
             markersize=5,
             linewidth=0.8,
             linestyle=":" if overview.channels[k].role == "command" else "-",
-            label=f"{overview.channels[k].label} ({_format_unit(overview.channels[k].format(strongest[k]))})",
+            label=f"{overview.channels[k].label} ({_format_unit(overview.channels[k].format(largest_rms[k]))})",
         )
     panel.set_ylim(0, 1.05)
     panel.set_xlabel("Segment", fontsize=10)
@@ -238,16 +245,16 @@ def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
     """Draw a recorded channel, and central differences of the channel whose derivative it should be."""
     rate_hz = overview.recording.sample_rate_hz
     by_label = {channel.label: channel for channel in overview.channels}
-    recorded = by_label[pair.derivative]
+    recorded = by_label[pair.higher_label]
     start, stop = _find_most_varying_part(recorded, overview.stretches)
     times_s = np.arange(start, stop) / rate_hz
     # Differences within this stretch only: positions jump where two parts of a recording meet.
-    differences = differentiate(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
+    differences = differentiate(by_label[pair.lower_label].samples[start:stop], pair.order, rate_hz)
     style_axes(panel)
     panel.plot(times_s, recorded.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
     panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
     panel.set_title(
-        f"{pair.derivative} ({_format_unit(recorded.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3
+        f"{pair.higher_label} ({_format_unit(recorded.unit)}) and {pair.lower_label}", fontsize=9, loc="left", pad=3
     )
     panel.set_xlim(float(times_s[0]), float(times_s[-1]))
 
@@ -255,16 +262,16 @@ def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
 def _find_most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """Find first and end sample of the `SHOWN_SAMPLES` samples (or fewer, in a shorter stretch) in which the channel's
     variance is largest; missing samples count as the mean."""
-    largest, best_part = -1.0, stretches[0]
+    largest_variance, best_part = -1.0, stretches[0]
     for start, stop in stretches:
         centred = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
         length = min(SHOWN_SAMPLES, len(centred))
-        sums, squares = (np.concatenate([[0.0], np.cumsum(values)]) for values in (centred, centred**2))
+        sums, sums_of_squares = (np.concatenate([[0.0], np.cumsum(values)]) for values in (centred, centred**2))
         mean = (sums[length:] - sums[:-length]) / length
-        variance = (squares[length:] - squares[:-length]) / length - mean**2
-        if variance.max() > largest:
+        variance = (sums_of_squares[length:] - sums_of_squares[:-length]) / length - mean**2
+        if variance.max() > largest_variance:
             first = start + int(np.argmax(variance))
-            largest, best_part = float(variance.max()), (first, first + length)
+            largest_variance, best_part = float(variance.max()), (first, first + length)
     return best_part
 
 

@@ -32,7 +32,7 @@ def make_power_picture(
     points: Sequence[PowerPoint],
     effect_db: float,
     pair_hz: tuple[float, float],
-    threshold_noun: str = REVERSAL_WORDS.means,
+    threshold_noun: str = REVERSAL_WORDS.noun,
 ) -> Picture:
     """Make the picture of power and coverage with its caption. points: at least one, each of one sample size.
     effect_db: true threshold at the first frequency of pair_hz minus that at the second; 0: the power is the type-1

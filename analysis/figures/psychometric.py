@@ -37,7 +37,7 @@ from analysis.psychophysics.hierarchy.observed_shares import (
 from protocols.procedure.staircase import to_db
 
 _ROW_HEIGHT_IN = 2.2
-"""Height of a row of panels, inches."""
+"""Height of a row of panels, inches. The numbers of this module are chosen by hand."""
 _SMALLEST_MARKER, _LARGEST_MARKER = 2.5, 7.5
 """Marker sizes in points: the lower limit, for very few trials, and that of `_LARGEST_MARKER_TRIALS` trials or more."""
 _LARGEST_MARKER_TRIALS = 100
@@ -77,13 +77,13 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
     """Draw one person, one panel per frequency with answers, over the level in newtons; a note without answers. person:
     index in `answers`. cap_n: cap of the level, a dashed line."""
     estimate, frequency_count = fit.persons[person], len(fit.frequencies_hz)
-    answered = [
+    answered_frequencies = [
         (index, shares) for index in range(frequency_count) if (shares := compute_person_shares(answers, person, index))
     ]
-    if not answered:
+    if not answered_frequencies:
         return draw_no_data_note(create_figure(4.0, 2.0), "There is no answer to draw.")
-    figure, panels = create_panel_grid(len(answered), _ROW_HEIGHT_IN)
-    for axes, (index, shares) in zip(panels, answered, strict=False):
+    figure, panels = create_panel_grid(len(answered_frequencies), _ROW_HEIGHT_IN)
+    for axes, (index, shares) in zip(panels, answered_frequencies, strict=False):
         levels_n = [10.0 ** (share.level_db / 20.0) for share in shares]
         low_n, high_n = 0.8 * min(levels_n), 1.15 * max(*levels_n, cap_n)
         level_n = np.geomspace(low_n, high_n, 200)
@@ -104,7 +104,7 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
         axes.set_xlim(low_n, high_n)
         threshold_text = "above the cap" if estimate.above_cap[index] else f"{estimate.thresholds_n[index]:.2f} N"
         axes.set_title(f"{fit.frequencies_hz[index]:g} Hz: {threshold_text}", fontsize=10, loc="left")
-    label_panel_axes(panels, len(answered), "Level (N)", "Right (%)")
+    label_panel_axes(panels, len(answered_frequencies), "Level (N)", "Right (%)")
     cap_handle = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")
     panels[-1].legend(
         handles=[*_make_legend_handles("curve of the model"), cap_handle], loc="center", fontsize=8.5, frameon=False

@@ -30,7 +30,7 @@ from analysis.psychophysics.thresholds import RunEnd, Threshold, compute_run_thr
 from protocols.definition.staircase_rule import StaircaseRule
 
 _PANEL_ROW_HEIGHT_IN = 2.2
-"""Height of a row of panels, in inches."""
+"""Height of a row of panels, in inches. Chosen by hand."""
 
 
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
@@ -94,7 +94,7 @@ def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
 
 
 def _describe_outcome(threshold: Threshold) -> str:
-    """Text that ends a panel's title: the threshold in N, or why there is none."""
+    """Describe how a run ended, at the end of its panel's title: the threshold in N, or why there is none."""
     if threshold.threshold_n is not None:
         return f": {threshold.threshold_n:.2f} N{', cut by the cap' if threshold.censored else ''}"
     return " (stopped by the trial limit)" if threshold.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
@@ -112,7 +112,7 @@ def _make_legend_handles(rule: StaircaseRule) -> list[Line2D]:
 
 
 def _make_reversal_handles(rule: StaircaseRule) -> list[Line2D]:
-    """Legend entries of averaged and other reversals."""
+    """Make the legend entries of averaged and other reversals."""
     return [
         _make_circle_handle(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
         _make_circle_handle(GREY, "reversal, not averaged"),

@@ -62,7 +62,7 @@ def _make_thresholds_picture(analysis: StudyAnalysis) -> Picture:
         caption="One marker and line per participant. Hollow markers with an arrow are cut by the cap; those above "
         "the cap are runs that the trial limit stopped. Black: group mean with comparison interval: two means differ "
         "significantly when their intervals do not overlap. They are not confidence intervals of the means."
-        + (f" {analysis.table.coverage}" if analysis.table.coverage else ""),
+        + (f" {analysis.table.coverage_warning}" if analysis.table.coverage_warning else ""),
         figure=draw_thresholds(analysis.table, analysis.comparisons, analysis.protocol.staircase.cap_n),
     )
 
@@ -119,7 +119,7 @@ def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
         name="psychometric",
         title="Psychometric functions, all people together",
         caption=f"{points_text}Levels are relative to each person's threshold by the model of all answers, whose curve "
-        f"is drawn. {select_threshold_words(analysis.protocol.staircase).levels}",
+        f"is drawn. {select_threshold_words(analysis.protocol.staircase).misfit_note}",
         figure=draw_people_curves(answer_counts, primary),
     )
     return [
@@ -182,7 +182,7 @@ def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
         Picture(
             name=f"staircases-{index}-{_sanitize_subject_code(subject)}",
             title=f"{'Levels' if analysis.protocol.staircase.is_bayesian else 'Staircases'} of {subject}",
-            caption=select_threshold_words(analysis.protocol.staircase).track,
+            caption=select_threshold_words(analysis.protocol.staircase).run_caption,
             figure=draw_staircases(
                 [run for run in analysis.runs if run.subject == subject], analysis.protocol.staircase
             ),

@@ -13,15 +13,18 @@ from matplotlib.figure import Figure
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6B6B6B"
 WINE, OLIVE, TEAL = "#882255", "#999933", "#117766"
+"""Colours as RGB hex; their sources are in the module docstring and at `COLOURS`."""
 COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK, WINE, OLIVE, TEAL)
-"""Ten, for the ten participants of the published study; the last three after P. Tol's muted scheme."""
+"""Ten colours, for the ten participants of the published study; the last three after P. Tol's muted scheme."""
 MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
+"""As many as colours, so that participants differ without colour, too."""
 CENSORED_MARKER = "$\\uparrow$"
 """An arrow above the participant's own marker: the cap (largest level) limited this threshold."""
 _TICK_MULTIPLES = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
-"""Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. Set by hand."""
+"""Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. Chosen by hand."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Raised characters for exponents."""
 
 PAGE_WIDTH_IN = 7.2
 """Width of a figure over both columns of a paper (183 mm); text of 8 to 10 points needs no scaling there."""

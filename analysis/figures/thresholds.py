@@ -1,7 +1,8 @@
 """Figure of individual thresholds and group means by frequency (the published figure 2).
 
 Thresholds that the cap cut (censored) are hollow with an arrow upwards; runs that the trial limit stopped have no
-threshold and are drawn above the cap.
+threshold and are drawn above the cap. Called by `study_pictures`; `thresholds_by_unit` and `medians` use
+`draw_threshold` alone.
 """
 
 import numpy as np
@@ -23,18 +24,19 @@ from analysis.figures.style import (
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
 
-_SPREAD = 0.5
+_MARKER_SPREAD_TICKS = 0.5
 """Width over which the participants' markers are spread at each frequency, in distances between ticks."""
-_LEGEND_LIMIT = 24
-"""Largest number of participants that the legend lists."""
-_STOPPED_AT = 1.07
-"""Height at which stopped runs are drawn, as a multiple of the cap."""
+_LARGEST_LEGEND = 24
+"""Largest number of participants for which the legend lists each one; with more it lists none."""
+_STOPPED_RUN_HEIGHT = 1.07
+"""Height at which stopped runs are drawn, as a multiple of the cap: chosen between the cap and the end of the axis."""
 
 
 def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> Figure:
     """Draw each participant's thresholds, joined by a line, and the group mean with its comparison interval.
 
-    table: thresholds in newtons. comparisons: of the same table; where it has no intervals, means are drawn without.
+    table: thresholds in newtons; a figure with a note where it has no participant. comparisons: of the same table;
+    where it has no intervals, means are drawn without.
     cap_n: largest force of the study (N), drawn as a line.
     """
     figure = create_figure(PAGE_WIDTH_IN, 4.2)
@@ -48,72 +50,82 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
         ha="left", fontsize=9, color=GREY,
     )  # fmt: skip
     _draw_participants(axes, table)
-    _draw_stopped(axes, table, cap_n)
+    _draw_stopped_runs(axes, table, cap_n)
     _draw_means(axes, table, comparisons)
     axes.set_xticks(range(len(table.frequencies_hz)), [f"{f:g}" for f in table.frequencies_hz])
     axes.set_xlim(-0.6, len(table.frequencies_hz) - 0.4)
     axes.set_ylim(0, 1.15 * cap_n)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
-    figure.legend(handles=_legend_handles(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False)
+    figure.legend(
+        handles=_make_legend_handles(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False
+    )
     return figure
 
 
 def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
-    count = len(table.subjects)
+    """Draw each participant's thresholds in a colour and marker, joined by a thin line; gaps are left open."""
+    participant_count = len(table.subjects)
     # A fixed offset from the tick instead of random jitter: a participant has the same offset at every frequency.
-    offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, count) if count > 1 else np.zeros(1)
+    offsets = (
+        np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, participant_count)
+        if participant_count > 1
+        else np.zeros(1)
+    )
     for index, row in enumerate(table.values):
         positions = np.arange(len(row)) + offsets[index]
-        values = np.array([np.nan if value is None else value for value in row], dtype=float)
-        axes.plot(positions, values, "-", color=choose_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
-        for x, value, cut in zip(positions, row, table.censored[index], strict=True):
+        threshold_values = np.array([np.nan if value is None else value for value in row], dtype=float)
+        axes.plot(positions, threshold_values, "-", color=choose_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
+        for position, value, is_censored in zip(positions, row, table.censored[index], strict=True):
             if value is not None:
-                draw_threshold(axes, x, value, index, cut)
+                draw_threshold(axes, position, value, index, is_censored)
 
 
-def draw_threshold(axes: Axes, x: float, value: float, participant: int, cut: bool) -> None:
-    """Draw one threshold (N) at the place x of its frequency; hollow with an arrow upwards if the cap cut it.
-    participant: index, which determines marker and colour."""
+def draw_threshold(axes: Axes, position: float, threshold: float, participant: int, is_censored: bool) -> None:
+    """Draw the marker of one threshold; hollow with an arrow upwards if it is censored by the cap. position, threshold:
+    in the units of the axes. participant: index, which determines marker and colour."""
     colour = choose_colour(participant)
-    axes.plot(x, value, choose_marker(participant), color=colour, markersize=6, alpha=0.85,
-              markerfacecolor="white" if cut else colour, markeredgecolor=colour if cut else "white",
-              markeredgewidth=1.1 if cut else 0.5)  # fmt: skip
-    if cut:
-        axes.annotate("", (x, value), xytext=(0, 13), textcoords="offset points", zorder=2,
+    axes.plot(position, threshold, choose_marker(participant), color=colour, markersize=6, alpha=0.85,
+              markerfacecolor="white" if is_censored else colour, markeredgecolor=colour if is_censored else "white",
+              markeredgewidth=1.1 if is_censored else 0.5)  # fmt: skip
+    if is_censored:
+        axes.annotate("", (position, threshold), xytext=(0, 13), textcoords="offset points", zorder=2,
                       arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 0.9, "shrinkB": 3.5,
                                   "shrinkA": 0})  # fmt: skip
 
 
-def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
+def _draw_stopped_runs(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
     """Draw a hollow marker above the cap for each stopped run, which has no threshold."""
-    offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, max(2, len(table.subjects)))
+    offsets = np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, max(2, len(table.subjects)))
     for index, row in enumerate(table.stopped):
         for position, is_stopped in enumerate(row):
             if is_stopped:
-                axes.plot(position + offsets[index], _STOPPED_AT * cap_n, choose_marker(index), markersize=6,
+                axes.plot(position + offsets[index], _STOPPED_RUN_HEIGHT * cap_n, choose_marker(index), markersize=6,
                           color=choose_colour(index), markerfacecolor="none")  # fmt: skip
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
-    """Draw the mean of each frequency, with its comparison interval where there is one."""
+    """Draw the mean of the measured thresholds at each frequency, with its comparison interval where there is one."""
     intervals = {interval.name: interval for interval in comparisons.intervals}
     for position, (name, values) in enumerate(table.group_by_frequency().items()):
-        measured = [value for value in values if value is not None]
-        if not measured:
+        measured_thresholds = [value for value in values if value is not None]
+        if not measured_thresholds:
             continue
-        mean = float(np.mean(measured))
+        mean = float(np.mean(measured_thresholds))
         half_width = intervals[name].upper - mean if name in intervals else None
         axes.errorbar(position, mean, yerr=half_width, fmt="_", color=BLACK, markersize=22, markeredgewidth=2.4,
                       elinewidth=1.6, capsize=4, zorder=4)  # fmt: skip
 
 
-def _legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
-    percent = f"{100 * comparisons.confidence:g} %"
-    coverage_note = ",\nwithout coverage" if table.coverage else ""
-    mean = f"mean, {percent}\ncomparison interval{coverage_note}" if comparisons.intervals else "mean"
-    handles = [Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0, label=mean)]
-    if table.cut:
+def _make_legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
+    """Make the legend's entries: mean, censored and stopped runs where there are any, and the participants."""
+    confidence_text = f"{100 * comparisons.confidence:g} %"
+    coverage_note = ",\nwithout coverage" if table.coverage_warning else ""
+    mean_label = f"mean, {confidence_text}\ncomparison interval{coverage_note}" if comparisons.intervals else "mean"
+    handles = [
+        Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0, label=mean_label)
+    ]
+    if table.censored_count:
         handles.append(
             Line2D(
                 [],
@@ -137,7 +149,7 @@ def _legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Lin
                 label="above the cap: stopped\nby the trial limit",
             )
         )
-    if len(table.subjects) <= _LEGEND_LIMIT:
+    if len(table.subjects) <= _LARGEST_LEGEND:
         handles += [
             Line2D([], [], color=choose_colour(index), marker=choose_marker(index), linewidth=0, label=subject)
             for index, subject in enumerate(table.subjects)

@@ -1,8 +1,7 @@
 """The channels of a recording as a flat list, for checks that treat each channel alike; text and rms of their values.
 
 A recording groups its channels by signal (command, response, position and so on); here each channel is one item with
-its role, name, quantity and unit. A stretch is a range of samples within which time is continuous.
-The checks of `analysis.look` use it.
+its role, name, quantity and unit. Called by `analysis.look.overview`, its checks, and the figures of recordings.
 """
 
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from equalizer.signals.recording_checks import collect_signals
 from equalizer.signals.signal import FloatArray
 
 Stretch = tuple[int, int]
-"""Index of the first sample, and of the sample after the last."""
+"""Range of samples without a gap in time: index of the first sample, and of the sample after the last."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

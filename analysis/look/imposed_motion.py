@@ -15,21 +15,24 @@ _BLOCKS_PER_HALF_CYCLE = 32
 """Block means per half cycle: enough averaging against noise, and short enough to keep corners sharp."""
 _HALF_CYCLES_PER_STRETCH = 4
 """Length, in half cycles, of the stretches in which the motion is compared with ramps or sinusoids."""
-_LEAST_REVERSAL = 0.1
-"""Least reversal that ends a half cycle, as a fraction of the signal's range."""
+_LEAST_REVERSAL_FRACTION = 0.1
+"""Least reversal that ends a half cycle, as a fraction of the signal's range: chosen above the noise of a sensor."""
 _TRIM_FRACTION = 0.7
 """Fraction of the samples that a fit keeps: the rest lie at the corners of ramps and trapezoids. Also the fraction of
-unchanged samples above which a signal is a series of steps."""
-_REST_SHARE = 0.1
-"""Speed squared below which the signal rests, as between the ramps of a trapezoid, relative to its 90 % quantile."""
+unchanged samples above which a signal is a series of steps. Chosen."""
+_REST_SPEED_FRACTION = 0.1
+"""Speed squared below which the signal rests, as between the ramps of a trapezoid, relative to its 90 % quantile.
+Chosen."""
 LARGEST_MISFIT = 0.1
-"""Misfit below which a signal obeys the law of ramps or sines; that of a random signal is about 0.25."""
+"""Misfit below which a signal obeys the law of ramps or sines: chosen well below that of a random signal, about
+0.25."""
 LEAST_MISFIT_RATIO = 3.0
-"""Least ratio of the force's misfit to the motion's at which the motion is the command."""
+"""Ratio of the force's misfit to the motion's above which the motion is the command. Chosen."""
 
 
 def is_imposed(motion: FloatArray, force: FloatArray) -> bool:
-    """Whether the motion (n,) obeys the law of ramps, or of ramps and sines, and the force (n,) clearly less so."""
+    """Whether the motion (n,) obeys the law of ramps, or of ramps and sines, with a misfit below `LARGEST_MISFIT`, and
+    the force (n,) has a misfit above both half that limit and `LEAST_MISFIT_RATIO` times that of the motion."""
     for ramps in (True, False):
         motion_misfit, force_misfit = compute_law_misfit(motion, ramps=ramps), compute_law_misfit(force, ramps=ramps)
         if motion_misfit < LARGEST_MISFIT and force_misfit > max(
@@ -41,8 +44,8 @@ def is_imposed(motion: FloatArray, force: FloatArray) -> bool:
 
 def compute_law_misfit(values: FloatArray, *, ramps: bool = False) -> float:
     """Compute the mean absolute residual of the fit relative to the mean speed squared, median over the stretches of a
-    signal (n,). ramps: fit a constant in place of the quadratic. 0 for a series of steps; 1 where the samples do not
-    suffice."""
+    signal (n,), NaN where a sample is missing. ramps: fit a constant in place of the quadratic. 0 for a series of
+    steps; 1 where all samples are equal or too few."""
     is_finite = np.isfinite(values)
     if is_finite.sum() < 2 * _BLOCKS_PER_HALF_CYCLE or not np.ptp(values[is_finite]) > 0:
         return 1.0
@@ -59,44 +62,45 @@ def compute_law_misfit(values: FloatArray, *, ramps: bool = False) -> float:
         interpolated[: len(interpolated) // block_samples * block_samples].reshape(-1, block_samples).mean(axis=1)
     )
     stretch_blocks = _HALF_CYCLES_PER_STRETCH * _BLOCKS_PER_HALF_CYCLE
-    starts = range(0, max(len(block_means) - stretch_blocks // 2, 1), stretch_blocks)
+    stretch_starts = range(0, max(len(block_means) - stretch_blocks // 2, 1), stretch_blocks)
     return float(
         np.median(
             [
-                _compute_stretch_misfit(block_means[start : start + stretch_blocks], 1 if ramps else 3)
-                for start in starts
+                _compute_stretch_misfit(block_means[stretch_start : stretch_start + stretch_blocks], 1 if ramps else 3)
+                for stretch_start in stretch_starts
             ]
         )
     )
 
 
 def _count_half_cycles(values: FloatArray) -> int:
-    """Count the half cycles: reversals by more than `_LEAST_REVERSAL`, plus one. values: (n,), scaled to a range of
-    1."""
+    """Count the half cycles: reversals by more than `_LEAST_REVERSAL_FRACTION`, plus one. values: (n,), scaled to a
+    range of 1."""
     half_cycle_count, is_rising, latest_extreme = 1, bool(values[len(values) // 2] > values[0]), float(values[0])
     for value in values.tolist():
         if (value > latest_extreme) == is_rising:
             latest_extreme = value
-        elif abs(value - latest_extreme) > _LEAST_REVERSAL:
+        elif abs(value - latest_extreme) > _LEAST_REVERSAL_FRACTION:
             half_cycle_count, is_rising, latest_extreme = half_cycle_count + 1, not is_rising, value
     return half_cycle_count
 
 
 def _compute_stretch_misfit(block_means: FloatArray, term_count: int) -> float:
-    """Compute the misfit of one stretch of block means (m,), with the first terms of the quadratic; 1 where the
-    blocks do not suffice. Three least-squares fits, each without the samples that fitted worst before."""
+    """Compute the misfit of one stretch of block means (m,), with the first term_count terms of the
+    quadratic; 1 where the blocks do not suffice. Trimmed least squares: three fits, each to the `_TRIM_FRACTION` of the
+    samples with the smallest residuals of the fit before."""
     if len(block_means) < _BLOCKS_PER_HALF_CYCLE // 2:
         return 1.0
     speed_squared = ((block_means[4:] - block_means[:-4]) / 4) ** 2
-    is_moving = speed_squared > _REST_SHARE * np.quantile(speed_squared, 0.9)
+    is_moving = speed_squared > _REST_SPEED_FRACTION * np.quantile(speed_squared, 0.9)
     positions, speed_squared = block_means[2:-2][is_moving], speed_squared[is_moving]
     if len(positions) < _BLOCKS_PER_HALF_CYCLE // 4:
         return 1.0
-    terms = np.stack([np.ones_like(positions), positions, positions**2], axis=1)[:, :term_count]
+    regressors = np.stack([np.ones_like(positions), positions, positions**2], axis=1)[:, :term_count]
     is_well_fitted = np.full(len(positions), True)
     for _ in range(3):
-        coefficients = np.linalg.lstsq(terms[is_well_fitted], speed_squared[is_well_fitted], rcond=None)[0]
-        residual = np.abs(speed_squared - terms @ coefficients)
+        coefficients = np.linalg.lstsq(regressors[is_well_fitted], speed_squared[is_well_fitted], rcond=None)[0]
+        residual = np.abs(speed_squared - regressors @ coefficients)
         is_well_fitted = residual <= np.quantile(residual, _TRIM_FRACTION)
     mean_speed_squared = float(np.mean(speed_squared))
     return float(np.mean(residual[is_well_fitted])) / mean_speed_squared if mean_speed_squared > 0 else 0.0

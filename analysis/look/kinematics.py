@@ -25,11 +25,12 @@ _DERIVATIVE_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^
 """Order of the time derivative of position or angle, by unit."""
 _DERIVATIVE_NAMES = {1: "the derivative", 2: "the second derivative"}
 LEAST_COHERENT_SHARE = 0.3
-"""Least coherent share of a channel's power; below it, the channel measures a different motion and is not compared."""
+"""Least coherent share of a channel's power; below it, the channel measures a different motion and is not compared.
+Chosen, as are the limits below."""
 SAME_QUANTITY_SHARE, SAME_QUANTITY_SPREAD = 0.8, 0.2
 """Least coherent share, and largest spread of the ratio, of two channels that measure the same quantity."""
 LARGEST_GAIN_ERROR, WRONG_GAIN_ERROR = 0.05, 0.2
-"""Deviation of the gain from 1 above which it is reported, and above which it counts as wrong."""
+"""Deviation of the gain's magnitude from 1 above which it is reported, and above which it counts as wrong."""
 LARGEST_LAG_SAMPLES = 0.6
 """Largest lag (samples) that is not reported: a zero-order hold of the force delays the acceleration by half a sample,
 and a backward difference delays a derivative by as much."""
@@ -50,21 +51,21 @@ _UNIT_ERROR_FACTORS = (
 class KinematicPair:
     """Two channels of which the second should be the derivative of the first, and how far they agree."""
 
-    place: str
+    lower_label: str
     """Label of the channel that is differentiated."""
-    derivative: str
+    higher_label: str
     """Label of the channel that it is compared with."""
     order: int
     """1: first derivative, 2: second."""
     agreement: GainAndLag
-    """Gain and lag of `derivative` relative to the differentiated channel."""
+    """Gain and lag of the second channel relative to the derivative of the first."""
 
 
 def find_kinematic_pairs(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> tuple[KinematicPair, ...]:
-    """For each velocity and acceleration, the channel whose derivative has the largest coherent share with it; none
-    where that share is below `LEAST_COHERENT_SHARE`."""
+    """Find, for each velocity and acceleration but excitations, the channel whose derivative has the largest coherent
+    share with it; no pair where that share is below `LEAST_COHERENT_SHARE`."""
     varying_channels = [
         channel
         for channel in channels
@@ -80,8 +81,8 @@ def find_kinematic_pairs(
 def _find_best_pair(
     higher_channel: Channel, varying_channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> KinematicPair | None:
-    """The pair of `higher_channel` and the channel among `changing` whose derivative agrees best with it; None where
-    none does."""
+    """Find the pair of `higher_channel` and the varying channel whose derivative agrees best with it; None where
+    none does, and for an excitation."""
     pairs = []
     for lower_channel in varying_channels:
         order = _DERIVATIVE_ORDER[higher_channel.unit] - _DERIVATIVE_ORDER[lower_channel.unit]
@@ -99,8 +100,8 @@ def _find_best_pair(
 def _compare_derivative(
     lower_channel: Channel, higher_channel: Channel, order: int, timing: tuple[Sequence[Stretch], float]
 ) -> GainAndLag | None:
-    """Gain and lag of `higher_channel` relative to the derivative of `lower_channel`. timing: stretches, and sample
-    rate in Hz. None where no stretch is long enough or no line is coherent."""
+    """Estimate gain and lag of `higher_channel` relative to the derivative of `lower_channel`. timing: stretches, and
+    sample rate in Hz. None where no stretch is long enough or no line is coherent."""
     stretches, rate_hz = timing
     differentiated = replace(lower_channel, samples=differentiate(lower_channel.samples, order, rate_hz))
     # The central difference has no value at the first and the last sample of a stretch.
@@ -124,7 +125,8 @@ def differentiate(samples: FloatArray, order: int, rate_hz: float) -> FloatArray
 
 def _compute_difference_gain(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
     """Compute the gain (lines,) of central differences relative to the exact derivative, with w = 2 pi f / rate: sin(w)
-    / w for the first, (sin(w / 2) / (w / 2))^2 for the second derivative."""
+    / w for the first, (sin(w / 2) / (w / 2))^2 for the second derivative. At least 1e-6, because
+    it is a divisor and that of the first derivative is 0 at half the sample rate."""
     angle_rad = 2 * np.pi * spectra.frequency_hz / rate_hz
     gain = np.sin(angle_rad) / angle_rad if order == 1 else (np.sin(angle_rad / 2) / (angle_rad / 2)) ** 2
     return np.maximum(gain, 1e-6)
@@ -140,8 +142,8 @@ def _check_pair(pair: KinematicPair, rate_hz: float) -> Check:
     agreement = pair.agreement
     lag_text = _format_lag(agreement.lag_samples, rate_hz)
     text = (
-        f"{pair.derivative} is {typeset(f'{agreement.gain:.4g}')} times {_DERIVATIVE_NAMES[pair.order]} of "
-        f"{pair.place}{lag_text} "
+        f"{pair.higher_label} is {typeset(f'{agreement.gain:.4g}')} times {_DERIVATIVE_NAMES[pair.order]} of "
+        f"{pair.lower_label}{lag_text} "
         f"(lines with {agreement.coherent_share:.0%} of its power)."
     )
     gain_error = abs(abs(agreement.gain) - 1)

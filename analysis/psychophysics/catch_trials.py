@@ -1,8 +1,8 @@
-"""Lapse rate from catch trials: trials at full level within the test runs, where a wrong answer is likely a lapse.
+"""Lapse rate from catch trials: trials at full level within the test runs, where a wrong answer is probably a lapse.
 
 A wrong answer is no proof of inattention: at high frequencies a person may not perceive a direction even at full level.
 The rate per participant and frequency is wrong over answered trials, with Wilson's 95 % interval.
-Called by `study_analysis`; other analyses use `compute_wilson_interval` alone.
+Called by `study_analysis`; `observed_shares`, `coverage_words` and `power_curve` use `compute_wilson_interval` alone.
 """
 
 from collections.abc import Iterable

@@ -33,6 +33,7 @@ class PairDifference:
     lower: float
     upper: float
     p: float
+    """Tukey-Kramer p-value, corrected for all pairs."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,7 +90,7 @@ def compute_declared_result(
                 comparisons,
                 table,
                 declared.primary == "published",
-                TUKEY_NOTE.format(means=capitalise(select_threshold_words(rule).means)),
+                TUKEY_NOTE.format(means=capitalise(select_threshold_words(rule).noun)),
             ),
         ]
         results.sort(key=lambda result: not result.declared)
@@ -170,7 +170,7 @@ def _make_published_contrast(
         sum(value is not None for value in groups.get(name, ())) for name in (first_name, second_name)
     ]
     participants = (participant_counts[0], participant_counts[1])
-    notes = (method_note, *filter(None, [table.coverage]))
+    notes = (method_note, *filter(None, [table.coverage_warning]))
     pair = next((pair for pair in comparisons.pairs if {pair.first, pair.second} == {first_name, second_name}), None)
     if pair is None:
         return ContrastResult("published", is_declared, "N", participants, None, None, None, None, (NO_PAIR_NOTE,))

@@ -28,7 +28,8 @@ from equalizer.signals.signal import FloatArray
 MOST_HARMONICS = 5
 """Largest number of harmonics that are fitted, the fundamental included; only those below half the sample rate are."""
 ORTHONORMALITY_TOLERANCE = 1e-3
-"""Largest error of a rotation's R R' against the identity: allows entries written with three digits. By hand."""
+"""Largest error of an entry of R R' against the identity, R a rotation: allows entries written with three digits.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +123,8 @@ def read_sensor_frame(recording: Recording) -> FloatArray | None:
     """Read the rotation (3, 3) from the sensor's axes to the device's, as the recording states it; None if it states
     none.
 
-    Raises ValueError where its rows are not orthonormal, which would distort every ellipse, and for a reflection, which
-    would mirror it.
+    Raises ValueError where it is not a (3, 3) matrix of numbers, where its rows are not orthonormal, which would
+    distort every ellipse, and for a reflection, which would mirror it.
     """
     sensor = recording.meta.get("sensor")
     stated_rotation = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
@@ -179,8 +180,8 @@ def compute_phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency
     """Compute the ellipse of the acceleration's fundamental. samples: (n, 3), m/s^2, in the test direction's frame.
     Raises ValueError for less than one period, or where nothing moves at this frequency."""
     harmonic_count = max(1, min(MOST_HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
-    harmonic_phasors = estimate_phasors(samples, sample_rate_hz, frequency_hz, harmonic_count)
-    fundamental = harmonic_phasors[0]
+    phasors = estimate_phasors(samples, sample_rate_hz, frequency_hz, harmonic_count)
+    fundamental = phasors[0]
     # Re(p exp(i phi)) over all phi is the image of the unit circle under the matrix [Re p, -Im p]: the semi-axes of
     # the ellipse are the singular values of that matrix, along its left singular vectors.
     directions, semi_axes_mps2, _ = np.linalg.svd(
@@ -190,7 +191,7 @@ def compute_phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency
         raise ValueError("the response does not move at all: there is no ellipse")
     tilt_deg, turn_deg = _compute_axis_angles_deg(directions[:, 0])
     on_axis_mps2, off_axis_mps2 = abs(fundamental[0]), float(np.linalg.norm(fundamental[1:]))
-    squared_amplitudes = np.sum(np.abs(harmonic_phasors) ** 2, axis=1)
+    squared_amplitudes = np.sum(np.abs(phasors) ** 2, axis=1)
     return PhasorEllipse(
         semi_axes_mps2=(float(semi_axes_mps2[0]), float(semi_axes_mps2[1])),
         tilt_deg=tilt_deg,
@@ -206,9 +207,10 @@ def _compute_segment_ellipsoid(
     samples: FloatArray, sample_rate_hz: float, segment: Segment, description: dict[str, Any]
 ) -> EllipsoidResult:
     """Compute the result of one segment. samples: (n, 3), m/s^2, in the device's frame. description: its entry of
-    meta["segments"]."""
+    meta["segments"]. Raises ValueError where the segment is shorter than one period."""
     frequency_hz = float(description["frequency_hz"])
     frame_samples = samples @ compute_direction_frame(np.asarray(description["unit_vector"], dtype=np.float64)).T
+    # 1e-9: a whole number of periods is not rounded down by a rounding error.
     whole_periods = int(len(frame_samples) * frequency_hz / sample_rate_hz + 1e-9)
     if whole_periods < 1:
         raise ValueError(f"the sinusoid of {frequency_hz:g} Hz is shorter than one period")

@@ -15,20 +15,22 @@ from protocols.trial import Trial
 
 DELIVERY_TOLERANCE = 0.1
 """Relative deviation from the requested acceleration, along or off the direction, above which a warning names the
-frequency."""
+frequency. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """Delivery at a single frequency: medians over all counted trials with a measured acceleration."""
+    """Delivery at a single frequency: medians over the valid trials with a requested and a measured acceleration."""
 
     frequency_hz: float
     trials: int
+    """Number of those trials, of both directions."""
     along: tuple[float | None, float | None]
     """Delivered over requested amplitude, along the protocol's directions 1 and 2; None for a direction without
     trials."""
     off_axis: float
-    """Amplitude off the direction over that along it, both as delivered."""
+    """Delivered amplitude off the direction over that along it; 0 for a trial without a measurement off the
+    direction."""
 
     @property
     def is_within_tolerance(self) -> bool:
@@ -40,29 +42,29 @@ class Delivery:
 
 
 def compute_deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
-    """Compute the deliveries by rising frequency; empty where levels are commanded forces."""
+    """Compute the delivery at each frequency, ascending; empty where levels are commanded forces."""
     measured_trials = [trial for trial in trials if trial.is_valid and trial.wanted_mps2 and trial.delivered_mps2]
-    ordered_trials, first_deg = (
+    ordered_trials, first_angle_deg = (
         sorted(measured_trials, key=lambda trial: trial.frequency_hz),
         _find_larger_angle_deg(measured_trials),
     )
     return tuple(
-        _summarise_delivery(frequency_hz, list(frequency_trials), first_deg)
+        _summarise_delivery(frequency_hz, list(frequency_trials), first_angle_deg)
         for frequency_hz, frequency_trials in groupby(ordered_trials, key=lambda trial: trial.frequency_hz)
     )
 
 
-def make_delivery_warning(results: Sequence[Delivery]) -> str:
+def make_delivery_warning(deliveries: Sequence[Delivery]) -> str:
     """Make a sentence that names the frequencies with a deviation above `DELIVERY_TOLERANCE`; empty where there are
     none."""
-    deviating = [delivery for delivery in results if not delivery.is_within_tolerance]
-    if not deviating:
+    deviating_deliveries = [delivery for delivery in deliveries if not delivery.is_within_tolerance]
+    if not deviating_deliveries:
         return ""
     deviation_texts = [
         f"{delivery.frequency_hz:g} Hz "
         f"({' and '.join(f'{100 * ratio:.0f} %' for ratio in delivery.along if ratio is not None)} "
         f"of what was wanted, {100 * delivery.off_axis:.0f} % off the direction)"
-        for delivery in deviating
+        for delivery in deviating_deliveries
     ]
     return (
         f"The accelerations that arrived are not those that were wanted, by more than {100 * DELIVERY_TOLERANCE:.0f} % "
@@ -71,19 +73,21 @@ def make_delivery_warning(results: Sequence[Delivery]) -> str:
     )
 
 
-def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_deg: float | None) -> Delivery:
-    """Compute the medians of the trials at one frequency. first_deg: angle of direction 1; None where it is not
+def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_angle_deg: float | None) -> Delivery:
+    """Compute the medians of the trials at one frequency. first_angle_deg: angle of direction 1; None where it is not
     known."""
-    medians: list[float | None] = []
+    median_ratios: list[float | None] = []
     for direction in (1, 2):
         ratios = [
-            _compute_delivery_ratio(trial) for trial in trials if _find_played_direction(trial, first_deg) == direction
+            _compute_delivery_ratio(trial)
+            for trial in trials
+            if _find_played_direction(trial, first_angle_deg) == direction
         ]
-        medians.append(median(ratios) if ratios else None)
+        median_ratios.append(median(ratios) if ratios else None)
     return Delivery(
         frequency_hz,
         len(trials),
-        (medians[0], medians[1]),
+        (median_ratios[0], median_ratios[1]),
         median((trial.off_axis_mps2 or 0.0) / (trial.delivered_mps2 or 1.0) for trial in trials),
     )
 
@@ -95,14 +99,14 @@ def _find_larger_angle_deg(trials: Sequence[Trial]) -> float | None:
     return max((angle for angle in angles if angle is not None), default=None) if len(angles - {None}) == 2 else None
 
 
-def _find_played_direction(trial: Trial, first_deg: float | None) -> int:
+def _find_played_direction(trial: Trial, first_angle_deg: float | None) -> int:
     """Find the protocol's direction that was played, 1 or 2; its number on the screen where the angles are not
     known."""
-    if first_deg is None or trial.angle_deg is None:
+    if first_angle_deg is None or trial.angle_deg is None:
         return trial.direction_shown
-    return 1 if trial.angle_deg == first_deg else 2
+    return 1 if trial.angle_deg == first_angle_deg else 2
 
 
 def _compute_delivery_ratio(trial: Trial) -> float:
-    """Compute the delivered over the requested acceleration amplitude."""
+    """Compute the delivered over the requested acceleration amplitude of a trial that has both."""
     return (trial.delivered_mps2 or 0.0) / (trial.wanted_mps2 or 1.0)

@@ -38,8 +38,9 @@ class Contrast:
     against_hz: float
     """Frequency whose threshold is subtracted."""
     participants: int
-    """Number of participants with values of their own at both frequencies."""
+    """Number of participants with answers at both frequencies."""
     difference_db: float
+    """Mean over the participants, including those whose values rest on answers at other frequencies."""
     lower_db: float
     upper_db: float
     """Limits of the t interval, uncorrected."""
@@ -62,9 +63,9 @@ class MeanErrors:
     """Standard errors of means over people, (m,) each."""
 
     people: NDArray[np.intp]
-    """Number of people with answers of their own."""
+    """Number of people with answers of their own at each place."""
     error: FloatArray
-    """Infinite below two such people."""
+    """Standard error; infinite below two such people."""
     df: FloatArray
     """Degrees of freedom for Student's t."""
 
@@ -79,29 +80,29 @@ def compute_mean_errors(values: FloatArray, has_answers: NDArray[np.bool_]) -> M
     mostly on the few people with answers, so that their number counts, not that of all.
     """
     person_count = len(values)
-    people = has_answers.sum(axis=0)
+    answered_count = has_answers.sum(axis=0)
     squared_deviations = ((values - values.mean(axis=0)) / person_count) ** 2
-    answered_df = np.maximum(people - 1, 1)
-    answered_variance = np.sum(squared_deviations * has_answers, axis=0) * people / answered_df
+    answered_df = np.maximum(answered_count - 1, 1)
+    answered_variance = np.sum(squared_deviations * has_answers, axis=0) * answered_count / answered_df
     unanswered_variance, unanswered_df = (
         np.sum(squared_deviations * ~has_answers, axis=0),
-        np.maximum(person_count - people, 1),
+        np.maximum(person_count - answered_count, 1),
     )
     error = np.where(
-        people == person_count,
+        answered_count == person_count,
         values.std(axis=0, ddof=1) / math.sqrt(person_count),
         np.sqrt(answered_variance + unanswered_variance),
     )
     # Where all values are equal both variances are 0, and df stays that of the people with answers.
     df_denominator = answered_variance**2 / answered_df + unanswered_variance**2 / unanswered_df
-    df = np.where(people == person_count, person_count - 1.0, answered_df)
+    df = np.where(answered_count == person_count, person_count - 1.0, answered_df)
     df = np.divide(
         (answered_variance + unanswered_variance) ** 2,
         df_denominator,
         out=df,
-        where=(people < person_count) & (df_denominator > 0),
+        where=(answered_count < person_count) & (df_denominator > 0),
     )
-    return MeanErrors(people, np.where(people < 2, math.inf, error), df)
+    return MeanErrors(answered_count, np.where(answered_count < 2, math.inf, error), df)
 
 
 def compute_contrasts(
@@ -124,7 +125,7 @@ def compute_contrasts(
             np.asarray(has_answers[is_complete][:, [0, index]].all(axis=1)),
         )
         if answered_both.sum() >= 2 and np.ptp(paired_db[:, 1] - paired_db[:, 0]) > ROUNDING_DB:
-            pairs.append((frequencies_hz[index], _Pair(paired_db, answered_both)))
+            pairs.append((frequencies_hz[index], _PairedDifferences(paired_db, answered_both)))
     corrected_p_values = apply_holm_correction([pair.p for _, pair in pairs], len(frequencies_hz) - 1)
     return tuple(
         _compute_contrast(frequency_hz, frequencies_hz[0], pair, p_holm, confidence)
@@ -165,7 +166,7 @@ def apply_holm_correction(p_values: Sequence[float], planned: int | None = None)
     return tuple(corrected_p_values)
 
 
-class _Pair:
+class _PairedDifferences:
     """Values (n, 2) in dB at two frequencies, with mean, standard error, degrees of freedom and p value of their
     differences, second minus first. answered_both: (n,), `has_answers` of `compute_mean_errors`."""
 
@@ -178,7 +179,7 @@ class _Pair:
 
 
 def _compute_contrast(
-    frequency_hz: float, against_hz: float, pair: _Pair, p_holm: float, confidence: float
+    frequency_hz: float, against_hz: float, pair: _PairedDifferences, p_holm: float, confidence: float
 ) -> Contrast:
     """Compute the contrast of a pair, with its interval at this confidence and its further tests."""
     half_width = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error

@@ -1,4 +1,4 @@
-"""Separation of trials by who answered: people, simulated participants, or people at a device that did not move.
+"""Separate trials by who answered: people, simulated participants, or people at a device that did not move.
 
 An analysis never mixes these populations: answers of simulated participants, or of people who felt nothing, say nothing
 about human thresholds. The column `felt` of a trial decides: empty (simulated participant), true (a person) or false (a
@@ -48,9 +48,9 @@ def _find_session_population(subject: str, session: str, session_trials: list[Tr
         _find_trial_population(trial) for trial in session_trials
     }
     if len(populations) > 1:
-        names = " and ".join(population.value for population in Population if population in populations)
+        kinds = " and ".join(population.value for population in Population if population in populations)
         raise ValueError(
-            f"session {session} of {subject} mixes trials of {names} (column felt): a session contains trials of "
+            f"session {session} of {subject} mixes trials of {kinds} (column felt): a session contains trials of "
             "one kind only; find the cause, remove the wrong rows, and analyse it again"
         )
     return populations.pop()

@@ -238,10 +238,10 @@ def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "unit": "N",
         "participants": list(analysis.table.subjects),
         "frequencies_hz": list(analysis.table.frequencies_hz),
-        "cut_by_cap": analysis.table.cut,
-        "lower_bounds": analysis.table.cut,  # older name of cut_by_cap, kept for programs that read it
+        "cut_by_cap": analysis.table.censored_count,
+        "lower_bounds": analysis.table.censored_count,  # older name of cut_by_cap, kept for programs that read it
         "stopped_by_trial_limit": sum(map(sum, analysis.table.stopped)),
-        "coverage": analysis.table.coverage or None,
+        "coverage": analysis.table.coverage_warning or None,
         "one_way": asdict(analysis.anova),
         "comparisons": asdict(analysis.comparisons),
         "within_participants": asdict(analysis.within),

@@ -138,9 +138,10 @@ def _warn_of_censoring(table: ThresholdTable, rule: StaircaseRule) -> str:
     if not cells:
         return ""
     return (
-        f"{_format_count(cells, 'threshold')} cut by the cap of {rule.cap_n:g} N, {select_threshold_words(rule).cut}: "
-        f"{conjoin(cells)}. As in the published analysis they enter means and tests as plain numbers, so means near "
-        "the cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
+        f"{_format_count(cells, 'threshold')} cut by the cap of {rule.cap_n:g} N, "
+        f"{select_threshold_words(rule).cut_clause}: {conjoin(cells)}. As in the published analysis they enter "
+        "means and tests as plain numbers, so means near the cap are too low, differences towards it too small, and "
+        "intervals and effect sizes without coverage."
     )
 
 

@@ -16,19 +16,21 @@ threshold."""
 
 @dataclass(frozen=True, slots=True)
 class ThresholdTable:
-    """Thresholds by participant and frequency, with what was cut, stopped or left out."""
+    """Thresholds by participant and frequency, with marks for censored and stopped runs."""
 
     quantity: Quantity
+    """Quantity of `values`, which determines their unit."""
     subjects: tuple[str, ...]
     frequencies_hz: tuple[float, ...]
     values: tuple[tuple[float | None, ...], ...]
     """values[subject][frequency]; None where there is no completed run."""
     censored: tuple[tuple[bool, ...], ...]
-    """Same shape: True where the value is cut by the cap."""
+    """Same shape as `values`: True where the value is cut by the cap."""
     stopped: tuple[tuple[bool, ...], ...]
-    """Same shape: True where there is no value because the trial limit ended every run."""
+    """Same shape as `values`: True where there is no value because the trial limit ended a run and none was
+    completed."""
     notes: tuple[str, ...]
-    """What was left out, as sentences."""
+    """Sentences on runs that were left out of the table."""
 
     def group_by_frequency(self) -> dict[str, tuple[float | None, ...]]:
         """Group the values by frequency, named like "35 Hz", one entry per participant."""
@@ -39,16 +41,20 @@ class ThresholdTable:
         }
 
     @property
-    def cut(self) -> int:
+    def censored_count(self) -> int:
         """Number of values that are cut by the cap (censored)."""
         return sum(map(sum, self.censored))
 
     @property
-    def coverage(self) -> str:
-        """Sentences on why intervals and effect sizes of this table have no stated coverage; empty where nothing is
-        cut."""
+    def coverage_warning(self) -> str:
+        """Sentences that warn that the stated confidence of intervals and effect sizes does not hold; empty where
+        neither the cap nor the trial limit affected a threshold."""
         missing_count = sum(map(sum, self.stopped))
-        causes = [f"{self.cut} of the values {'is' if self.cut == 1 else 'are'} cut by the cap"] if self.cut else []
+        causes = (
+            [f"{self.censored_count} of the values {'is' if self.censored_count == 1 else 'are'} cut by the cap"]
+            if self.censored_count
+            else []
+        )
         causes += (
             [f"{missing_count} {'is' if missing_count == 1 else 'are'} missing because of the trial limit"]
             if missing_count
@@ -76,12 +82,13 @@ def tabulate_thresholds(
 ) -> ThresholdTable:
     """Tabulate the first completed run of each participant at each of the frequencies.
 
-    The first, because a run repeated after its result was seen must not replace it; later ones are named in the
-    notes. Participants in the order of their first row; those without any completed run have a row of gaps.
+    The first, because a run repeated after its result was seen must not replace it; later ones are named in the notes,
+    and so are runs at further frequencies. Frequencies ascend; participants are in the order of their first row; those
+    without any completed run have a row of gaps.
     """
     subjects = tuple(dict.fromkeys(row.subject for row in rows))
     first_runs: dict[tuple[str, float], Threshold] = {}
-    limited_cells = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
+    trial_limited_cells = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
     notes = []
     for row in rows:
         cell = (row.subject, row.frequency_hz)
@@ -99,10 +106,17 @@ def tabulate_thresholds(
         quantity=quantity,
         subjects=subjects,
         frequencies_hz=ordered_hz,
-        values=tuple(tuple(_read_finite_value(first_runs.get((s, f)), quantity) for f in ordered_hz) for s in subjects),
-        censored=tuple(tuple((s, f) in first_runs and first_runs[s, f].censored for f in ordered_hz) for s in subjects),
+        values=tuple(
+            tuple(_read_finite_value(first_runs.get((subject, hz)), quantity) for hz in ordered_hz)
+            for subject in subjects
+        ),
+        censored=tuple(
+            tuple((subject, hz) in first_runs and first_runs[subject, hz].censored for hz in ordered_hz)
+            for subject in subjects
+        ),
         stopped=tuple(
-            tuple((s, f) in limited_cells and (s, f) not in first_runs for f in ordered_hz) for s in subjects
+            tuple((subject, hz) in trial_limited_cells and (subject, hz) not in first_runs for hz in ordered_hz)
+            for subject in subjects
         ),
         notes=tuple(notes),
     )

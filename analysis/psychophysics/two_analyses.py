@@ -3,14 +3,14 @@
 The published analysis is a one-way analysis of variance of reversal means with Tukey's comparisons; the primary
 analysis is the hierarchical model of all answers. The text states which analysis the protocol declared, where estimates
 differ by 1 dB or more, where significance at the 5 % level differs, and the measured coverage near the cap.
-Called by `analysis.psychophysics.study_analysis` and the tables of `analysis.reports`.
+Called by `analysis.psychophysics.study_analysis`, the tables of `analysis.reports` and `study.cli.protocol`.
 """
 
 from collections.abc import Sequence
 
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.coverage.coverage_words import describe_coverage
-from analysis.psychophysics.coverage.measured_coverage import MEASURED
+from analysis.psychophysics.coverage.measured_coverage import MEASURED_COVERAGES
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, format_frequency
@@ -22,7 +22,8 @@ from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 NOTABLE_DIFFERENCE_DB = 1.0
 """Least difference (dB) between the two analyses that is reported: the small step of the published staircase."""
 SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
-"""The published staircase and cap, with which `measured_coverage` was simulated: its counts hold for no other rule."""
+"""The published staircase: starts at 1 N, cap 3 N, down after three right answers and up after a wrong one, steps of 4
+dB and then 1 dB. `measured_coverage` was simulated with it, so its counts hold for no other rule."""
 NOTHING_DECLARED_NOTE = (
     "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is given "
     "first because the cap distorts it least; a choice made after the data were seen is not a "
@@ -89,14 +90,14 @@ def describe_declaration(declared: AnalysisSettings) -> str:
 
 def describe_comparison(
     primary: PrimaryAnalysis | None,
-    means: Sequence[Contrast],
+    mean_contrasts: Sequence[Contrast],
     comparisons: Comparisons,
     table: ThresholdTable,
     rule: StaircaseRule,
 ) -> str:
-    """Describe the differences between the published and the primary analysis. primary: None without a fit. means:
-    contrasts of reversal means in dB, against the same frequency as those of the primary analysis. rule: the staircase
-    of the study."""
+    """Describe the differences between the published and the primary analysis. primary: None without a fit.
+    mean_contrasts: contrasts of reversal means in dB, against the same frequency as those of the primary analysis.
+    rule: the staircase of the study."""
     if primary is None:
         return (
             "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
@@ -109,14 +110,16 @@ def describe_comparison(
         else ""
     )
     cap_sentences = (
-        [NEAR_CAP_WARNING, *describe_measured_coverage(("means", "tukey", "one-way"), table, rule)] if table.cut else []
+        [NEAR_CAP_WARNING, *describe_measured_coverage(("means", "tukey", "one-way"), table, rule)]
+        if table.censored_count
+        else []
     )
     return " ".join(
         filter(
             None,
             [
                 missing_text,
-                _describe_differences(primary, means, rule),
+                _describe_differences(primary, mean_contrasts, rule),
                 _describe_significance(primary, comparisons),
                 *cap_sentences,
             ],
@@ -125,18 +128,18 @@ def describe_comparison(
 
 
 def describe_measured_coverage(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """Describe the measured coverage of the intervals of these analyses (names of `coverage_words.TITLES`). Empty
-    where neither the cap nor the trial limit affected a threshold, and for a rule other than `SIMULATED_RULE`."""
-    if not table.coverage or rule != SIMULATED_RULE:
+    """Describe the measured coverage of the intervals of these analyses (names of `coverage_words.INTERVAL_TITLES`).
+    Empty where neither the cap nor the trial limit affected a threshold, and for a rule other than `SIMULATED_RULE`."""
+    if not table.coverage_warning or rule != SIMULATED_RULE:
         return ()
-    return tuple(filter(None, (describe_coverage(MEASURED, analysis) for analysis in analyses)))
+    return tuple(filter(None, (describe_coverage(MEASURED_COVERAGES, analysis) for analysis in analyses)))
 
 
-def _describe_differences(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
+def _describe_differences(primary: PrimaryAnalysis, mean_contrasts: Sequence[Contrast], rule: StaircaseRule) -> str:
     """Describe the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DIFFERENCE_DB`,
     or where not."""
-    means_noun = select_threshold_words(rule).means
-    means_by_frequency = {contrast.frequency_hz: contrast for contrast in means}
+    means_noun = select_threshold_words(rule).noun
+    means_by_frequency = {contrast.frequency_hz: contrast for contrast in mean_contrasts}
     reference = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, means_by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
     if not pairs:

@@ -28,7 +28,8 @@ _INTRODUCTION = (
 
 def make_cue_sections(findings: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
     """Make the section on cues other than the direction; empty where no trial was measured. findings: a finding per cue
-    and frequency. gaps: trials without a measurement of a cue. rule: the staircase rule, which sets the target d'."""
+    and frequency. gaps: trials without a measurement of a cue. rule: the staircase rule, which determines a note on d'
+    of the answers."""
     if not findings:
         return []
     sentences = (
@@ -36,7 +37,7 @@ def make_cue_sections(findings: Sequence[CueFinding], gaps: Sequence[CueGap], ru
         *filter(None, [describe_cue_gaps(gaps)]),
     )
     tables = (
-        _tabulate_sensitivity(findings, select_threshold_words(rule).sensitivity),
+        _tabulate_sensitivity(findings, select_threshold_words(rule).d_prime_note),
         _tabulate_regressions(findings),
     )
     return [Section("Was direction the cue?", paragraphs=(_INTRODUCTION, *sentences), tables=tables)]
@@ -45,7 +46,7 @@ def make_cue_sections(findings: Sequence[CueFinding], gaps: Sequence[CueGap], ru
 def _describe_no_cue(findings: Sequence[CueFinding]) -> str:
     """Describe the result where no cue is shown to be noticeable or followed, with the cues that could not be
     tested."""
-    untestable = [
+    untestable_cues = [
         f"{finding.cue.value} at {finding.frequency_hz:g} Hz"
         for finding in findings
         if not finding.answers.is_conclusive
@@ -55,16 +56,16 @@ def _describe_no_cue(findings: Sequence[CueFinding]) -> str:
         "and no answers are shown to depend on what was delivered."
         + (
             " Delivery varied too little within a direction to test whether answers depend on it: "
-            f"{conjoin(untestable)}. A roved level (rove_db of [stimulus]) allows the test for intensity."
-            if untestable
+            f"{conjoin(untestable_cues)}. A roved level (rove_db of [stimulus]) allows the test for intensity."
+            if untestable_cues
             else ""
         )
     )
 
 
 def _tabulate_sensitivity(findings: Sequence[CueFinding], target_note: str) -> Table:
-    """Tabulate d' by each cue alone, a row per cue and frequency. sensitivity: sentence on the staircase's target
-    d'."""
+    """Tabulate d' by each cue alone, a row per cue and frequency. target_note: sentence on the d' of the answers that
+    the staircase keeps."""
     return Table(
         caption="Sensitivity that each cue alone would give",
         header=(
@@ -115,14 +116,15 @@ def _tabulate_regressions(findings: Sequence[CueFinding]) -> Table:
 
 
 def _format_slope_and_interval(answers: AnswersOnDelivery) -> tuple[str, str]:
-    """Format the slope of the regression (logits per dB) and its 95 % interval."""
+    """Format the slope of the regression (logits per dB) and its 95 % interval; `MISSING` where they are not
+    determined."""
     if answers.slope is None or answers.lower is None or answers.upper is None:
         return MISSING, MISSING
     return format_signed(answers.slope), f"{format_signed(answers.lower)} to {format_signed(answers.upper)}"
 
 
 def _describe_dependence(finding: CueFinding) -> str:
-    """Describe in a cell whether the answers depend on the cue, after Holm's correction."""
+    """Describe in a table cell whether the answers depend on the cue, after Holm's correction."""
     if finding.affects_answers:
         return "depend on the cue"
     return "do not" if finding.answers.is_conclusive else "not testable"

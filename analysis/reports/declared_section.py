@@ -1,7 +1,8 @@
 """First section of a study report: the contrast declared in the protocol, by both analyses, with sample and exclusions.
 
 The section shows the result that was fixed before the data were collected (`declared_result`), so that a reader can
-distinguish it from results chosen afterwards. Called by `analysis.reports.study_report`.
+distinguish it from results chosen afterwards. Called by `analysis.reports.study_report`;
+`study.workflows.results.analyze_data` shows the sentences of `describe_declared` alone.
 """
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
@@ -9,6 +10,7 @@ from analysis.reports.page import Section, Table
 from analysis.wording import MISSING, format_p, format_p_text, format_signed
 
 ANALYSIS_NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
+"""Name of each analysis in sentences and tables, by its value in the protocol."""
 
 
 def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
@@ -57,7 +59,7 @@ def _tabulate_contrasts(result: DeclaredResult) -> Table:
     first_hz, second_hz = result.contrast_hz
     rows = []
     for contrast in result.results:
-        role = " (declared)" if contrast.declared else ""
+        role_text = " (declared)" if contrast.declared else ""
         first_count, second_count = contrast.participants
         difference_text = (
             MISSING
@@ -68,7 +70,7 @@ def _tabulate_contrasts(result: DeclaredResult) -> Table:
         participants_text = str(first_count) if first_count == second_count else f"{first_count} and {second_count}"
         rows.append(
             (
-                f"{ANALYSIS_NAMES[contrast.analysis]}{role}",
+                f"{ANALYSIS_NAMES[contrast.analysis]}{role_text}",
                 participants_text,
                 difference_text,
                 interval_text,
@@ -120,5 +122,5 @@ def _format_interval(contrast: ContrastResult) -> str:
 
 
 def _choose_decimals(contrast: ContrastResult) -> int:
-    """Return the decimals of a difference: one in dB, two in N."""
+    """Choose the number of decimals of a difference: one in dB, two in N."""
     return 1 if contrast.unit == "dB" else 2

@@ -12,7 +12,7 @@ from analysis.diagnosis.unit_wording import format_share
 from analysis.reports.page import Section, Table
 from analysis.wording import MISSING, conjoin
 
-_DISTORTION_KINDS: tuple[Kind, ...] = ("odd", "even", "either", "varying")
+_KINDS_IN_ORDER: tuple[Kind, ...] = ("odd", "even", "either", "varying")
 _KIND_NAMES: Mapping[Kind, str] = {
     "odd": "Odd",
     "even": "Even",
@@ -26,8 +26,8 @@ _TREND_DESCRIPTIONS = {
     "stays": "has the same share at all levels",
     "": "is present, at too few levels to determine how it grows",
 }
-_LEAST_RESPONSE = 0.1
-"""Response relative to the largest of its quantity, input and level, below which a channel has no row. By hand."""
+_LEAST_RESPONSE_RATIO = 0.1
+"""Response relative to the largest of its quantity, input and level, below which a channel has no row. Chosen."""
 
 
 def make_distortion_sections(findings: Findings) -> list[Section]:
@@ -58,9 +58,9 @@ def _describe_trends(cells: Sequence[Distortion]) -> tuple[str, ...]:
     if not trends_by_kind:
         return ("No distortion exceeds the noise: by repeats and silent lines the device appears linear.",)
     return tuple(
-        f"{_KIND_NAMES[kind]}{' distortion' if kind != 'varying' else ''} {_TREND_DESCRIPTIONS[dependence]}: "
-        f"{conjoin([f'{trend_member.output} driven by {trend_member.input}' for trend_member in trends])}."
-        for (kind, dependence), trends in trends_by_kind.items()
+        f"{_KIND_NAMES[kind]}{' distortion' if kind != 'varying' else ''} {_TREND_DESCRIPTIONS[level_dependence]}: "
+        f"{conjoin([f'{channel_trend.output} driven by {channel_trend.input}' for channel_trend in trends])}."
+        for (kind, level_dependence), trends in trends_by_kind.items()
     )
 
 
@@ -68,7 +68,7 @@ def _tabulate_distortion(findings: Findings) -> Table | None:
     """Tabulate noise and distortion by channel, input and level; None where no channel responds."""
     cells = [cell for cell in findings.localisation.distortions.cells if cell.whole_band]
     responding_cells = [cell for cell in cells if _is_responding(cell, cells)]
-    kinds = [kind for kind in _DISTORTION_KINDS if any(distortion.kind == kind for distortion in responding_cells)]
+    kinds = [kind for kind in _KINDS_IN_ORDER if any(distortion.kind == kind for distortion in responding_cells)]
     cells_by_row: dict[tuple[str, str, str, float], dict[Kind, Distortion]] = {}
     for responding_cell in responding_cells:
         cells_by_row.setdefault(
@@ -83,12 +83,12 @@ def _tabulate_distortion(findings: Findings) -> Table | None:
         tuple(
             (
                 output,
-                input_,
+                input_name,
                 f"{amplitude:g}",
                 _format_share_of_signal(noise_rms.get((output, quantity)), next(iter(by_kind.values())).signal_rms),
                 *(_format_distortion(by_kind.get(kind)) for kind in kinds),
             )
-            for (output, quantity, input_, amplitude), by_kind in cells_by_row.items()
+            for (output, quantity, input_name, amplitude), by_kind in cells_by_row.items()
         ),
         (
             "Root-mean-square over the driven band. <: below the detection limit, which is stated. "
@@ -99,18 +99,20 @@ def _tabulate_distortion(findings: Findings) -> Table | None:
 
 
 def _is_responding(cell: Distortion, cells: Sequence[Distortion]) -> bool:
-    """Whether a channel's response is above `_LEAST_RESPONSE` of the strongest of its quantity, input and level."""
+    """Whether a channel's response is above `_LEAST_RESPONSE_RATIO` of the strongest of its quantity, input and
+    level."""
     compared_signal_rms = [
         other_cell.signal_rms
         for other_cell in cells
         if (other_cell.quantity, other_cell.input, other_cell.amplitude, other_cell.whole_band)
         == (cell.quantity, cell.input, cell.amplitude, cell.whole_band)
     ]
-    return cell.signal_rms > _LEAST_RESPONSE * max(compared_signal_rms)
+    return cell.signal_rms > _LEAST_RESPONSE_RATIO * max(compared_signal_rms)
 
 
 def _collect_noise_rms(findings: Findings) -> dict[tuple[str, str], float]:
-    """Collect the noise rms by channel and quantity; empty without a noise estimate or time series."""
+    """Collect the noise rms by channel and quantity; empty without a noise estimate or time series. The cells list the
+    channels in the order of the noise estimate: responses, then positions."""
     if findings.floor is None or not findings.time_series:
         return {}
     channel_rms = [
@@ -118,14 +120,17 @@ def _collect_noise_rms(findings: Findings) -> dict[tuple[str, str], float]:
         *(() if findings.floor.position_rms is None else findings.floor.position_rms),
     ]
     channel_keys = dict.fromkeys((cell.output, cell.quantity) for cell in findings.localisation.distortions.cells)
-    return {channel_key: float(value) for channel_key, value in zip(channel_keys, channel_rms, strict=False)}
+    return {channel_key: float(noise_rms) for channel_key, noise_rms in zip(channel_keys, channel_rms, strict=False)}
 
 
 def _format_share_of_signal(rms: float | None, signal_rms: float) -> str:
+    """Format an rms as a share of the signal's; `MISSING` without an rms or a signal."""
     return MISSING if rms is None or not signal_rms > 0 else format_share(rms / signal_rms)
 
 
 def _format_distortion(cell: Distortion | None) -> str:
+    """Format a distortion as a share of the signal, or "<" and its detection limit where it is not significant at
+    `DISTORTION_P`; `MISSING` for None."""
     if cell is None:
         return MISSING
     if cell.p_value < DISTORTION_P:

@@ -1,6 +1,6 @@
 """Paragraphs of a diagnosis report on the method: how errors were measured, how the samples were split, how the noise
-was estimated, how the model was re-tuned and effects were chosen, how the map is tested. Numbers are those of the
-diagnosis itself. Called by `analysis.reports.diagnosis_report`."""
+was estimated, how the model was re-tuned and effects were chosen, how the map of the mismatch is tested. Durations and
+limits are those of the diagnosis. Called by `analysis.reports.diagnosis_report`."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
@@ -20,7 +20,7 @@ _NOISE_SOURCES = {
     "rest": "from the signals while nothing is driven",
     "quiet band": "from the frequencies above the driven band",
 }
-"""How the noise was measured, by `NoiseFloor.method`."""
+"""How the noise was measured, by `NoiseFloor.method`; other methods mean that it could not be measured."""
 _SPLIT_USES = (
     ("fit", "were used for the fit"),
     ("choose", "were used to choose between explanations"),

@@ -1,7 +1,8 @@
 """Tables of a diagnosis report: parameters, rivals and candidates of the missing physics, model errors, mismatches.
 
 Errors are given for the model as given, for the model with re-tuned parameters, and for the model with the effects that
-were found, each on the fitted and on held-out data. `diagnosis_report` arranges the tables.
+were found, each on the fitted and on held-out data. Called by `analysis.reports.diagnosis_report`, which
+arranges the tables.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,13 +21,13 @@ from analysis.wording import MISSING, capitalise, end_sentence, format_p, format
 _MODEL_STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With the effects found"))
 """Attribute of each stage of the model, and its heading."""
 _MOST_MISMATCH_ROWS = 12
-"""Most rows of the table of mismatches."""
+"""Largest number of rows of the table of mismatches. Chosen."""
 _SHARE_NOTE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
     "is named, the share of the mismatch's power that occurs in it."
 )
 _PART_NAMES: Mapping[str, str] = {"fit": "the fitted data", "test": "held-out data"}
-"""Part of the data, and its text."""
+"""Name of each part of the data in captions and rows, by its key."""
 
 
 def tabulate_parameters(effect: NamedEffect) -> Table:
@@ -98,34 +99,37 @@ def tabulate_channel_errors(findings: Findings, part: Literal["fit", "test"]) ->
     where there are no time series. Where a statistic was fitted, its chance error takes the place of the noise."""
     if not findings.time_series:
         return None
-    names, units, noise_rms_by_channel = (
+    channel_names, channel_units, noise_rms_by_channel = (
         findings.time_series[0].channels,
         findings.time_series[0].units,
         findings.noise_rms,
     )
     statistic, reference_name = findings.explanation.statistic, "noise"
     if statistic is not None:
-        units, noise_rms_by_channel, reference_name = (
-            ("1",) * len(names),
-            dict(zip(names, statistic.chance.tolist(), strict=True)),
+        channel_units, noise_rms_by_channel, reference_name = (
+            ("1",) * len(channel_names),
+            dict(zip(channel_names, statistic.chance.tolist(), strict=True)),
             "chance",
         )
     scores_by_stage = {stage: getattr(getattr(findings.explanation, stage).score, part) for stage, _ in _MODEL_STAGES}
     rows = []
-    for channel_index, (name, unit) in enumerate(zip(names, units, strict=True)):
-        noise_rms = noise_rms_by_channel.get(name)
+    for channel_index, (channel_name, channel_unit) in enumerate(zip(channel_names, channel_units, strict=True)):
+        noise_rms = noise_rms_by_channel.get(channel_name)
         if noise_rms is None:
             continue
         ratios = [
             float(
-                findings.channel_errors.get(stage, {}).get(name, channel_ratios[channel_index])
+                findings.channel_errors.get(stage, {}).get(channel_name, channel_ratios[channel_index])
                 if part == "test"
                 else channel_ratios[channel_index]
             )
             for stage, channel_ratios in scores_by_stage.items()
         ]
-        rows.append((name, *(f"{format_value(ratio * noise_rms, unit)} ({_format_ratio(ratio)})" for ratio in ratios),
-                     format_value(noise_rms, unit)))  # fmt: skip
+        rows.append((
+            channel_name,
+            *(f"{format_value(ratio * noise_rms, channel_unit)} ({_format_ratio(ratio)})" for ratio in ratios),
+            format_value(noise_rms, channel_unit),
+        ))  # fmt: skip
     header = (
         "Channel",
         *(f"{heading} (× {reference_name})" for _, heading in _MODEL_STAGES),

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.figures.frequency_bands import frequency_bands_picture
-from analysis.figures.model_order import model_order_picture
+from analysis.figures.frequency_bands import make_frequency_bands_picture
+from analysis.figures.model_order import make_model_order_picture
 from analysis.figures.picture import Picture
 from analysis.figures.transfer_functions import ResponseCurve, make_transfer_functions_picture
 from analysis.reports.page import Page, Section, Table, render_page
@@ -61,10 +61,10 @@ def make_identification_pictures(findings: IdentificationFindings) -> tuple[Pict
     pictures = [make_transfer_functions_picture(findings.estimate, model_curve, findings.model.band_hz)]
     if findings.bands:
         pictures.append(
-            frequency_bands_picture(findings.estimate, findings.onset, findings.bands, findings.direction_limit_hz)
+            make_frequency_bands_picture(findings.estimate, findings.onset, findings.bands, findings.direction_limit_hz)
         )
     if findings.order is not None:
-        pictures.append(model_order_picture(findings.order, findings.model.order))
+        pictures.append(make_model_order_picture(findings.order, findings.model.order))
     return tuple(pictures)
 
 

@@ -106,7 +106,8 @@ def _make_channel_table(overview: Overview) -> Table:
 
 def _make_segment_table(overview: Overview) -> Table:
     """Make the table of the segments with start and length (s, or samples where the recording has no time axis), period
-    (samples; empty where not periodic) and the rms of each channel; folded with more than 12 rows."""
+    (samples; empty where not periodic) and the rms of each channel; folded with more than 12 rows, which keeps a page
+    readable."""
     header = (
         "Segment",
         "Role",

@@ -19,7 +19,9 @@ class Table:
 
     caption: str
     header: tuple[str, ...]
+    """Headings of the columns."""
     rows: tuple[tuple[str, ...], ...]
+    """Rows with as many cells as the header has."""
     notes: tuple[str, ...] = ()
     """Sentences shown below the table."""
     folded: bool = False
@@ -40,7 +42,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report; `render_page` renders it."""
+    """A complete report; `render_page` renders it."""
 
     title: str
     summary: str
@@ -67,6 +69,6 @@ def render_page(page: Page) -> str:
 
 
 def _render_inline_svg(picture: Picture) -> Markup:
-    """Inline SVG of a picture, not escaped again."""
-    # Safe as markup: `render_inline_svg` escapes title and description, and Matplotlib the texts of the figure.
+    """Render a picture as inline SVG, marked so that the template does not escape it again."""
+    # Safe as markup: `render_picture_svg` escapes title and description, and Matplotlib the texts of the figure.
     return Markup(render_picture_svg(picture))

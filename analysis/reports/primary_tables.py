@@ -58,10 +58,10 @@ def make_primary_section(analysis: StudyAnalysis) -> Section:
         return _make_single_section(analysis)
     phrases = select_threshold_words(analysis.protocol.staircase)
     mean_tables = [
-        _make_contrast_table(f"Differences by {phrases.means} (dB)", means, (), _describe_coverage(analysis, "means"))
+        _make_contrast_table(f"Differences by {phrases.noun} (dB)", means, (), _describe_coverage(analysis, "means"))
     ]
     if analysis.tobit:
-        tobit_notes = (TOBIT_NOTE.format(too_low=phrases.too_low), *_describe_coverage(analysis, "tobit"))
+        tobit_notes = (TOBIT_NOTE.format(too_low=phrases.tobit_caveat), *_describe_coverage(analysis, "tobit"))
         mean_tables.append(
             _make_contrast_table("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), tobit_notes)
         )
@@ -91,8 +91,8 @@ def _make_single_section(analysis: StudyAnalysis) -> Section:
 
 
 def _describe_coverage(analysis: StudyAnalysis, analysis_name: str) -> tuple[str, ...]:
-    """Describe the measured coverage of the intervals of one analysis, a name of `coverage_words.TITLES`; empty where
-    `describe_measured_coverage` is."""
+    """Describe the measured coverage of the intervals of one analysis, a name of `coverage_words.INTERVAL_TITLES`;
+    empty where `describe_measured_coverage` is."""
     return describe_measured_coverage((analysis_name,), analysis.table, analysis.protocol.staircase)
 
 

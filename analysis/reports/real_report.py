@@ -161,8 +161,11 @@ def _make_recording_section(real_answer: RealAnswer, picture: Picture | None) ->
 def _make_stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
     """Make the table of root-mean-square errors by held-out stretch and channel, those of further tests included; empty
     without stretches. The ratio is a dash where the re-tuned model has no error."""
-    stretches = (*real_answer.stretches, *(stretch for test in real_answer.further for stretch in test.stretches))
-    if not stretches:
+    held_out_stretches = (
+        *real_answer.stretches,
+        *(stretch for test in real_answer.further for stretch in test.stretches),
+    )
+    if not held_out_stretches:
         return ()
     rows = tuple(
         (
@@ -172,7 +175,7 @@ def _make_stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
             format_value(stretch.after, stretch.unit),
             f"{stretch.after / stretch.retuned:.2f}" if stretch.retuned > 0 else "-",
         )
-        for stretch in stretches
+        for stretch in held_out_stretches
     )
     header = ("held-out stretch", "signal", "re-tuned", "with the effects found", "ratio")
     return (Table("Root-mean-square errors, stretch by stretch", header, rows),)
@@ -180,7 +183,7 @@ def _make_stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
 
 def describe_parameter(parameter: OwnParameter) -> str:
     """Describe a fitted parameter of the model in a sentence with its 95 % interval and, where its value is known by
-    other means, with its deviation from it in % (none from 0)."""
+    other means, with its deviation from it in %, which a known value of 0 does not have."""
     interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
     value_text = (
         f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after everything"

@@ -24,7 +24,7 @@ BANNER = (
 _AGREEMENT_WORDS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
 """Text for whether a finding is as published; None: not compared."""
 
-_MEASURES = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
+_MEASURE_HEADINGS = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
 """Column headings of the values of `_format_measures`."""
 
 _MODEL_NOTE = (
@@ -59,7 +59,7 @@ def render_reproduction_report(
     """Render the report as an HTML page. pictures: by the number of the published figure; a figure without an entry has
     none. provenance: versions and hashes by name. generated: local time of the report."""
     sections = [*_make_model_sections(reproduction), _make_overview_section(reproduction)]
-    for figure in sorted(reproduction.figures, key=lambda figure_findings: figure_findings.figure):
+    for figure in sorted(reproduction.figures, key=lambda findings: findings.figure):
         played_tables = _make_played_tables(reproduction) if figure.figure == 5 else ()
         tables = (_make_findings_table(figure), *played_tables)
         sections.append(_make_figure_section(figure, pictures.get(figure.figure, ()), tables))
@@ -113,8 +113,10 @@ def _format_percent(error_share: float | None) -> str:
 
 def _make_overview_section(reproduction: Reproduction) -> Section:
     """Make the section with the number of findings that agree with the paper, and a list of those that do not."""
-    compared = [finding for figure in reproduction.figures for finding in figure.findings if _is_compared(finding)]
-    agreement_count = sum(finding.as_published is True for finding in compared)
+    compared_findings = [
+        finding for figure in reproduction.figures for finding in figure.findings if _is_compared(finding)
+    ]
+    agreement_count = sum(finding.as_published is True for finding in compared_findings)
     differing_findings = tuple(
         f"Figure {figure.figure}, {finding.what}: published {finding.published}; here {finding.here}."
         for figure in sorted(reproduction.figures, key=lambda figure: figure.figure)
@@ -122,7 +124,7 @@ def _make_overview_section(reproduction: Reproduction) -> Section:
         if finding.as_published is False
     )
     summary_sentence = (
-        f"Of {len(compared)} things that the paper says of its figures and that can be compared by a rule, "
+        f"Of {len(compared_findings)} things that the paper says of its figures and that can be compared by a rule, "
         f"{agreement_count} came out as published. The rules are ours and are given below each table."
     )
     list_introduction = " These did not:" if differing_findings else ""
@@ -169,18 +171,18 @@ def _make_remark_tables(figure: FigureFindings) -> tuple[Table, ...]:
 def _make_played_tables(reproduction: Reproduction) -> tuple[Table, ...]:
     """Make the table of the quality of every row of figure 5, and, where the document has baselines, a second one of
     other ways of driving the device."""
-    header = ("", "Device", "Wanted", *_MEASURES)
+    header = ("", "Device", "Wanted", *_MEASURE_HEADINGS)
     rows = tuple((row.name, row.device, row.signal, *_format_measures(row)) for row in reproduction.played)
     tables = [Table("What was played, row by row", header, rows, notes=_ROW_NOTES)]
     if reproduction.baselines:
-        baseline_header = ("", *_MEASURES, "Cost")
+        baseline_header = ("", *_MEASURE_HEADINGS, "Cost")
         baseline_rows = tuple((row.name, *_format_measures(row), _format_cost(row)) for row in reproduction.baselines)
         tables.append(Table("Other ways of driving the device", baseline_header, baseline_rows, notes=_BASELINE_NOTES))
     return tuple(tables)
 
 
 def _format_measures(row: PlayedRow) -> tuple[str, ...]:
-    """Format the values of `_MEASURES` with units."""
+    """Format the values under `_MEASURE_HEADINGS`, with units."""
     return (
         f"{format_number(row.flatness_db)} dB",
         f"{format_number(row.coupling_db, 1)} dB",
@@ -196,7 +198,7 @@ def _format_cost(row: PlayedRow) -> str:
 
 
 def _is_compared(finding: Finding) -> bool:
-    """Return whether a rule compares the finding with the paper."""
+    """Whether a rule compares the finding with the paper."""
     return finding.as_published is not None
 
 

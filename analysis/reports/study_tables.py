@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from analysis.psychophysics.bias import CRITERION_DEFINITION
 from analysis.psychophysics.ellipsoid import EllipsoidResult
-from analysis.psychophysics.repeated_trials import FREQUENT_WORDS
+from analysis.psychophysics.repeated_trials import VOID_LIMITS_TEXT
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import describe_measured_coverage
@@ -92,13 +92,13 @@ def make_group_table(analysis: StudyAnalysis) -> Table:
 def _format_coverage_suffix(analysis: StudyAnalysis) -> str:
     """Format the suffix for the name of an interval or effect size that includes cut or stopped runs: its confidence
     does not hold; empty where no run was cut or stopped."""
-    return ", without coverage" if analysis.table.coverage else ""
+    return ", without coverage" if analysis.table.coverage_warning else ""
 
 
 def _list_coverage_notes(analysis: StudyAnalysis) -> tuple[str, ...]:
-    """List the note on why confidence levels do not hold (`ThresholdTable.coverage`); empty without cut or stopped
-    runs."""
-    return (analysis.table.coverage,) if analysis.table.coverage else ()
+    """List the note on why confidence levels do not hold (`ThresholdTable.coverage_warning`); empty without cut or
+    stopped runs."""
+    return (analysis.table.coverage_warning,) if analysis.table.coverage_warning else ()
 
 
 def make_one_way_table(analysis: StudyAnalysis) -> Table:
@@ -246,7 +246,7 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
             *([REVERSALS_NOTE] if has_reversals else []),
             f"m/s² and mm: as measured in {select_threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
-            f"the time), with their share; ! {FREQUENT_WORDS}.",
+            f"the time), with their share; ! {VOID_LIMITS_TEXT}.",
             f"Criterion: {CRITERION_DEFINITION}.",
         ),
         folded=True,
@@ -260,7 +260,7 @@ def _format_threshold(row: Threshold) -> str:
 
 def _format_repeats(row: Threshold) -> str:
     """Format number and percentage of the presentations that the participant made void; "0" without any; "!" where they
-    are frequent (`FREQUENT_WORDS`)."""
+    are frequent (`VOID_LIMITS_TEXT`)."""
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"

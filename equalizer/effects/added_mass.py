@@ -2,7 +2,8 @@
 
     F = -m dv/dt        m > 0 in kg (a rotation: kg m²)
 
-It is added to the mass matrix along the driven axis: M + m a aᵀ, a the axis's unit vector.
+It is added to the mass matrix along the driven axis: M + m a aᵀ, a the axis's unit vector. An entry of `catalogue`,
+which simulation and diagnosis look up by name.
 """
 
 from dataclasses import replace
@@ -16,17 +17,19 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _INITIAL_MASS_SHARE = 0.1
-"""Second starting value, as a share of the model's own mass: re-tuning the model may have absorbed the missing mass."""
+"""Second starting value, as a share of the model's own mass: re-tuning the model may have absorbed the missing mass.
+Chosen."""
 
 
-def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+def _add_mass(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    """Add the mass to the model along a driven axis: `Structure.change` of this effect."""
     direction = compute_driven_axes(model)[:, axis]
     return replace(model, mass=model.mass + values["mass"] * np.outer(direction, direction))
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Mass by linear regression of the missing force on -dv/dt, with position, velocity and a constant as nuisances
-    (the median over all axes for ALL_SITES); then a share of the model's mass. Only positive values."""
+    """Find the mass by linear regression of the missing force on -dv/dt, with position, velocity and a constant as
+    nuisances (the median over all axes for ALL_SITES); then a share of the model's mass. Only positive values."""
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
     estimates = []
     for site in sites:
@@ -48,7 +51,7 @@ EFFECT = Effect(
     signature="the missing force is a straight line over the acceleration, at every level; nothing appears at silent "
     "lines",
     parameters=(Parameter("mass", 1e-9, 1e6, none=0.0),),
-    action=Structure(_change),
+    action=Structure(_add_mass),
     starts=_find_starting_values,
     sites=("all", "one"),
 )

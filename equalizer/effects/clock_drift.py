@@ -17,7 +17,8 @@ from equalizer.effects.starts.response_starts import estimate_lag
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4
-"""Length (s) of the windows in which the time shift is measured, and fewest windows for a slope."""
+"""Length (s) of the windows in which the time shift is measured, and fewest windows for a slope. Chosen, as are the
+limits below."""
 LARGEST_SHIFT_S = 0.1
 """Largest time shift (s) of a window, either way, that is searched for."""
 LARGEST_PPM = 2e4
@@ -59,8 +60,9 @@ def _compute_misfit(evidence: Evidence, values: Values) -> float:
 
 
 def _detect_position_drift(evidence: Evidence, response_shift_rate: float) -> float:
-    """Return 1 where the measured position has the same clock error as the response, and where it cannot be told; 0
-    where its time shift is nearer to none: it has the clock of the commands. response_shift_rate: s per s."""
+    """Detect the clock of the measured position: 1 where it drifts as the response does, or where this cannot be
+    determined; 0 where its time shift is nearer to none, so that it has the clock of the commands. response_shift_rate:
+    s per s."""
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
     position_noise = evidence.position_noise
@@ -112,6 +114,7 @@ def _estimate_shift_rate(evidence: Evidence, measured: FloatArray, predicted: Fl
     earlier, later = np.triu_indices(len(times_s), 1)
     shift_rate = float(np.median((time_shifts_s[later] - time_shifts_s[earlier]) / (times_s[later] - times_s[earlier])))
     residual = time_shifts_s - shift_rate * times_s
+    # 1.5: rounded 1.4826, which makes the median absolute deviation a standard deviation for normal residuals.
     residual_sd = 1.5 * float(np.median(np.abs(residual - np.median(residual))))
     return shift_rate, residual_sd / (np.sqrt(len(times_s)) * float(times_s.std()))
 

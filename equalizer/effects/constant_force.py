@@ -2,7 +2,8 @@
 
     F = force        in N (a rotation: N m), of either sign
 
-It shifts the equilibrium position; a linear model keeps its resonances.
+It shifts the equilibrium position; a linear model keeps its resonances. An entry of `catalogue`, which simulation and
+diagnosis look up by name.
 """
 
 import numpy as np
@@ -16,13 +17,13 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """The force (N), the same at every instant. parameters: force."""
+    """Return the force (N), the same at every instant. parameters: force."""
     return float(parameters[0])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Two starting values: the mean of the missing force, and the constant of its regression on position, velocity and
-    acceleration; a value of zero is left out."""
+    """Find two starting values: the mean of the missing force, and the constant of its regression on position, velocity
+    and acceleration; a value of zero is left out."""
     motion = select_axis_motion(evidence, axis)
     # Re-tuning of a linear model can change its stiffness but not its equilibrium: a constant is no nuisance here.
     regression = PartialRegression(motion.force, stack_linear_regressors(motion, constant=False))

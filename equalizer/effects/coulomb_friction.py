@@ -3,7 +3,8 @@
     F = -level sgn(v) in sliding, any force from -level to level at rest; level in N (a rotation: N m)
 
 The simulation replaces the jump at v = 0 by the bristle of the LuGre model, which slips after 50 nm
-(`equalizer.effects.simulation.dry_friction_kernel`).
+(`equalizer.effects.simulation.dry_friction_kernel`). An entry of `catalogue`, which simulation and diagnosis look up by
+name.
 """
 
 import numpy as np
@@ -18,12 +19,14 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean friction force (N) over a step. parameters: level; memory: deflection of the bristle over its largest."""
+    """Compute the mean friction force (N) over a step. parameters: level; memory: deflection of the bristle over its
+    largest."""
     return float(compute_friction_force(parameters[0], parameters[0], memory[0], memory, step_motion))
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Level by linear regression of the missing force on -sgn(v) where the axis slides; empty unless positive."""
+    """Find the level by linear regression of the missing force on -sgn(v) where the axis slides; empty unless
+    positive."""
     motion = select_sliding_motion(evidence, axis)
     level = float(regress_out_linear_terms(motion).fit(-np.sign(motion.velocity)).strengths[0])
     return ({"level": level},) if level > 0 else ()

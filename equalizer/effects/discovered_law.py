@@ -41,7 +41,7 @@ _RESERVED_NAMES = {
 }
 """Names that a recorded condition cannot have in a formula, because they have another meaning."""
 LARGEST_PARAMETER, LARGEST_EXPONENT = 1e15, 20.0
-"""Largest magnitude of a free parameter, and of an exponent."""
+"""Largest magnitude of a free parameter, and of an exponent. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,9 @@ class Channels:
     """Channel names of a recording's commands, responses and conditions."""
 
     inputs: tuple[str, ...] = ("fx", "fy", "fz")
+    """Names of the command channels, one per driven axis."""
     outputs: tuple[str, ...] = ("ax", "ay", "az")
+    """Names of the response channels."""
     quantity: str = "acceleration"
     """Quantity of the response."""
     conditions: tuple[str, ...] = ()
@@ -101,7 +103,7 @@ def name_conditions(channels: Channels) -> tuple[str, ...]:
 
 
 def _is_usable_name(name: str) -> bool:
-    """Return whether a condition's channel name is valid in a formula and has no other meaning there."""
+    """Whether a condition's channel name is valid in a formula and has no other meaning there."""
     is_reserved = iskeyword(name) or name in _RESERVED_NAMES or re.fullmatch(r"[pc]\d+", name)
     return name.isidentifier() and not is_reserved
 
@@ -144,7 +146,7 @@ def make_law_parameters(law: Law) -> tuple[Parameter, ...]:
 
 
 def _adds_to_signal(tree: Node) -> bool:
-    """Return whether the formula is the signal itself plus terms: with all terms zero, it changes nothing."""
+    """Whether the formula is the signal itself plus terms: with all terms zero, it changes nothing."""
     while isinstance(tree, Apply) and tree.name in ("+", "-"):
         tree = tree.arguments[0]
     return isinstance(tree, Variable)
@@ -174,7 +176,7 @@ def _format_left_hand_side(law: Law) -> str:
 
 
 def has_memory(law: Law) -> bool:
-    """Return whether the formula has an operator with memory (lag, play, delay, integral): it depends on past
+    """Whether the formula has an operator with memory (lag, play, delay, integral): it depends on past
     signals."""
     return any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree))
 
@@ -197,7 +199,7 @@ def list_response_signals(channels: Channels) -> tuple[str, ...]:
 
 
 def index_force_signals(channels: Channels) -> dict[str, int]:
-    """Return the index of each signal in the compiled law's input: time, then position, velocity, acceleration and
+    """List the index of each signal in the compiled law's input: time, then position, velocity, acceleration and
     command of each axis, then the conditions."""
     condition_labels = name_conditions(channels)
     first_condition = 1 + SIGNALS_PER_AXIS * len(channels.inputs)
@@ -246,7 +248,7 @@ def _make_force_action(
         numbers = program.with_numbers(with_law_values(law, values).numbers)
         return np.concatenate([header, condition_samples.ravel(), numbers])
 
-    memory = STACK_SIZE + 1 + SIGNALS_PER_AXIS * m + q + program.memory
+    memory = STACK_SIZE + 1 + SIGNALS_PER_AXIS * m + q + program.memory_size
     return AxisForce(compute_law_force, pack, memory=memory, acceleration=reads_acceleration, reads_all_axes=True)
 
 
@@ -258,13 +260,15 @@ def _make_command_action(law: Law, channels: Channels) -> OnCommand:
     # Compiled only to raise LawError now, instead of in the first simulation.
     compile_program(law.tree, {**signals, "t": -1})
 
-    def modify(commands: FloatArray, channel: int, step_s: float, values: Values) -> tuple[FloatArray, FloatArray]:
+    def compute_force(
+        commands: FloatArray, channel: int, step_s: float, values: Values
+    ) -> tuple[FloatArray, FloatArray]:
         """Compute the law in place of the command: `OnCommand.of_all`."""
         signal_values = {name: commands[:, channel_index] for name, channel_index in signals.items()}
         step_values = evaluate_held(with_law_values(law, values), signal_values, 1 / step_s)
         return np.asarray(step_values.mean(axis=0)), step_values[1]
 
-    return OnCommand(lambda commands, step_s, values: commands, fine=has_memory(law), of_all=modify)
+    return OnCommand(lambda commands, step_s, values: commands, fine=has_memory(law), of_all=compute_force)
 
 
 def _make_response_action(law: Law, channels: Channels) -> OnResponse:
@@ -284,7 +288,7 @@ def _make_response_action(law: Law, channels: Channels) -> OnResponse:
 
 
 def _index_response_signals(channels: Channels) -> Mapping[str, int]:
-    """Return the column in the response of each name that a formula can use."""
+    """List the column in the response of each name that a formula can use."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     letters = derive_axis_letters(channels.outputs) if order is not None else ()
     derivative_names = {DERIVATIVE_PREFIXES[order or 0] + letter: column for column, letter in enumerate(letters)}

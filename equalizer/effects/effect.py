@@ -3,7 +3,8 @@
 An effect acts in one of five ways: it changes the linear structure (`Structure`), adds a motion-dependent force at a
 driven axis (`AxisForce`) or within a joint (`JointForce`), changes the command before it becomes a force
 (`OnCommand`), or changes the sensed response (`OnResponse`). Sizes: n samples or coordinates, m commands, p response
-channels. SI units; on rotational axes N stands for N m and m for rad.
+channels. SI units; on rotational axes N stands for N m and m for rad. Each module of `catalogue` makes an `Effect`;
+`placing` binds it to axes, `simulation` evaluates it, and the search of `analysis.diagnosis` fits it.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,8 +23,8 @@ Values = Mapping[str, float]
 """Values by parameter name, in SI units."""
 
 STEPS = 4
-"""Default number of integration steps per sample, where a force depends on the motion or a command changes between
-samples."""
+"""Default number of integration steps per sample (chosen), where a force depends on the motion or a command changes
+between samples."""
 
 ALL_SITES = -1
 """Placeholder for the site when starting values are asked for all axes or channels together."""
@@ -81,8 +82,8 @@ class JointForce:
     motion."""
 
     change: Callable[[MechanicalModel, int, Values], tuple[MechanicalModel, FloatArray]]
-    """The structure with the joint in it (its additional coordinates come last), and the direction (n,) in these
-    coordinates along which the joint moves and its force acts."""
+    """Arguments as in `Structure`. Returns the model with the joint in it (its additional coordinates come last), and
+    the direction (n,) in these coordinates along which the joint moves and its force acts."""
     law: Any
     """As in `AxisForce`; so are `memory`, `steps` and `acceleration`."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
@@ -93,7 +94,7 @@ class JointForce:
 
 
 def pack_values(*names: str) -> Callable[[MechanicalModel, int, Values], FloatArray]:
-    """A `pack` function whose array is the values of these parameters in this order."""
+    """Make a `pack` function whose array (k,) is the values of these parameters in this order."""
     return lambda model, axis, values: np.array([values[name] for name in names])
 
 
@@ -173,7 +174,7 @@ class Effect:
     Hz from a simulation's first sample on."""
 
     def __post_init__(self) -> None:
-        """Register the effect for `effects_by_address`."""
+        """Register the effect for `list_effects_by_address`."""
         _live_effects[id(self)] = self
 
 
@@ -181,8 +182,8 @@ _live_effects: WeakValueDictionary[int, Effect] = WeakValueDictionary()
 """Effects by address; weak references, so that an unused effect is freed."""
 
 
-def effects_by_address() -> dict[int, Effect]:
-    """All effects in this process, by address (`id`): those of the catalogue and those of discovered laws.
+def list_effects_by_address() -> dict[int, Effect]:
+    """List all effects in this process by address (`id`): those of the catalogue and those of discovered laws.
 
     Effects hold functions, which cannot be pickled for another process; a forked process has them at the same
     addresses, so that the address identifies them there.

@@ -23,7 +23,7 @@ from equalizer.signals.signal import FloatArray
 
 COARSE_POSITION_SHARES, FINE_POSITION_OFFSETS = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
 """Stop positions that are tried, relative to the largest deflection: a coarse grid, then offsets around its best
-point."""
+point. Chosen."""
 
 
 @compile_law
@@ -86,13 +86,14 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 def _find_best_stop(
     motion: AxisMotion, regression: PartialRegression, stop_sign: float, stop_distances: FloatArray
 ) -> tuple[float, Values] | None:
-    """Find the best stop on the side `stop_sign` (1 or -1), with a second stop that is at most 10 % stiffer. Returns
+    """Find the best stop on the side `stop_sign` (1 or -1), with a second stop at the same distance on the other
+    side. A trial whose second stop is over 10 % stiffer is left out; a stiffer one counts as equal. Returns
     the share of the missing force that both explain, and the values; None where no stop has a positive stiffness.
     stop_distances: distances (m) to try."""
     candidates: list[tuple[float, Values]] = []
     for stop_distance in stop_distances.tolist():
         penetration, opposite_penetration = (
-            np.maximum(side * motion.position - stop_distance, 0.0) for side in (stop_sign, -stop_sign)
+            np.maximum(side_sign * motion.position - stop_distance, 0.0) for side_sign in (stop_sign, -stop_sign)
         )
         if not (penetration > 0).any():
             continue

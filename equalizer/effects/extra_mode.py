@@ -3,7 +3,8 @@
     q'' + 2 z w (q' - s') + w² (q - s) = 0,   F = -m q''        w = 2 pi f
 
 s is the motion of the axis, q that of the attached mass m, f its natural frequency, z its damping ratio. The direction
-of the oscillator may be tilted towards the other axes (`tilt_next`, `tilt_after_next`).
+of the oscillator may be tilted towards the other axes (`tilt_next`, `tilt_after_next`). An entry of `catalogue`, which
+simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -21,7 +22,8 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 LOWEST_NATURAL_HZ, MAX_MODES = 2.0, 2
-"""Lowest natural frequency (Hz) that is tried, and largest number of modes for which starting values are returned."""
+"""Lowest natural frequency (Hz) that is tried, and largest number of modes for which starting values are returned.
+Chosen, as are the grids below."""
 DAMPING_RATIOS = (0.01, 0.04, 0.12)
 """Damping ratios of the coarse search."""
 FREQUENCY_FACTORS, DAMPING_FACTORS = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
@@ -31,7 +33,7 @@ TILT_NAMES = ("tilt_next", "tilt_after_next")
 
 
 def _attach_oscillator(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    """The model with the oscillator attached along the direction of the axis, tilted towards the other axes; the
+    """Attach the oscillator to the model along the direction of the axis, tilted towards the other axes; the
     direction is scaled to a unit vector in the coordinates. A missing tilt is 0."""
     axes, m = compute_driven_axes(model), model.inputs
     direction = axes[:, axis].copy()
@@ -45,8 +47,8 @@ def _attach_oscillator(model: MechanicalModel, axis: int, values: Values) -> Mec
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Up to `MAX_MODES` oscillators that explain most of the missing force, each by a coarse and a fine grid search
-    over natural frequency (up to 0.4 of the sample rate) and damping ratio."""
+    """Find up to `MAX_MODES` oscillators that explain most of the missing force, each by a coarse and a fine grid
+    search over natural frequency (up to 0.4 of the sample rate) and damping ratio."""
     missing_force, starting_values = estimate_missing_force_spectra(evidence, axis), []
     natural_hz = np.geomspace(LOWEST_NATURAL_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(MAX_MODES):
@@ -65,10 +67,10 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _convert_to_parameters(oscillator: AttachedOscillator, axis: int, m: int) -> Values:
-    """Parameters of the effect for an oscillator that was fitted at an axis. m: number of driven axes; tilts towards
-    axes beyond them are 0, the others limited to -1 to 1."""
+    """Convert to the effect's parameters an oscillator that was fitted at an axis. m: number of driven axes; tilts
+    towards axes beyond them are 0, the others limited to -1 to 1."""
     tilts = [float(np.clip(oscillator.by_axis[(axis + offset) % m], -1, 1)) if offset < m else 0.0 for offset in (1, 2)]
-    # Along a direction (1, t1, t2) the own axis feels only mass / (1 + t1² + t2²), which is what was fitted.
+    # Along a direction (1, t1, t2) the axis itself bears only mass / (1 + t1² + t2²), which is what was fitted.
     mass = oscillator.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
     values = {"frequency": oscillator.natural_hz, "mass": mass, "damping_ratio": oscillator.damping_ratio}
     return values | dict(zip(TILT_NAMES, tilts, strict=True))

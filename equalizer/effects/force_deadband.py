@@ -2,7 +2,8 @@
 
     F = 0 where |u| <= width,  else F = u - (1 - jump) width sgn(u)        u, F, width in N; jump from 0 to 1
 
-With jump = 1 the force equals the command beyond the band; with jump = 0 it grows from zero there.
+With jump = 1 the force equals the command beyond the band; with jump = 0 it grows from zero there. An entry of
+`catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -14,32 +15,34 @@ from equalizer.signals.signal import FloatArray
 
 
 def _apply_deadband(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Force (n,) for commands (n,), both in N; `step_s` is not used, because the dead band has no memory. A missing
-    jump is 0."""
+    """Compute the force (n,) for commands (n,), both in N; `step_s` is not used, because the dead band has no memory. A
+    missing jump is 0."""
     width = values["width"]
     jump = values.get("jump", 0.0) * width * np.sign(commands) * (np.abs(commands) > width)
     return np.asarray(commands - np.clip(commands, -width, width) + jump)
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Likeliest width without a jump (0) and with a full one (1), each by search over a grid of widths from 0.1 % to
-    99.5 % of the strongest command; a jump for which no width explains enough of the missing force is left out."""
-    peaks = make_force_level_grid(evidence, axis)
-    grid = [peaks[0] / 30, peaks[0] / 10, peaks[0] / 3, *peaks] if peaks else []
+    """Find the likeliest width without a jump (0) and with a full one (1), each by search over a grid of widths from
+    0.1 % to 99.5 % of the strongest command; a jump for which no width explains enough of the missing force is left
+    out."""
+    force_levels = make_force_level_grid(evidence, axis)
+    widths = [force_levels[0] / 30, force_levels[0] / 10, force_levels[0] / 3, *force_levels] if force_levels else []
     starting_values = []
     for jump in (0.0, 1.0):
 
-        def change(commands: FloatArray, step_s: float, width: float, jump: float = jump) -> FloatArray:
+        def apply_trial_deadband(commands: FloatArray, step_s: float, width: float, jump: float = jump) -> FloatArray:
+            """Compute the force (n,) for a trial width in N."""
             return _apply_deadband(commands, step_s, {"width": width, "jump": jump})
 
-        width = find_command_parameter(evidence, axis, change, grid, True)
+        width = find_command_parameter(evidence, axis, apply_trial_deadband, widths, True)
         starting_values += [] if width is None else [{"width": width, "jump": jump}]
     return tuple(starting_values)
 
 
 def _remove_jump(values: Values) -> tuple[Values, ...]:
-    """The dead band without a jump that gives the same force beyond the band: the two differ only for commands between
-    both widths, where a recording has few samples."""
+    """Convert to the dead band without a jump that gives the same force beyond the band: the two differ only for
+    commands between both widths, where a recording has few samples."""
     jump = values.get("jump", 0.0)
     return ({"width": values["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
 

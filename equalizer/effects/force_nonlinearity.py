@@ -3,7 +3,7 @@
     F = u (1 - square + square |u| / reference)        u, F, reference in N; square without unit
 
 square = 1 is the pure square law of a propeller or of a coil without bias current; square < 0 is a gain that falls as
-the command grows.
+the command grows. An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -14,17 +14,19 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 
-def square_law_force(commands: FloatArray, square: float, reference: float) -> FloatArray:
-    """Force (n,) in N of commands (n,) in N. square: quadratic share; reference: magnitude at which force and command
-    are equal."""
+def apply_square_law(commands: FloatArray, square: float, reference: float) -> FloatArray:
+    """Compute the force (n,) in N of commands (n,) in N. square: quadratic share; reference: magnitude at which force
+    and command are equal."""
     return np.asarray(commands * (1 - square + square * np.abs(commands) / reference))
 
 
-def _bend_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return square_law_force(commands, values["square"], values["reference"])
+def _compute_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Compute the force (n,): `OnCommand.change` of this effect; `step_s` is not used."""
+    return apply_square_law(commands, values["square"], values["reference"])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Find the square law by regression of the missing force; empty where `fit_square_law` finds none."""
     square_law = fit_square_law(evidence, axis)
     return () if square_law is None else ({"square": square_law[0], "reference": square_law[1]},)
 
@@ -40,7 +42,7 @@ EFFECT = Effect(
         Parameter("square", -1.0, 1.0, none=0.0, scale="signed"),
         Parameter("reference", 1e-6, 1e6, none=None),
     ),
-    action=OnCommand(_bend_force),
+    action=OnCommand(_compute_force),
     starts=_find_starting_values,
     sites=("one", "all"),
 )

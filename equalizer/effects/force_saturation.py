@@ -2,7 +2,7 @@
 
     F = max(-limit, min(u, limit))        command u, force F and limit in N
 
-The effect vanishes for an infinite limit.
+The effect vanishes for an infinite limit. An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import math
@@ -16,11 +16,13 @@ from equalizer.signals.signal import FloatArray
 
 
 def _clip_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Limit the commands (n,): `OnCommand.change` of this effect; `step_s` is not used."""
     return np.clip(commands, -values["limit"], values["limit"])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Likeliest limit by grid search, from 3 % to just below the strongest command."""
+    """Find the likeliest limit by grid search and golden section, from 3 % to just below the strongest command; empty
+    where no limit explains enough of the missing force."""
     limit = find_command_parameter(
         evidence, axis, lambda u, step_s, value: np.clip(u, -value, value), make_force_level_grid(evidence, axis), True
     )

@@ -2,7 +2,8 @@
 
     F = -(m dv/dt + c v + k x)        in kg, N s/m, N/m (a rotation: kg m², N m s/rad, N m/rad)
 
-The values are added to the model's mass, damping and stiffness matrices along the axis.
+The values are added to the model's mass, damping and stiffness matrices along the axis. An entry of `catalogue`, which
+simulation and diagnosis look up by name.
 """
 
 from dataclasses import replace
@@ -15,37 +16,41 @@ from equalizer.effects.starts.starting_values import PartialRegression, compute_
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-_INITIAL_SHARE = 0.1
+_INITIAL_MODEL_SHARE = 0.1
 """Second starting values, as shares of the model's own mass, damping and stiffness. In the first, a tenth of them
-replaces each value that the regression finds negative or zero."""
+replaces each value that the regression finds negative or zero. Chosen."""
 
 
-def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+def _add_impedance(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    """Add mass, damping and stiffness to the model along a driven axis: `Structure.change` of this effect."""
     direction = compute_driven_axes(model)[:, axis]
-    square = np.outer(direction, direction)
+    direction_product = np.outer(direction, direction)
     return replace(
         model,
-        mass=model.mass + values["mass"] * square,
-        damping=model.damping + values["damping"] * square,
-        stiffness=model.stiffness + values["stiffness"] * square,
+        mass=model.mass + values["mass"] * direction_product,
+        damping=model.damping + values["damping"] * direction_product,
+        stiffness=model.stiffness + values["stiffness"] * direction_product,
     )
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Values by linear regression of the missing force, then shares of the model's own values."""
+    """Find values by linear regression of the missing force, then shares of the model's own values."""
     motion = select_axis_motion(evidence, axis)
     regression = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
     estimates = regression.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
     direction, model = compute_driven_axes(evidence.model)[:, axis], evidence.model
     model_shares = [
-        _INITIAL_SHARE * compute_quadratic_form(matrix, direction)
+        _INITIAL_MODEL_SHARE * compute_quadratic_form(matrix, direction)
         for matrix in (model.mass, model.damping, model.stiffness)
     ]
     values = [
-        estimate if estimate > 0 else 0.1 * fallback for estimate, fallback in zip(estimates, model_shares, strict=True)
+        estimate if estimate > 0 else 0.1 * model_share
+        for estimate, model_share in zip(estimates, model_shares, strict=True)
     ]
-    names = ("mass", "damping", "stiffness")
-    return tuple(dict(zip(names, numbers, strict=True)) for numbers in (values, model_shares))
+    parameter_names = ("mass", "damping", "stiffness")
+    return tuple(
+        dict(zip(parameter_names, parameter_values, strict=True)) for parameter_values in (values, model_shares)
+    )
 
 
 EFFECT = Effect(
@@ -60,7 +65,7 @@ EFFECT = Effect(
         Parameter("damping", 0.0, 1e6, none=0.0, scale="signed"),
         Parameter("stiffness", 0.0, 1e9, none=0.0, scale="signed"),
     ),
-    action=Structure(_change),
+    action=Structure(_add_impedance),
     starts=_find_starting_values,
     sites=("each",),
     simpler=("added_mass", "viscous_damping"),

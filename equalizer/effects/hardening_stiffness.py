@@ -2,6 +2,8 @@
 alike.
 
     F = -k3 x³        k3 > 0: hardening, k3 < 0: softening; N/m³ (a rotation: N m/rad³)
+
+An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
@@ -14,7 +16,7 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Force (N) over one step: the mean of those at its start and end (trapezoidal rule).
+    """Compute the force (N) over one step: the mean of those at its start and end (trapezoidal rule).
 
     The end position depends on this force (implicit step), x_end = x_free + x_per_n F, so that
     g(F) = F + k3/2 (x³ + x_end³) = 0 is solved by Newton's method, dg/dF = 1 + 3 k3/2 x_per_n x_end². Started at the
@@ -31,8 +33,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """k3 by linear regression of the missing force on -x³ and the linear terms of the motion; empty where k3 is not
-    positive, so that a search by simulation begins with hardening only."""
+    """Find k3 by linear regression of the missing force on -x³ and the linear terms of the motion; empty where k3 is
+    not positive, so that a search by simulation begins with hardening only."""
     motion = select_axis_motion(evidence, axis)
     k3 = float(regress_out_linear_terms(motion).fit(-(motion.position**3)).strengths[0])
     return ({"k3": k3},) if k3 > 0 else ()

@@ -1,7 +1,7 @@
 """Constant time offset between two data loggers: the response is recorded late or early, the position is not.
 
 y(t) = x(t - offset). The offset may be a fraction of a sample; the logger may have interpolated linearly between
-samples, which attenuates high frequencies.
+samples, which attenuates high frequencies. An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -13,24 +13,24 @@ from equalizer.effects.starts.response_starts import estimate_lag
 from equalizer.signals.signal import FloatArray
 
 LARGEST_OFFSET_S = 1.0
-"""Largest offset between the loggers (s), of either sign. Chosen by hand."""
+"""Largest offset between the loggers (s), of either sign. Chosen."""
 SMALLEST_OFFSET_SAMPLES = 1e-3
-"""Least offset that is tried (samples): below it, the estimate by cross-correlation is not worth a fit. Chosen by
-hand."""
+"""Least offset that is tried (samples): below it, the estimate by cross-correlation is not worth a fit. Chosen."""
 
 
 def _shift_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """The response (n, c), delayed by `offset` seconds. `interpolated`: share (0 to 1) of linear interpolation between
+    """Delay the response (n, c) by `offset` seconds. `interpolated`: share (0 to 1) of linear interpolation between
     samples; the rest is band-limited (windowed sinc). `channels` is not used: all are delayed alike."""
     return resample_response(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Starting values: the lag of the measured response behind the predicted one, by cross-correlation weighted with
-    the noise, with linear and with band-limited interpolation, that of the smaller misfit first. Empty for an offset of
-    at most `SMALLEST_OFFSET_SAMPLES`, and for channels after the first, because all channels have the same offset."""
+    """Find starting values: the lag of the measured response behind the predicted one, by cross-correlation weighted
+    with the noise, with linear and with band-limited interpolation, that of the smaller misfit first. Empty for an
+    offset of at most `SMALLEST_OFFSET_SAMPLES`, and for channels after the first, because all channels have the same
+    offset."""
     if channel > 0:
         return ()
     weight = evidence.used[:, None] / evidence.noise
@@ -46,7 +46,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
 
 
 def _compute_misfit(evidence: Evidence, values: Values) -> float:
-    """Sum of squared residuals of the shifted prediction over the samples in use, in units of the noise."""
+    """Compute the sum of squared residuals of the shifted prediction over the samples in use, in units of the noise."""
     shifted_response = _shift_response(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - shifted_response) / evidence.noise) ** 2)[evidence.used > 0]))
 

@@ -29,16 +29,16 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 STEPS_PER_SAMPLE = 8
-"""Integration steps per sample."""
+"""Integration steps per sample. Chosen."""
 RELATIVE_GAPS, RELATIVE_STIFFNESSES, RELATIVE_SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Starting values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to the
-model's stiffness along the joint; slip forces relative to that stiffness times that travel."""
+model's stiffness along the joint; slip forces relative to that stiffness times that travel. Chosen."""
 EXCERPT_S = 2.0
-"""Length of the excerpt that is simulated (s)."""
+"""Length of the excerpt that is simulated (s), chosen to limit the computing time."""
 SETTLING_DIVISOR = 4
 """The first 1/SETTLING_DIVISOR of the excerpt is not compared: the simulation starts at rest, the recording did not."""
 REFINED_PAIRS = 4
-"""Number of the best pairs of gap and stiffness that are tried with every slip force."""
+"""Number of the best pairs of gap and stiffness that are tried with every slip force. Chosen."""
 _NO_FORCE: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 """Values without a force: the motion of the model alone, from which the joint's travel is computed."""
 
@@ -83,11 +83,11 @@ def find_joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
     a spring is coupled to the axis, the joint connects the axis to the ground.
     """
     direction, axes = compute_driven_axes(model)[:, axis], compute_driven_axes(model)
-    undriven = np.linalg.norm(axes, axis=1) < 1e-9
-    if not undriven.any():
+    is_undriven = np.linalg.norm(axes, axis=1) < 1e-9
+    if not is_undriven.any():
         return direction
     diagonal_stiffness = np.diagonal(model.stiffness)
-    is_sprung = undriven & (diagonal_stiffness > 0)
+    is_sprung = is_undriven & (diagonal_stiffness > 0)
     static_ratio = np.where(
         is_sprung, model.stiffness @ direction / np.where(diagonal_stiffness > 0, diagonal_stiffness, 1.0), 0.0
     )
@@ -96,13 +96,14 @@ def find_joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
     if kinetic_energy[body] == 0:
         return direction
     # Travel of the joint: static position of the body for the driven coordinates, minus its actual position.
-    relative_direction = np.where(undriven, 0.0, -model.stiffness[body] / diagonal_stiffness[body])
+    relative_direction = np.where(is_undriven, 0.0, -model.stiffness[body] / diagonal_stiffness[body])
     relative_direction[body] = -1.0
     return np.asarray(relative_direction)
 
 
 def _locate_joint(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
-    """Return the unchanged model, whose bodies the joint connects, and the direction of the joint."""
+    """Locate the joint: returns the unchanged model, whose bodies the joint connects, and the direction of the
+    joint."""
     return model, find_joint_direction(model, axis)
 
 
@@ -135,10 +136,10 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         for pair in product(RELATIVE_GAPS, RELATIVE_STIFFNESSES)
     }
     best_pairs = sorted(errors, key=errors.__getitem__)[:REFINED_PAIRS]
-    candidates = [(errors[pair], scale_values(*pair, medium_slip)) for pair in best_pairs]
+    scored_values = [(errors[pair], scale_values(*pair, medium_slip)) for pair in best_pairs]
     other_slips = [scale_values(*pair, slip) for pair in best_pairs for slip in RELATIVE_SLIPS if slip != medium_slip]
-    candidates += [(compute_mean_square(values), values) for values in other_slips]
-    return tuple(values for _, values in sorted(candidates, key=lambda item: item[0])[:2])
+    scored_values += [(compute_mean_square(values), values) for values in other_slips]
+    return tuple(values for _, values in sorted(scored_values, key=lambda item: item[0])[:2])
 
 
 def _find_strongest_excerpt(evidence: Evidence, axis: int) -> slice:

@@ -4,7 +4,7 @@
 
 Without a measurement, a simulation draws the lost samples at random. With a measurement, the samples are lost for which
 the measured value is likelier under repetition than under the simulated value (likelihood ratio test, equation in
-`simulation.logger_kernel`).
+`simulation.logger_kernel`). An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import math
@@ -16,15 +16,16 @@ from equalizer.effects.simulation.logger_kernel import BoolArray, repeat_likely_
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
-DISTINGUISHABLE = 4.0
-"""Difference of two successive samples, over the noise, from which a repeated sample is distinguishable."""
-LEAST_EVENTS = 8
+DISTINGUISHABLE_SIGMA = 4.0
+"""Difference of two successive samples, over the noise, above which a repeated sample is distinguishable. Chosen, as
+are the limits below."""
+LEAST_LOST_SAMPLES = 8
 """Fewest repeated readings that count as lost samples."""
-LARGEST = 0.3
+LARGEST_FRACTION = 0.3
 """Largest fraction of lost samples."""
-ROUNDS = 4
+FRACTION_ITERATIONS = 4
 """Iterations between the fraction and the decisions on which samples are lost."""
-CONTROL = 3.0
+LEAST_CONTROL_RATIO = 3.0
 """Negative control: repeated samples must be more than this many times as frequent as samples that equal the next
 sample, for which there is no physical cause."""
 
@@ -32,42 +33,44 @@ sample, for which there is no physical cause."""
 def _lose_at_random(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
+    """Repeat samples of these channels of the response (n, p) at random: `OnResponse.change` of this effect."""
     # Seeded with the length, so that the same samples are lost in every simulation of a recording.
-    lost = np.random.default_rng(len(response)).random(len(response)) < values["fraction"]
-    read, repeated = response.copy(), np.empty((len(response), len(channels)))
-    repeat_lost_samples(np.ascontiguousarray(response[:, channels]), lost, repeated)
-    read[:, channels] = repeated
-    return read
+    is_lost = np.random.default_rng(len(response)).random(len(response)) < values["fraction"]
+    readings, repeated = response.copy(), np.empty((len(response), len(channels)))
+    repeat_lost_samples(np.ascontiguousarray(response[:, channels]), is_lost, repeated)
+    readings[:, channels] = repeated
+    return readings
 
 
 def _lose_as_measured(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """The response (n, p) with lost samples decided by the measurement; unchanged for a fraction of 0 or 1."""
+    """Repeat the samples of the response (n, p) that the measurement shows as lost; unchanged for a fraction of 0 or
+    1."""
     if not 0 < values["fraction"] < 1:
         return response
-    columns, read = list(channels), response.copy()
-    read[:, columns] = _repeat_by_likelihood(
+    columns, readings = list(channels), response.copy()
+    readings[:, columns] = _repeat_by_likelihood(
         response[:, columns], measured[:, columns], noise[columns], values["fraction"]
     )[0]
-    return read
+    return readings
 
 
 def _repeat_by_likelihood(
     samples: FloatArray, measured: FloatArray, noise: FloatArray, fraction: float
 ) -> tuple[FloatArray, BoolArray]:
-    """Samples (n, c) after losses, and mask (n,) of the lost ones, by likelihood ratio with the prior odds of the
-    fraction."""
-    read, lost = np.empty(samples.shape), np.zeros(len(samples), dtype=np.bool_)
+    """Compute the samples (n, c) after losses, and a mask (n,) of the lost ones, by likelihood ratio with the prior
+    odds of the fraction."""
+    readings, is_lost = np.empty(samples.shape), np.zeros(len(samples), dtype=np.bool_)
     repeat_likely_losses(
         np.ascontiguousarray(samples),
         np.ascontiguousarray(measured),
         np.ascontiguousarray(noise),
         2 * math.log((1 - fraction) / fraction),
-        read,
-        lost,
+        readings,
+        is_lost,
     )
-    return read, lost
+    return readings, is_lost
 
 
 def _lose_positions_as_measured(
@@ -76,63 +79,65 @@ def _lose_positions_as_measured(
     """Repeat positions (n, p) where samples of the response are lost, provided that this brings them closer to the
     measured position, i.e. the same logger recorded both. Then also repeat those where only the position shows a loss,
     because the response hardly changed between the two samples."""
-    lost = np.any(response_after != response_before, axis=1)
-    if not lost.any():
+    is_lost = np.any(response_after != response_before, axis=1)
+    if not is_lost.any():
         return position
-    repeated = _repeat_rows(position, lost)
-    if not np.nansum((measured - repeated)[lost] ** 2) < np.nansum((measured - position)[lost] ** 2):
+    repeated_position = _repeat_rows(position, is_lost)
+    if not np.nansum((measured - repeated_position)[is_lost] ** 2) < np.nansum((measured - position)[is_lost] ** 2):
         return position
-    return _repeat_rows(position, lost | _is_clearly_repeated(position, measured))
+    return _repeat_rows(position, is_lost | _is_clearly_repeated(position, measured))
 
 
 def _repeat_rows(position: FloatArray, lost: BoolArray) -> FloatArray:
-    """Positions (n, p) with each lost row replaced by the last row that was not lost."""
+    """Replace each lost row of positions (n, p) by the last row that was not lost."""
     repeated = np.empty(position.shape)
     repeat_lost_samples(np.ascontiguousarray(position), lost, repeated)
     return repeated
 
 
 def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> BoolArray:
-    """Mask of the samples whose measured position is far nearer to the simulated position of the sample before than to
-    their own, in units of the noise (1.4826 times the median absolute deviation)."""
+    """Mark the samples (n,) whose measured position is clearly nearer to the simulated position of the preceding sample
+    than to their own: the difference of the squared distances, in units of the noise (1.4826 times the median absolute
+    deviation), exceeds half of `DISTINGUISHABLE_SIGMA` squared."""
     error = measured - position
     noise = 1.4826 * np.nanmedian(np.abs(error), axis=0)
-    step = np.diff(position, axis=0, prepend=position[:1])
+    position_step = np.diff(position, axis=0, prepend=position[:1])
     with np.errstate(divide="ignore", invalid="ignore"):
         # Squared distance to the preceding position minus squared distance to the sample's own position.
-        nearer = np.nansum((2 * error * step + step**2) / noise**2, axis=1)
-    return np.asarray(nearer < -(DISTINGUISHABLE**2) / 2)
+        squared_distance_change = np.nansum((2 * error * position_step + position_step**2) / noise**2, axis=1)
+    return np.asarray(squared_distance_change < -(DISTINGUISHABLE_SIGMA**2) / 2)
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The fraction of lost samples; empty where they are too few or the negative control has as many."""
+    """Find the fraction of lost samples; empty where they are too few or the negative control has as many."""
     columns = [channel]
     fraction = _estimate_fraction(evidence, columns, 1)
     return (
         ({"fraction": fraction},)
-        if fraction is not None and fraction > CONTROL * (_estimate_fraction(evidence, columns, -1) or 0)
+        if fraction is not None and fraction > LEAST_CONTROL_RATIO * (_estimate_fraction(evidence, columns, -1) or 0)
         else ()
     )
 
 
 def _estimate_fraction(evidence: Evidence, columns: list[int], direction: int) -> float | None:
-    """Fraction of lost samples among those where a loss is distinguishable; None for fewer than `LEAST_EVENTS`.
-    direction: 1, or -1 for the negative control, in reversed time (samples that equal the next)."""
+    """Estimate the fraction of lost samples among those where a loss is distinguishable; None for fewer than
+    `LEAST_LOST_SAMPLES`. direction: 1, or -1 for the negative control, in reversed time (samples that equal the
+    next)."""
     samples, measured = evidence.predicted[::direction, columns], evidence.response[::direction, columns]
     noise, used = evidence.noise[columns], evidence.used[::direction] > 0
     is_distinguishable = (
-        np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > DISTINGUISHABLE**2
+        np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > DISTINGUISHABLE_SIGMA**2
     )
     is_countable = is_distinguishable & used
     if not is_countable.any():
         return None
     fraction = 0.01
-    for _ in range(ROUNDS):
-        lost = _repeat_by_likelihood(samples, measured, noise, fraction)[1]
-        events = int(np.count_nonzero(lost & is_countable))
-        if events < LEAST_EVENTS:
+    for _ in range(FRACTION_ITERATIONS):
+        is_lost = _repeat_by_likelihood(samples, measured, noise, fraction)[1]
+        lost_count = int(np.count_nonzero(is_lost & is_countable))
+        if lost_count < LEAST_LOST_SAMPLES:
             return None
-        fraction = min(events / int(np.count_nonzero(is_countable)), LARGEST)
+        fraction = min(lost_count / int(np.count_nonzero(is_countable)), LARGEST_FRACTION)
     return fraction
 
 
@@ -142,7 +147,7 @@ EFFECT = Effect(
     source="Gilbert 1960, Bell Syst. Tech. J. 39:1253: losses in a channel",
     signature="single samples repeat the one before, scattered at random, in the response and in nothing "
     "that another logger read",
-    parameters=(Parameter("fraction", 1e-6, LARGEST, none=0.0, fixed=True),),
+    parameters=(Parameter("fraction", 1e-6, LARGEST_FRACTION, none=0.0, fixed=True),),
     action=OnResponse(
         _lose_at_random, stage=5, conditioned=_lose_as_measured, conditioned_position=_lose_positions_as_measured
     ),

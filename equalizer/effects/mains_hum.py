@@ -18,11 +18,11 @@ from equalizer.signals.signal import FloatArray
 MAINS_HZ = (45.0, 65.0)
 """Range of mains frequencies, 50 and 60 Hz with a margin, that is searched first."""
 LEAST_PEAK_RATIO = 12.0
-"""Least ratio of a tone's power to the median power of the lines around it."""
+"""Least ratio of a tone's power to the median power of the lines around it. Chosen, as are the limits below."""
 NEIGHBOURHOOD_HZ = 3.0
 """Half-width (Hz) of the band around a line over which that median is taken."""
 FREQUENCY_STEPS = 4
-"""Gauss-Newton steps for the frequency."""
+"""Number of Gauss-Newton steps for the frequency."""
 BLOCK_COUNT, LEAST_STEADINESS = 12, 0.8
 """Number of blocks of the recording that are compared in amplitude and phase, and least steadiness (0 to 1) of a
 tone."""
@@ -60,7 +60,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
             continue
         tone = _fit_tone(residual[:, channel], evidence, float(lines_hz[peak_line]))
         steadiness = _compute_steadiness(
-            residual[:, _find_loudest_channel(residual, evidence, peak_line)], evidence, tone["frequency"]
+            residual[:, _find_strongest_channel(residual, evidence, peak_line)], evidence, tone["frequency"]
         )
         if (
             steadiness > LEAST_STEADINESS
@@ -72,7 +72,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
 
 
 def _is_commanded(evidence: Evidence, frequency_hz: float) -> bool:
-    """Return whether a command contains the tone steadily, or consists mainly of a tone of which this is a harmonic."""
+    """Whether a command contains the tone steadily, or consists mainly of a tone of which this is a harmonic."""
     return _has_commanded_tone(evidence, frequency_hz, COMMANDED_RATIO) or any(
         _has_commanded_tone(evidence, frequency_hz / harmonic, DOMINANT_RATIO)
         for harmonic in range(2, HIGHEST_HARMONIC + 1)
@@ -80,25 +80,25 @@ def _is_commanded(evidence: Evidence, frequency_hz: float) -> bool:
 
 
 def _has_commanded_tone(evidence: Evidence, frequency_hz: float, least_ratio: float) -> bool:
-    """Return whether a command contains the tone steadily. least_ratio: lower limit of half the tone's amplitude over
+    """Whether a command contains the tone steadily. least_ratio: lower limit of half the tone's amplitude over
     the command's rms."""
-    phasor = np.exp(-2j * np.pi * frequency_hz * np.arange(len(evidence.command)) / evidence.sample_rate_hz)
+    demodulator = np.exp(-2j * np.pi * frequency_hz * np.arange(len(evidence.command)) / evidence.sample_rate_hz)
     amplitude_ratios = (
-        np.abs(phasor @ evidence.command)
-        / len(phasor)
+        np.abs(demodulator @ evidence.command)
+        / len(demodulator)
         / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
     )
-    steadiness = [_compute_steadiness(command, evidence, frequency_hz) for command in evidence.command.T]
+    command_steadinesses = [_compute_steadiness(command, evidence, frequency_hz) for command in evidence.command.T]
     return any(
         ratio > least_ratio and command_steadiness > LEAST_STEADINESS
-        for ratio, command_steadiness in zip(amplitude_ratios, steadiness, strict=True)
+        for ratio, command_steadiness in zip(amplitude_ratios, command_steadinesses, strict=True)
     )
 
 
-def _find_loudest_channel(residual: FloatArray, evidence: Evidence, line: int) -> int:
+def _find_strongest_channel(residual: FloatArray, evidence: Evidence, line: int) -> int:
     """Find the channel in which a spectral line (index of the FFT) is strongest relative to the noise."""
-    phasor = np.exp(-2j * np.pi * line * np.arange(len(residual)) / len(residual))
-    return int(np.argmax(np.abs(phasor @ residual) / evidence.noise))
+    demodulator = np.exp(-2j * np.pi * line * np.arange(len(residual)) / len(residual))
+    return int(np.argmax(np.abs(demodulator @ residual) / evidence.noise))
 
 
 def _compute_steadiness(samples: FloatArray, evidence: Evidence, frequency_hz: float) -> float:

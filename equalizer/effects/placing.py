@@ -1,8 +1,9 @@
-"""Converts effects between the form of a model file (axis names, parameters) and that of a simulation (sites, values).
+"""Conversion of effects between the form of a model file (axis names, parameters) and that of a simulation (sites,
+values).
 
 A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
 file, `to_model_effects` back. Called by `analysis.diagnosis`, by `command_sign`, and by
-`study.workflows.files.validate_together` to check a model.
+`study.workflows.files.check_model_channels` to check a model.
 """
 
 from collections.abc import Iterator
@@ -24,7 +25,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, sugge
 from equalizer.signals.recording import Recording
 
 SHORT_NAME_LENGTH = 2
-"""Length of the longest channel name that consists of a quantity and an axis letter, such as `fx`."""
+"""Length (characters) of the longest channel name that consists of a quantity and an axis letter, such as `fx`."""
 
 
 class PlacingError(ValueError):

@@ -2,7 +2,8 @@
 
     F = -k z,   dz/dt = v - k |v| z / level        level in N, k in N/m (a rotation: N m, N m/rad)
 
-The bristle deflection z saturates at level / k, where F = -level sgn(v) as in Coulomb friction.
+The bristle deflection z saturates at level / k, where F = -level sgn(v) as in Coulomb friction. An entry of
+`catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -16,15 +17,17 @@ from equalizer.effects.starts.starting_values import find_best_trial, regress_ou
 from equalizer.signals.signal import FloatArray
 
 RELATIVE_DEFLECTIONS = np.geomspace(3e-4, 1.0, 15)
-"""Deflections level / k that are tried for starting values, relative to the rms position."""
+"""Deflections level / k that are tried for starting values, relative to the rms position.
+Chosen."""
 
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean force (N) over a step, whose travel depends on the force (implicit step), by Newton's method.
+    """Compute the mean force (N) over a step, whose travel depends on the force (implicit step), by Newton's method.
 
     The force is a weighted mean of those at both ends of the step: weight 1/2 (trapezoidal rule) for a soft bristle,
-    towards the end (backward Euler, stable) for a stiff one. parameters: level, stiffness; memory: deflection z (m).
+    towards the end (backward Euler, stable) for a stiff one. Newton's method ends at a correction of 1e-7 of the slip
+    deflection, or after 20 iterations. parameters: level, stiffness; memory: deflection z (m).
     """
     if parameters[0] <= 0:
         return 0.0
@@ -56,7 +59,7 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Level and stiffness for the deflection level / k that explains most of the missing force, among
+    """Find level and stiffness for the deflection level / k that explains most of the missing force, among
     `RELATIVE_DEFLECTIONS`; empty where the axis does not move or the level is not positive."""
     motion = select_axis_motion(evidence, axis)
     position, is_used = evidence.axis_position[:, axis], evidence.used > 0

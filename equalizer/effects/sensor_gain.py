@@ -2,7 +2,8 @@
 
     y = gain x        x: true response, y: reading, both in the unit of the response
 
-The measured position is not affected, in contrast to a gain error of the actuator.
+The measured position is not affected, in contrast to a gain error of the actuator. An entry of `catalogue`, which
+simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -13,24 +14,26 @@ from equalizer.effects.starts.response_starts import list_site_channels
 from equalizer.signals.signal import FloatArray
 
 LEAST_DEVIATION = 1e-4
-"""Least deviation of a gain from 1 that is tried."""
+"""Least deviation of a gain from 1 that is tried. Chosen."""
 
 
 def _scale_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    read = response.copy()
-    read[:, channels] *= values["gain"]
-    return read
+    """Scale these channels of the response (n, p): `OnResponse.change` of this effect; the sample rate is not used."""
+    readings = response.copy()
+    readings[:, channels] *= values["gain"]
+    return readings
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Gain by least squares of the measured on the predicted response; empty where it is 1 within `LEAST_DEVIATION`."""
+    """Find the gain by least squares of the measured on the predicted response; empty where it is 1 within
+    `LEAST_DEVIATION` or not positive."""
     channels, used = list(list_site_channels(evidence, channel)), evidence.used > 0
     measured = (evidence.response[:, channels] / evidence.noise[channels])[used]
     predicted = (evidence.predicted[:, channels] / evidence.noise[channels])[used]
-    size = float(np.sum(predicted**2))
-    gain = float(np.sum(measured * predicted)) / size if size > 0 else 1.0
+    predicted_power = float(np.sum(predicted**2))
+    gain = float(np.sum(measured * predicted)) / predicted_power if predicted_power > 0 else 1.0
     return ({"gain": gain},) if gain > 0 and abs(gain - 1) > LEAST_DEVIATION else ()
 
 

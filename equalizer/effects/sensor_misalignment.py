@@ -19,7 +19,7 @@ ANGLE_NAMES = ("about_x", "about_y", "about_z")
 LARGEST_ANGLE_DEG = 120.0
 """Largest angle (degrees): below half a turn the rotation vector is unique."""
 LEAST_ANGLE_DEG = 0.01
-"""Least angle (degrees) that is tried."""
+"""Least angle (degrees) that is tried. Chosen."""
 
 
 def _rotate_response(
@@ -66,11 +66,11 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
     channel_count = evidence.response.shape[1]
     if channel > 0 or channel_count not in (2, 3):
         return ()
-    used = evidence.used > 0
-    predicted_xyz, measured_xyz = np.zeros((2, int(used.sum()), 3))
+    is_used = evidence.used > 0
+    predicted_xyz, measured_xyz = np.zeros((2, int(is_used.sum()), 3))
     predicted_xyz[:, :channel_count], measured_xyz[:, :channel_count] = (
-        evidence.predicted[used],
-        evidence.response[used],
+        evidence.predicted[is_used],
+        evidence.response[is_used],
     )
     left_vectors, _, right_vectors = np.linalg.svd(measured_xyz.T @ predicted_xyz)
     reflection_sign = np.diag([1.0, 1.0, np.linalg.det(left_vectors @ right_vectors)])
@@ -81,7 +81,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
 
 
 def _report_angle(values: Values) -> Values:
-    """Return the values with the angle of the rotation, `degrees`, which the vocabulary reports."""
+    """Add the angle of the rotation, `degrees`, which the vocabulary reports, to the values: `Effect.report`."""
     angles_deg = {name: values[name] for name in ANGLE_NAMES if name in values}
     return {"degrees": math.hypot(*_read_rotation_vector(values)), **angles_deg}
 

@@ -2,7 +2,8 @@
 
     y = x + cubic x³        cubic in 1 / (unit of the response)²
 
-The reading has odd harmonics that grow with the level; the measured position is not affected.
+The reading has odd harmonics that grow with the level; the measured position is not affected. An entry of `catalogue`,
+which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -14,13 +15,15 @@ from equalizer.signals.signal import FloatArray
 
 
 def _add_cubic(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    read = response.copy()
-    read[:, channels] += values["cubic"] * response[:, channels] ** 3
-    return read
+    """Add the cubic term to these channels of the response (n, p): `OnResponse.change` of this effect."""
+    readings = response.copy()
+    readings[:, channels] += values["cubic"] * response[:, channels] ** 3
+    return readings
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The cubic coefficient by linear regression of the residual, weighted by the noise."""
+    """Find the cubic coefficient by linear regression of the residual, weighted by the noise; empty where it is 0 or
+    not finite."""
     channels = list(list_site_channels(evidence, channel))
     weight = 1 / evidence.noise[channels]
     predicted = evidence.predicted[:, channels]

@@ -2,7 +2,8 @@
 
     F = -(coulomb + (static - coulomb) exp(-(v / speed)²)) sgn(v)        levels in N, speed in m/s
 
-The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
+The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`). An
+entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -17,15 +18,16 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 RELATIVE_SPEEDS = np.geomspace(0.03, 1.5, 12)
-"""Stribeck velocities that are tried as starting values, relative to the rms velocity."""
+"""Stribeck velocities that are tried as starting values, relative to the rms velocity. Chosen."""
 _INITIAL_STATIC_RATIO = 1.2
-"""Starting ratio of static to Coulomb friction where the data show no higher friction at low speed."""
+"""Starting ratio of static to Coulomb friction where the data show no higher friction at low speed. Chosen."""
 
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean friction force (N) over the step, at its mean velocity. That depends on the force: at most three fixed-point
-    iterations, each from the same bristle deflection. parameters: coulomb, static, speed."""
+    """Compute the mean friction force (N) over the step, at its mean velocity, which depends on the force: at most
+    three fixed-point iterations, each from the same bristle deflection, until the level changes by at most 1e-6.
+    parameters: coulomb, static, speed."""
     mean_velocity, force, start_deflection, previous_level = step_motion[V], 0.0, memory[0], -1.0
     for _ in range(3):
         level = parameters[0] + (parameters[1] - parameters[0]) * np.exp(-((mean_velocity / parameters[2]) ** 2))
@@ -37,28 +39,31 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
     return float(force)
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    """(3,): Coulomb level, static level and Stribeck velocity, the latter above zero because the law divides by it."""
+def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """Pack the parameters of `_compute_mean_force`, (3,): Coulomb level, static level and Stribeck velocity, the latter
+    above zero because the law divides by it."""
     return np.array([values["coulomb"], values["static"], max(values["speed"], 1e-12)])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Levels by regression of the missing force, at the tried Stribeck velocity that explains most. Empty where neither
-    level is positive; the Coulomb level is at least a twentieth of the static excess, and the static level
-    `_INITIAL_STATIC_RATIO` times it where the excess is below 2 %."""
+    """Find the levels by regression of the missing force, at the tried Stribeck velocity that explains most. Empty
+    where neither level is positive; the Coulomb level is at least a twentieth of the static excess, and the static
+    level `_INITIAL_STATIC_RATIO` times it where the excess is below 2 %."""
     motion = select_sliding_motion(evidence, axis)
-    direction, rms_velocity = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
+    sliding_direction, rms_velocity = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
     speed, fit = find_best_trial(
         regress_out_linear_terms(motion),
         (RELATIVE_SPEEDS * rms_velocity).tolist(),
-        lambda trial_speed: (-direction, -direction * np.exp(-((motion.velocity / trial_speed) ** 2))),
+        lambda trial_speed: (-sliding_direction, -sliding_direction * np.exp(-((motion.velocity / trial_speed) ** 2))),
     )
-    coulomb, static_excess = fit.strengths.tolist()
-    if coulomb <= 0 and coulomb + static_excess <= 0:
+    coulomb_level, static_excess = fit.strengths.tolist()
+    if coulomb_level <= 0 and coulomb_level + static_excess <= 0:
         return ()
-    coulomb = max(coulomb, 0.05 * static_excess)
-    static = coulomb + static_excess if static_excess > 0.02 * coulomb else _INITIAL_STATIC_RATIO * coulomb
-    return ({"coulomb": coulomb, "static": static, "speed": speed},)
+    coulomb_level = max(coulomb_level, 0.05 * static_excess)
+    static_level = (
+        coulomb_level + static_excess if static_excess > 0.02 * coulomb_level else _INITIAL_STATIC_RATIO * coulomb_level
+    )
+    return ({"coulomb": coulomb_level, "static": static_level, "speed": speed},)
 
 
 EFFECT = Effect(
@@ -72,7 +77,7 @@ EFFECT = Effect(
         Parameter("static", 1e-9, 1e6, none=0.0),
         Parameter("speed", 1e-6, 1e3, none=None, step=0.03),
     ),
-    action=AxisForce(_compute_mean_force, _pack, memory=1),
+    action=AxisForce(_compute_mean_force, _pack_parameters, memory=1),
     starts=_find_starting_values,
     simpler=("coulomb_friction",),
 )

@@ -22,12 +22,13 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 HIGHEST_MODULATION_HZ, START_COUNT = 15.0, 2
 """Highest modulation frequency (Hz) that is searched, above that of tremor (8 to 12 Hz); and number of starting
-values."""
+values. Chosen."""
 _POINTS_PER_LINE = 16
 """Zero padding of the spectrum: points per line (one cycle per recording), so that a frequency is found to a sixteenth
 of a line."""
 _LEAST_DENOMINATOR = 0.2
-"""Least denominator of the implicit step, which strong negative damping could otherwise bring to zero or below."""
+"""Least denominator of the implicit step, which strong negative damping could otherwise bring to zero or below.
+Chosen."""
 
 
 @compile_law

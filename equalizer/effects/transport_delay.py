@@ -1,7 +1,8 @@
 """Transport delay of the command, as of a bus or a controller's tick: F(t) = u(t - delay).
 
 A command u that is held over a sample period and delayed by (k + r) periods, 0 <= r < 1, has over each period the mean
-(1 - r) u[n - k] + r u[n - k - 1] (`compute_delayed_mean`).
+(1 - r) u[n - k] + r u[n - k - 1] (`compute_delayed_mean`). An entry of `catalogue`, which simulation and diagnosis look
+up by name.
 """
 
 import numpy as np
@@ -13,40 +14,42 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import list_lag_starts
 from equalizer.signals.signal import FloatArray
 
-SHORTEST_S, LONGEST_S = 2e-5, 0.05
-"""Range of delays (s) among which starting values are searched."""
-JUMP_MARGIN = 0.15
-"""Distance of the second starting value from the nearest whole number of hold times, in hold times; heuristic. An
-acceleration follows a force without delay, so that the misfit jumps where the delay passes a whole number of hold
-times, and a gradient search does not cross that jump."""
+SHORTEST_DELAY_S, LONGEST_DELAY_S = 2e-5, 0.05
+"""Range of delays (s) among which starting values are searched. Chosen."""
+JUMP_MARGIN_PERIODS = 0.15
+"""Distance of the second starting value from the nearest whole number of hold times, in hold times (sample periods).
+Chosen. An acceleration follows a force without delay, so that the misfit jumps where the delay passes a whole number of
+hold times, and a gradient search does not cross that jump."""
 
 
 def _delay_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Mean force (n,) over each step, for commands (n,) in N."""
+    """Compute the mean force (n,) over each step, for commands (n,) in N: `OnCommand.change` of this effect."""
     return compute_delayed_mean(commands, step_s, values["delay"])
 
 
 def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Force (n,) at the end of each step, for commands (n,) in N."""
+    """Compute the force (n,) at the end of each step, for commands (n,) in N: `OnCommand.at_end` of this effect."""
     return compute_delayed_end(commands, step_s, values["delay"])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Delays (s) from the response's time shift and from the missing force, and the first of these across the jump of
-    the misfit (see `JUMP_MARGIN`). Empty where the measured response is early."""
+    """Find delays (s) from the response's time shift and from the missing force, and the first of these across the jump
+    of the misfit (see `JUMP_MARGIN_PERIODS`). Empty where the measured response is early."""
     force_delay_s = find_command_parameter(
-        evidence, axis, compute_delayed_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False
+        evidence, axis, compute_delayed_mean, list(np.geomspace(SHORTEST_DELAY_S, LONGEST_DELAY_S, 24)), False
     )
-    delays_s = list_lag_starts(evidence, axis, force_delay_s, LONGEST_S)
+    delays_s = list_lag_starts(evidence, axis, force_delay_s, LONGEST_DELAY_S)
     moved_delays_s = tuple(_move_across_jump(delay_s, 1 / evidence.sample_rate_hz) for delay_s in delays_s[:1])
     return tuple({"delay": delay_s} for delay_s in (*delays_s, *moved_delays_s))
 
 
 def _move_across_jump(delay_s: float, hold_time_s: float) -> float:
-    """A delay (s) on the other side of the nearest whole number, at least 1, of hold times, `JUMP_MARGIN` from it.
-    hold_time_s: sample period."""
+    """Move a delay (s) to the other side of the nearest whole number, at least 1, of hold times, `JUMP_MARGIN_PERIODS`
+    from it. hold_time_s: sample period."""
     hold_times = max(round(delay_s / hold_time_s), 1)
-    return (hold_times + (JUMP_MARGIN if delay_s < hold_times * hold_time_s else -JUMP_MARGIN)) * hold_time_s
+    return (
+        hold_times + (JUMP_MARGIN_PERIODS if delay_s < hold_times * hold_time_s else -JUMP_MARGIN_PERIODS)
+    ) * hold_time_s
 
 
 EFFECT = Effect(

@@ -24,16 +24,16 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
     Raises LawError where a signal is missing, there are no columns, or their lengths differ.
     """
     program, signals = _bind_signals(law, columns, sample_rate_hz)
-    value, memory = np.empty(len(signals)), np.zeros(program.memory)
-    run_interpolated(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, value)
-    return value
+    values, memory = np.empty(len(signals)), np.zeros(program.memory_size)
+    run_interpolated(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
+    return values
 
 
 def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
     """(2, n): the law's value at the start and at the end of each step, over which the signals (n,) are held, as
     commands are. Before the first sample all signals are zero. Raises LawError as `evaluate` does."""
     program, signals = _bind_signals(law, columns, sample_rate_hz)
-    values, memory = np.empty((2, len(signals))), np.zeros(program.memory)
+    values, memory = np.empty((2, len(signals))), np.zeros(program.memory_size)
     memory[0] = FROM_ZERO
     run_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
     return values
@@ -48,12 +48,12 @@ def _bind_signals(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: f
     if len(lengths) > 1:
         raise LawError(f"the signals have different lengths: {', '.join(str(length) for length in sorted(lengths))}")
     length = lengths.pop()
-    used = law.variables
-    available = {"t": np.arange(length) / sample_rate_hz, **columns} if "t" in used else columns
+    used_names = law.variables
+    available_columns = {"t": np.arange(length) / sample_rate_hz, **columns} if "t" in used_names else columns
     program = compile_program(
-        law.tree, {name: column_index for column_index, name in enumerate(used) if name in available}
+        law.tree, {name: column_index for column_index, name in enumerate(used_names) if name in available_columns}
     )
-    signals = np.empty((length, len(used)))
-    for column_index, name in enumerate(used):
-        signals[:, column_index] = available[name]
+    signals = np.empty((length, len(used_names)))
+    for column_index, name in enumerate(used_names):
+        signals[:, column_index] = available_columns[name]
     return program, signals

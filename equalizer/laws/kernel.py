@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from equalizer.laws.program import CELLS, CODE, MEMORY_SIZE, STACK_SIZE
+from equalizer.laws.program import MAX_CELLS, MEMORY_SIZE, OPCODES, STACK_SIZE
 from equalizer.signals.signal import FloatArray
 
 START, END = 0, 1
@@ -24,12 +24,12 @@ allocates none. Measured: their atomic operations took two thirds of the time of
 step of a mechanism."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
-_NUMBER, _VARIABLE = CODE["number"], CODE["variable"]
-_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _POWER = (CODE[name] for name in ("+", "-", "*", "/", "**"))
-_MINIMUM = CODE["minimum"]
-_NEGATE, _ABS, _SIGN, _SQRT = CODE["neg"], CODE["abs"], CODE["sign"], CODE["sqrt"]
-_SIN, _COS, _EXP, _LOG, _TANH, _ATAN = (CODE[name] for name in ("sin", "cos", "exp", "log", "tanh", "atan"))
-_LAG, _PLAY, _DELAY, _INTEGRAL = (CODE[name] for name in ("lag", "play", "delay", "integral"))
+_NUMBER, _VARIABLE = OPCODES["number"], OPCODES["variable"]
+_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _POWER = (OPCODES[name] for name in ("+", "-", "*", "/", "**"))
+_MINIMUM = OPCODES["minimum"]
+_NEGATE, _ABS, _SIGN, _SQRT = OPCODES["neg"], OPCODES["abs"], OPCODES["sign"], OPCODES["sqrt"]
+_SIN, _COS, _EXP, _LOG, _TANH, _ATAN = (OPCODES[name] for name in ("sin", "cos", "exp", "log", "tanh", "atan"))
+_LAG, _PLAY, _DELAY, _INTEGRAL = (OPCODES[name] for name in ("lag", "play", "delay", "integral"))
 _TIME_TOLERANCE = 1e-9
 """Tolerance for equal instants, relative to the delay (rounding)."""
 _RING_SIZE = (MEMORY_SIZE["delay"] - 4) // 2
@@ -159,7 +159,7 @@ def _interpolate_delayed(
 def _store_instant(signal: float, delay_s: float, memory: FloatArray, offset: int, time_s: float) -> None:
     """Append an instant to the ring buffer; replace the newest instant while it is too close to its predecessor."""
     times, values, count = offset + 2, offset + 2 + _RING_SIZE, int(memory[offset])
-    if count < 2 or time_s - memory[times + (count - 2) % _RING_SIZE] >= delay_s / CELLS * (1 - _TIME_TOLERANCE):
+    if count < 2 or time_s - memory[times + (count - 2) % _RING_SIZE] >= delay_s / MAX_CELLS * (1 - _TIME_TOLERANCE):
         count += 1
     memory[offset], memory[times + (count - 1) % _RING_SIZE], memory[values + (count - 1) % _RING_SIZE] = (
         count,

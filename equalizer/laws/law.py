@@ -1,7 +1,7 @@
 """A law: a formula with free parameters, and the quantity on which it acts (force, command or response).
 
-Model files (`plant.mechanical_model_toml`), the simulation of effects (`effects.discovered_law`) and the search for
-formulas use it.
+Called by the reader of model files (`plant.mechanical_model_toml`), the simulation of effects
+(`effects.discovered_law`) and the search for formulas (`analysis.diagnosis.discovery`).
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,9 @@ from equalizer.laws.parse import LawError, parse_formula
 from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable, format_formula, iterate_nodes
 
 ActsOn = Literal["force", "command", "response"]
+"""Quantity on which a law acts, see `Law.acts_on`."""
 KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
+"""All values of `ActsOn`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,7 @@ _SECOND_ARGUMENT_ROLES: dict[str, Role] = {
     "play": "positive",
     "delay": "positive",
 }
+"""Role of the second argument of these operators; of all others it is that of the first."""
 
 
 def find_parameter_roles(tree: Node) -> dict[int, Role]:

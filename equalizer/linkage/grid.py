@@ -1,8 +1,8 @@
-"""Grid of positions for the calibration of a delta linkage, which its mirror symmetries map onto itself, and a test of
-its Jacobian by finite differences.
+"""Symmetric grid of positions for the calibration of a delta linkage, and a test of its Jacobian by finite differences.
 
-Called by `study.workflows.recording.calibrate_linkage`. Axes as in the whole package: x from the base towards the
-operator, y to the right, z up. Azimuths are angles from y towards z.
+The azimuths of the arms, estimated from the Jacobian, give the planes of mirror symmetry; the grid is made so that
+reflection about each of them maps it onto itself. Called by `study.workflows.recording.calibrate_linkage`. Axes as in
+the whole package: x from the base towards the operator, y to the right, z up. Azimuths are angles from y towards z.
 """
 
 import math
@@ -14,7 +14,7 @@ from equalizer.signals.signal import FloatArray
 
 DIFFERENCE_STEP_M = 2e-3
 """Step (m) of the central differences: about 200 encoder counts, so that the resolution of the encoder is negligible,
-and small against the length of an arm."""
+and small against the length of an arm. Chosen."""
 
 LARGEST_AZIMUTH_ERROR_DEG = 5.0
 """Largest deviation (degrees) of an arm's azimuth from three azimuths at 120 degrees to each other. Heuristic."""
@@ -32,10 +32,10 @@ def estimate_arm_azimuths(jacobian: FloatArray) -> FloatArray:
     inverse_rows = inverse_rows * np.sign(inverse_rows[:, :1])
     arm_directions = np.arctan2(-inverse_rows[:, 2], -inverse_rows[:, 1])
     mean_rotation = np.angle(np.exp(3j * arm_directions).mean()) / 3
-    thirds = np.round((arm_directions - mean_rotation) / (2 * math.pi / 3))
-    ideal_directions = mean_rotation + thirds * 2 * math.pi / 3
+    sector_indices = np.round((arm_directions - mean_rotation) / (2 * math.pi / 3))
+    ideal_directions = mean_rotation + sector_indices * 2 * math.pi / 3
     deviation_deg = np.degrees(np.abs(arm_directions - ideal_directions)).max()
-    if len(set(thirds.astype(int) % 3)) < 3 or deviation_deg > LARGEST_AZIMUTH_ERROR_DEG:
+    if len(set(sector_indices.astype(int) % 3)) < 3 or deviation_deg > LARGEST_AZIMUTH_ERROR_DEG:
         azimuths_text = ", ".join(f"{azimuth:.0f}" for azimuth in np.degrees(arm_directions))
         raise CalibrationError(
             (f"the arms lie at {azimuths_text} degrees; those of a delta device are 120 degrees apart",)
@@ -44,7 +44,7 @@ def estimate_arm_azimuths(jacobian: FloatArray) -> FloatArray:
     return azimuths
 
 
-def make_symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -> FloatArray:
+def make_symmetric_grid(azimuths_rad: FloatArray, radius_m: float, depth_m: float) -> FloatArray:
     """Make the grid, (185, 3), m: twelve directions at three radii up to radius_m, and the axis, in five planes at
     depths (x) of -depth_m to depth_m. The first is the centre.
 
@@ -52,13 +52,19 @@ def make_symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -
     the grid onto itself. azimuths: (3,), of the arms, rad.
     """
     points = [(0.0, 0.0, 0.0)]
-    for depth in np.linspace(-depth_m, depth_m, 5):
-        if depth:
-            points.append((float(depth), 0.0, 0.0))
-        for radius in radius_m * np.array([1, 2, 3]) / 3:
+    for depth_position_m in np.linspace(-depth_m, depth_m, 5):
+        if depth_position_m:
+            points.append((float(depth_position_m), 0.0, 0.0))
+        for ring_radius_m in radius_m * np.array([1, 2, 3]) / 3:
             for direction_index in range(12):
-                azimuth = azimuths[0] + direction_index * math.pi / 6
-                points.append((float(depth), float(radius * math.cos(azimuth)), float(radius * math.sin(azimuth))))
+                azimuth_rad = azimuths_rad[0] + direction_index * math.pi / 6
+                points.append(
+                    (
+                        float(depth_position_m),
+                        float(ring_radius_m * math.cos(azimuth_rad)),
+                        float(ring_radius_m * math.sin(azimuth_rad)),
+                    )
+                )
     return np.array(points)
 
 

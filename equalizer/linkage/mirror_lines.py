@@ -12,17 +12,17 @@ from equalizer.linkage.calibration import LinkageReading
 from equalizer.signals.signal import FloatArray
 
 LEAST_WARNED_ASYMMETRY = 0.02
-"""Relative difference of inertia from which a warning is given. It changes an acceleration by 2 % (0.17 dB), a small
+"""Relative difference of inertia above which a warning is given. It changes an acceleration by 2 % (0.17 dB), a small
 part of the staircases' finest step (1 dB)."""
 
 SAME_POSITION_M = 1e-6
-"""Distance (m) below which two positions count as the same."""
+"""Distance (m) below which two positions count as the same. Chosen above rounding errors."""
 VALID_LINE_SHARE = 0.5
 """Fraction of the other lines' asymmetry below which a mirror line counts as valid; the arm in that line is then the
 arm that differs from the others. Heuristic."""
 LARGEST_UPRIGHT_COMPONENT = 1e-3
 """Largest magnitude of the y component of a line's direction for it to count as upright; its mirror plane then contains
-the direction of gravity."""
+the direction of gravity. Chosen above rounding errors."""
 
 
 def compute_reflection(azimuth_rad: float) -> FloatArray:
@@ -32,14 +32,14 @@ def compute_reflection(azimuth_rad: float) -> FloatArray:
     return mirror
 
 
-def measure_line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
+def measure_line_asymmetry(readings: list[LinkageReading], azimuths_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Measure the asymmetry of the inertia about each line, (3,): largest |M(R p) - R M(p) R| / |M(p)| (spectral norms)
     over the readings whose mirrored position was read too, 0 without any; and the positions (3, 3), m, where it is
-    largest."""
+    largest (zero where the asymmetry is 0). azimuths: (3,), of the lines, rad."""
     largest_asymmetry, worst_positions = np.zeros(3), np.zeros((3, 3))
     positions = np.array([reading.position_m for reading in readings])
-    for line, azimuth in enumerate(azimuths):
-        mirror = compute_reflection(float(azimuth))
+    for line, azimuth_rad in enumerate(azimuths_rad):
+        mirror = compute_reflection(float(azimuth_rad))
         for reading in readings:
             mirrored_index = _find_same_position(positions, mirror @ reading.position_m)
             if mirrored_index is None:
@@ -52,27 +52,27 @@ def measure_line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray)
 
 
 def complete_by_symmetry(
-    readings: list[LinkageReading], azimuths: FloatArray, unread: FloatArray
+    readings: list[LinkageReading], azimuths_rad: FloatArray, unread_positions_m: FloatArray
 ) -> tuple[list[LinkageReading], FloatArray]:
-    """Complete readings by symmetry: readings at those positions of unread (k, 3), m, that one reflection, or two in
-    succession, map to a position that was read; and the remaining positions (r, 3). Gravity is reflected about an
-    upright line only, and NaN otherwise."""
+    """Complete readings by symmetry: readings at those of the unread positions (k, 3), m, that one reflection, or two
+    in succession, map to a position that was read; and the remaining positions (r, 3). Gravity is reflected about an
+    upright line only, and NaN otherwise. readings: at least one; azimuths: (3,), of the lines, rad."""
     completed, remaining = [], []
-    positions = np.array([reading.position_m for reading in readings])
+    read_positions = np.array([reading.position_m for reading in readings])
     single_reflections = [(line,) for line in range(3)]
-    for position in unread:
+    for position in unread_positions_m:
         for reflected_lines in (
             *single_reflections,
             *((first, second) for first in range(3) for second in range(3) if first != second),
         ):
             image_position = position
             for line in reflected_lines:
-                image_position = compute_reflection(float(azimuths[line])) @ image_position
-            source_index = _find_same_position(positions, image_position)
+                image_position = compute_reflection(float(azimuths_rad[line])) @ image_position
+            source_index = _find_same_position(read_positions, image_position)
             if source_index is not None:
                 image_reading = readings[source_index]
                 for line in reversed(reflected_lines):
-                    image_reading = _mirror_reading(image_reading, line, float(azimuths[line]))
+                    image_reading = _mirror_reading(image_reading, line, float(azimuths_rad[line]))
                 completed.append(image_reading)
                 break
         else:
@@ -106,8 +106,8 @@ def write_asymmetry_warnings(
 def _find_same_position(positions: FloatArray, target: FloatArray) -> int | None:
     """Index of the position that equals `target` within `SAME_POSITION_M`; None without one."""
     distances = np.linalg.norm(positions - target, axis=1)
-    nearest = int(np.argmin(distances))
-    return nearest if distances[nearest] < SAME_POSITION_M else None
+    nearest_index = int(np.argmin(distances))
+    return nearest_index if distances[nearest_index] < SAME_POSITION_M else None
 
 
 def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:

@@ -1,5 +1,8 @@
-"""Quality of an identified model: its errors against measurements. Stored with the model by `identify_model`, and
-stated in reports before any figure that the model predicts about itself."""
+"""Quality of an identified model: its errors against measurements, and their text for reports.
+
+`study.workflows.equalizer.identify_model` computes it and stores it with the model; summaries and reports state it
+before any figure that the model predicts about itself.
+"""
 
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -50,12 +53,21 @@ def summarise_quality(
     at least the held-out error. held_out: error, noise, and length of the record (s). most_misfit: misfit that the
     noise of the fitted lines may hide; used in place of a smaller misfit_error."""
     model_error = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
-    error, noise, held_out_s = held_out or (None, None, None)
-    return ModelQuality(max(model_error, error or 0.0), misfit_error, scatter_error, error, noise, held_out_s, remarks)
+    held_out_error, held_out_noise, held_out_s = held_out or (None, None, None)
+    return ModelQuality(
+        max(model_error, held_out_error or 0.0),
+        misfit_error,
+        scatter_error,
+        held_out_error,
+        held_out_noise,
+        held_out_s,
+        remarks,
+    )
 
 
 def write_quality_sentence(quality: ModelQuality | None) -> str:
-    """Write the sentence to print before every figure that a model predicts about itself. None: quality not stored."""
+    """Write the sentence to print before every figure that a model predicts about itself. None: quality not stored. The
+    expected error in it includes the held-out error, see `summarise_quality`."""
     if quality is None:
         return NOT_STORED
     if quality.held_out_error is None:
@@ -63,10 +75,10 @@ def write_quality_sentence(quality: ModelQuality | None) -> str:
             "No recording was held out for a test; on the lines to which it was fitted, the error of the model is "
             f"{100 * quality.expected_error:.2f} % (misfit {100 * quality.misfit_error:.2f} % beyond their noise)."
         )
-    noise = "" if quality.held_out_noise is None else f", noise of the record {100 * quality.held_out_noise:.2f} %"
+    noise_text = "" if quality.held_out_noise is None else f", noise of the record {100 * quality.held_out_noise:.2f} %"
     return (
         f"Measured on {quality.held_out_s or 0:g} s held out for a test, the error of the model is "
-        f"{100 * quality.held_out_error:.2f} %{noise}; expected from misfit and scatter: "
+        f"{100 * quality.held_out_error:.2f} %{noise_text}; expected from misfit and scatter: "
         f"{100 * quality.expected_error:.2f} %."
     )
 

@@ -2,7 +2,8 @@
 
 The gain 1 / (1 + (f / f_b)^(2 n)), n = `LOW_PASS_ORDER`, is that of a Butterworth low pass of order n applied forwards
 and backwards (its squared magnitude), with zero phase. Records are extended as odd functions at both ends, which limits
-the error there. Called by the inverse dynamics of a diagnosis (`inverse_dynamics`, `force_views`, `predicted_force`).
+the error there. Called by the diagnosis: its inverse dynamics (`analysis.diagnosis.forces`), force balance and search
+for laws.
 """
 
 from collections.abc import Callable
@@ -16,7 +17,7 @@ LOW_PASS_ORDER = 4
 """Order of the Butterworth low pass, applied forwards and backwards (Gautier, Vandanjon and Pressé 1994)."""
 
 LINES_PER_BLOCK = 8192
-"""Number of frequency lines that are filtered at once, to limit the memory."""
+"""Number of frequency lines that are filtered at once, to limit the memory. Chosen."""
 
 
 def compute_low_pass_gain(frequency_hz: FloatArray, band_hz: float) -> FloatArray:
@@ -26,24 +27,24 @@ def compute_low_pass_gain(frequency_hz: FloatArray, band_hz: float) -> FloatArra
 
 
 def filter_by_gain(
-    samples: FloatArray, sample_rate_hz: float, gain: Callable[[FloatArray], ComplexArray | FloatArray]
+    samples: FloatArray, sample_rate_hz: float, compute_gain: Callable[[FloatArray], ComplexArray | FloatArray]
 ) -> FloatArray:
-    """Filter samples (n, k), without NaN, by the matrices gain(frequency_hz), (lines, r, k); returns (n, r).
+    """Filter samples (n, k), without NaN, by the matrices compute_gain(frequency_hz), (lines, r, k); returns (n, r).
 
     The straight line from the first to the last sample is subtracted first; the rest is extended as an odd function
     beyond both ends, so that samples and slope are continuous there. The line is not added again; a caller that needs
     it adds it.
     """
-    extended = extend_as_odd(samples - compute_end_to_end_line(samples))
-    spectrum, lines_hz = rfft(extended, axis=0), rfftfreq(len(extended), 1 / sample_rate_hz)
+    extended_samples = extend_as_odd(samples - compute_end_to_end_line(samples))
+    spectrum, lines_hz = rfft(extended_samples, axis=0), rfftfreq(len(extended_samples), 1 / sample_rate_hz)
     # In blocks: the matrices of all lines at once would take a gigabyte for some minutes of samples at 1 kHz.
     line_blocks = [
         slice(first_line, first_line + LINES_PER_BLOCK) for first_line in range(0, len(lines_hz), LINES_PER_BLOCK)
     ]
     filtered = np.concatenate(
-        [np.einsum("lrk,lk->lr", gain(lines_hz[block]), spectrum[block]) for block in line_blocks]
+        [np.einsum("lrk,lk->lr", compute_gain(lines_hz[block]), spectrum[block]) for block in line_blocks]
     )
-    return np.asarray(irfft(filtered, len(extended), axis=0)[: len(samples)])
+    return np.asarray(irfft(filtered, len(extended_samples), axis=0)[: len(samples)])
 
 
 def extend_as_odd(samples: FloatArray) -> FloatArray:
@@ -67,6 +68,7 @@ def filter_low_pass(samples: FloatArray, sample_rate_hz: float, band_hz: float, 
     allowed and are not detected."""
 
     def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, k, k): gain and delay, the same for all channels."""
         scalar_gain = compute_low_pass_gain(frequency_hz, band_hz) * np.exp(-2j * np.pi * frequency_hz * delay_s)
         return np.asarray(scalar_gain[:, None, None] * np.eye(samples.shape[1]))
 

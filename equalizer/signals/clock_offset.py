@@ -55,33 +55,37 @@ def find_clock_offset(reference: Samples, shifted: Samples, centre_s: float, hal
     the range is too short, |r| is too small, its maximum is at the end of the range, or another peak is about as high;
     ValueError as `resample` does.
     """
-    rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, shifted))
-    first, second = (_resample_centred(part, rate_hz) for part in (reference, shifted))
-    correlation = _correlate_normalised(first, second)
-    lags = np.arange(-(len(second) - 1), len(first))
+    rate_hz = 2 * max(1 / float(np.median(np.diff(samples.times_s))) for samples in (reference, shifted))
+    reference_values, shifted_values = (_resample_centred(samples, rate_hz) for samples in (reference, shifted))
+    correlation = _correlate_normalised(reference_values, shifted_values)
+    lags = np.arange(-(len(shifted_values) - 1), len(reference_values))
     offsets_s = reference.times_s[0] - shifted.times_s[0] + lags / rate_hz
-    is_searched = (np.abs(offsets_s - centre_s) <= half_range_s) & _has_enough_overlap(lags, len(first), len(second))
+    is_searched = (np.abs(offsets_s - centre_s) <= half_range_s) & _has_enough_overlap(
+        lags, len(reference_values), len(shifted_values)
+    )
     if is_searched.sum() < LEAST_LAGS:
         raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched; widen it")
     offsets_s, correlation = offsets_s[is_searched], correlation[is_searched]
-    peak = int(np.argmax(np.abs(correlation)))
-    highest = abs(correlation[peak])
-    if highest < LEAST_CORRELATION:
+    peak_index = int(np.argmax(np.abs(correlation)))
+    highest_magnitude = abs(correlation[peak_index])
+    if highest_magnitude < LEAST_CORRELATION:
         raise NoOffsetError(
-            f"the two signals agree nowhere (highest correlation {highest:.2f}); give two signals of the same quantity"
+            f"the two signals agree nowhere (highest correlation {highest_magnitude:.2f}); give two signals of the "
+            "same quantity"
         )
-    if not 0 < peak < len(correlation) - 1:
+    if not 0 < peak_index < len(correlation) - 1:
         raise NoOffsetError(
-            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s); widen it"
+            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak_index]:g} s); "
+            "widen it"
         )
-    _refuse_rival_peaks(offsets_s, np.abs(correlation), peak)
-    return _interpolate_peak(offsets_s, correlation, peak)
+    _refuse_rival_peaks(offsets_s, np.abs(correlation), peak_index)
+    return _interpolate_peak(offsets_s, correlation, peak_index)
 
 
 def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
     """Samples (n,) on a uniform grid from the first time on, without their mean; missing values are zero."""
-    count = int(np.floor((samples.times_s[-1] - samples.times_s[0]) * rate_hz)) + 1
-    values = resample(samples, Grid(float(samples.times_s[0]), rate_hz, count), "band-limited")
+    sample_count = int(np.floor((samples.times_s[-1] - samples.times_s[0]) * rate_hz)) + 1
+    values = resample(samples, Grid(float(samples.times_s[0]), rate_hz, sample_count), "band-limited")
     centred = values - np.nanmean(values)
     return np.nan_to_num(centred, nan=0.0)
 
@@ -109,35 +113,36 @@ def _has_enough_overlap(lags: IntArray, first_length: int, second_length: int) -
     return has_overlap
 
 
-def _refuse_rival_peaks(offsets_s: FloatArray, magnitude: FloatArray, peak: int) -> None:
+def _refuse_rival_peaks(offsets_s: FloatArray, magnitude: FloatArray, peak_index: int) -> None:
     """Raise NoOffsetError where a peak more than two lags from the index `peak` is about as high. magnitude: |r|,
     (lags,)."""
     from scipy import signal as sg
 
-    peaks, _ = sg.find_peaks(magnitude)
-    rivals = [
-        candidate
-        for candidate in peaks
-        if abs(candidate - peak) > 2 and magnitude[candidate] > AMBIGUOUS_RATIO * magnitude[peak]
+    peak_indices, _ = sg.find_peaks(magnitude)
+    rival_indices = [
+        candidate_index
+        for candidate_index in peak_indices
+        if abs(candidate_index - peak_index) > 2
+        and magnitude[candidate_index] > AMBIGUOUS_RATIO * magnitude[peak_index]
     ]
-    if rivals:
+    if rival_indices:
         raise NoOffsetError(
-            f"offsets of {offsets_s[peak]:g} s and {offsets_s[rivals[0]]:g} s agree equally well, as happens with "
-            "periodic signals; search a shorter range"
+            f"offsets of {offsets_s[peak_index]:g} s and {offsets_s[rival_indices[0]]:g} s agree equally well, as "
+            "happens with periodic signals; search a shorter range"
         )
 
 
-def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
+def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak_index: int) -> ClockOffset:
     """Maximum of |r| within one lag of the index `peak`, on a spline of degree 5 through the eight neighbours on either
     side, in steps of 1/2000 of a lag."""
     from scipy.interpolate import make_interp_spline
 
-    neighbours = slice(max(0, peak - 8), peak + 9)
+    neighbours = slice(max(0, peak_index - 8), peak_index + 9)
     spline = make_interp_spline(
-        offsets_s[neighbours] - offsets_s[peak], correlation[neighbours], k=min(5, len(correlation) - 1)
+        offsets_s[neighbours] - offsets_s[peak_index], correlation[neighbours], k=min(5, len(correlation) - 1)
     )
     lag_s = offsets_s[1] - offsets_s[0]
     fine_offsets_s = np.linspace(-lag_s, lag_s, 4001)
     fine_correlation = spline(fine_offsets_s)
-    fine_peak = int(np.argmax(np.abs(fine_correlation)))
-    return ClockOffset(float(offsets_s[peak] + fine_offsets_s[fine_peak]), float(fine_correlation[fine_peak]))
+    fine_index = int(np.argmax(np.abs(fine_correlation)))
+    return ClockOffset(float(offsets_s[peak_index] + fine_offsets_s[fine_index]), float(fine_correlation[fine_index]))

@@ -39,13 +39,17 @@ def make_log_sweep(
     return wave
 
 
-def apply_fades(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:
-    """Apply a raised-cosine rise to the first `fade_in` and a fall to the last `fade_out` of the samples (n, ...), from
-    and to zero. Raises ValueError where both fades together are longer than the samples."""
+def apply_fades(samples: FloatArray, fade_in_samples: int, fade_out_samples: int) -> FloatArray:
+    """Apply a raised-cosine rise to the first `fade_in_samples` and a fall to the last `fade_out_samples` of the
+    samples (n, ...), from and to zero. Raises ValueError where both fades together are longer than the samples."""
     sample_count = samples.shape[0]
-    if fade_in + fade_out > sample_count:
-        raise ValueError(f"fades of {fade_in} and {fade_out} samples do not fit into {sample_count}; shorten them")
+    if fade_in_samples + fade_out_samples > sample_count:
+        raise ValueError(
+            f"fades of {fade_in_samples} and {fade_out_samples} samples do not fit into {sample_count}; shorten them"
+        )
     envelope = np.ones(sample_count)
-    envelope[:fade_in] = 0.5 - 0.5 * np.cos(np.pi * np.arange(fade_in) / max(fade_in, 1))
-    envelope[sample_count - fade_out :] = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, fade_out + 1) / max(fade_out, 1))
+    envelope[:fade_in_samples] = 0.5 - 0.5 * np.cos(np.pi * np.arange(fade_in_samples) / max(fade_in_samples, 1))
+    envelope[sample_count - fade_out_samples :] = 0.5 + 0.5 * np.cos(
+        np.pi * np.arange(1, fade_out_samples + 1) / max(fade_out_samples, 1)
+    )
     return samples * envelope.reshape((sample_count,) + (1,) * (samples.ndim - 1))

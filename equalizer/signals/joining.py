@@ -1,4 +1,7 @@
-"""Concatenates recordings that were made one after another."""
+"""Concatenation of recordings that were made one after another, and of their signals.
+
+Called by the recording and import of data (`study.workflows.recording`).
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,10 +15,11 @@ from equalizer.signals.signal import Signal
 
 
 def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
-    """All parts end to end; their segments move along. Time stamps are dropped, because there were pauses; a signal
-    that one of the parts lacks is dropped, too (`signals_left_out`).
+    """Join all parts end to end; the sample indices of their segments are shifted accordingly. Time stamps are dropped,
+    because there were pauses; a signal that one of the parts lacks is dropped, too (`list_dropped_signals`). meta:
+    metadata of the result.
 
-    Raises ValueError for no parts, or for parts of different devices, rates, holds of the command, or channels.
+    Raises ValueError for no parts, or for parts of different devices, rates, holds of the command, channels, or units.
     """
     if not parts:
         raise ValueError("there is nothing to join; give at least one recording")
@@ -50,25 +54,27 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
     )
 
 
-def signals_left_out(parts: Sequence[Recording]) -> tuple[str, ...]:
-    """Names of the signals that some parts have and others lack, so that `join` drops them."""
+def list_dropped_signals(parts: Sequence[Recording]) -> tuple[str, ...]:
+    """List the names of the signals that some parts have and others lack, so that `join` drops them, in alphabetical
+    order; none without parts."""
     names = [set(collect_signals(part)) for part in parts]
     return tuple(sorted(set().union(*names) - names[0].intersection(*names))) if names else ()
 
 
 def _shift_segment(segment: Segment, offset: int) -> Segment:
+    """The segment moved by `offset` samples."""
     return replace(segment, start=segment.start + offset, stop=segment.stop + offset)
 
 
 def concatenate_if_all(signals: Sequence[Signal | None]) -> Signal | None:
-    """The signals end to end; None where one of them is missing."""
-    recorded = [signal for signal in signals if signal is not None]
-    return concatenate(recorded) if len(recorded) == len(signals) else None
+    """Concatenate the signals; None where one of them is missing. Raises ValueError as `concatenate` does."""
+    present_signals = [signal for signal in signals if signal is not None]
+    return concatenate(present_signals) if len(present_signals) == len(signals) else None
 
 
 def concatenate(signals: Sequence[Signal]) -> Signal:
-    """The signals end to end. Raises ValueError where channels or units differ."""
+    """Concatenate the samples of at least one signal. Raises ValueError where channels or units differ."""
     first = signals[0]
-    if any((s.channels, s.unit) != (first.channels, first.unit) for s in signals):
+    if any((signal.channels, signal.unit) != (first.channels, first.unit) for signal in signals):
         raise ValueError(f"not all parts have the channels {', '.join(first.channels)} in {first.unit}")
-    return replace(first, samples=np.concatenate([s.samples for s in signals]))
+    return replace(first, samples=np.concatenate([signal.samples for signal in signals]))

@@ -1,4 +1,8 @@
-"""Base class of the validation errors of documents, models and tables: they list all problems, not only the first."""
+"""Base class of the validation errors of documents, models and tables: they list all problems, not only the first.
+
+Subclasses are raised, for example, by `plant.mechanical_model`, `feedforward.trajectory` and
+`study.store.disk.csv_rows`.
+"""
 
 
 class ListedProblemsError(ValueError):

@@ -16,7 +16,8 @@ SLOPE_DB_PER_OCTAVE = -3.0103
 them."""
 
 HEADROOM_DB = 3.0
-"""Distance of the largest sample from full scale (dB), because the analog signal may exceed it between samples."""
+"""Distance of the largest sample from full scale (dB), because the analog signal may exceed it between samples.
+Chosen."""
 
 FULL_SCALE = 2**15 - 1
 """Largest value of a signed 16 bit sample."""
@@ -38,7 +39,8 @@ def make_masking_noise(
             f"noise needs 0 < low_hz < high_hz <= {sample_rate_hz / 2:g} Hz (half the rate), "
             f"not {low_hz:g} to {high_hz:g}"
         )
-    # Lines are 1 / seconds apart; whole seconds keep the number of samples a product of small primes.
+    # Lines are 1 / seconds apart. Whole seconds give a number of samples that is a product of small primes, hence a
+    # fast FFT, wherever `seconds` is one.
     first_line, last_line = math.ceil(low_hz * seconds), math.floor(high_hz * seconds)
     if last_line < first_line:
         raise ValueError(f"no multiple of 1 / {seconds} Hz lies between {low_hz:g} and {high_hz:g} Hz")

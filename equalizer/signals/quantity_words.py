@@ -1,7 +1,8 @@
-"""Measured quantities by the words in channel names, for the import of files and the diagnosis.
+"""Detection of a channel's measured quantity from the words in its name.
 
-Words of other languages are further entries of the table; those in other scripts are in `study.importing`. French
-`tension` is left out: in English it is a force.
+Called by the import of files (`study.importing`) and the diagnosis (`analysis.diagnosis.first_model`). Words of other
+languages are further entries of the table; those in other scripts are in `study.importing`. French `tension` is left
+out: in English it is a force.
 """
 
 import re
@@ -22,11 +23,14 @@ QUANTITY_WORDS = {
     "humidity": "humidity",
     "setting": "setting",
 }
+"""Words, separated by blanks, that name each quantity, in lower case."""
 _QUANTITY_BY_WORD = {word: quantity for quantity, words in QUANTITY_WORDS.items() for word in words.split()}
 _UPPER, _LOWER = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
+"""Capital and small Latin letters, as ranges of a regular expression."""
 _WORD = re.compile(f"[{_UPPER}]?[{_LOWER}]+|[{_UPPER}]+(?![{_LOWER}])")
+"""A word: small letters, with a capital in front or not, or capitals that no small letter follows."""
 _RATE_WORD = "rate"
-"""Word behind an angle that makes it an angular velocity: `yaw rate`."""
+"""Word after an angle that makes it an angular velocity: `yaw rate`."""
 _AMBIGUOUS_WORDS = frozenset(
     ["dot", "ddot", "d", "delta", "diff", "rate", "error", "gyro", "pedal", "time", "ratio", "mode", "limit"]
 )
@@ -43,7 +47,7 @@ def split_into_words(name: str) -> list[str]:
 
 def detect_quantity(name: str) -> str:
     """The quantity (a key of `QUANTITY_WORDS`), by the last word that names one: a load angle is an angle. An angle
-    with the word `rate` behind it is a velocity. Empty where no word names a quantity, or another word makes it
+    followed by the word `rate` is a velocity. Empty where no word names a quantity, or another word makes it
     ambiguous."""
     words = split_into_words(name)
     last_index = max((index for index, word in enumerate(words) if word in _QUANTITY_BY_WORD), default=None)

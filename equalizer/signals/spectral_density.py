@@ -1,7 +1,8 @@
 """Spectral density by Welch's method: averaged windowed segments (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
 
-The results equal those of SciPy's `welch` and `csd` at their defaults. `scipy.signal` is not used because its import
-takes longer than the computation of most spectra. Called by identification and diagnosis.
+The results equal those of SciPy's `welch` and `csd` for the same segment length, with their other defaults.
+`scipy.signal` is not used because its import takes longer than the computation of most spectra. Called by
+identification and diagnosis.
 """
 
 import numpy as np
@@ -12,8 +13,8 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 def estimate_spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
     """Frequencies (lines,) and the one-sided power spectral density of (n,) or (n, c), in units squared per hertz.
 
-    length: samples of a segment, at most n. The mean of each segment is removed; segments are Hann-windowed and overlap
-    by half.
+    length: samples of a segment, at least 2; n where it is longer. The mean of each segment is removed; segments are
+    Hann-windowed and overlap by half.
     """
     frequency_hz, power = _average_segments(signal, signal, rate_hz, length)
     return frequency_hz, np.asarray(power.real)

@@ -1,7 +1,8 @@
-"""Other spellings of units, as recordings of other laboratories use them: `RPM`, `m/sec2`, `°/s`, `kgf·cm`, `oz-in`, `A
-(peak)`.
+"""Normalisation of the spelling of units in recordings of other laboratories: `RPM`, `m/sec2`, `°/s`, `kgf·cm`,
+`oz-in`.
 
-A spelling is rewritten, never interpreted: what is not listed stays as it is. Called by `signals.units`.
+Only listed spellings are rewritten, all others are returned unchanged; the meaning of a unit is not examined. For an
+unknown symbol the nearest known one can be suggested. Called by `signals.units`.
 """
 
 import re
@@ -54,6 +55,7 @@ _SPELLINGS = {
 _SYMBOL_BY_SPELLING = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()} | {
     unit.lower(): unit for unit in _SPELLINGS if len(unit) > 2
 }
+"""Symbol of each other spelling; symbols of more than two letters also in lower case."""
 _UNIT_BY_SPELLING = {
     "dps": "deg/s", "mps": "m/s", "mps2": "m/s^2", "r/min": "rpm", "U/min": "rpm", "deg C": "degC", "deg F": "degF",
     "deg. C": "degC", "degree C": "degC", "degrees C": "degC", "% RH": "%", "%RH": "%", "%rh": "%",
@@ -61,28 +63,28 @@ _UNIT_BY_SPELLING = {
     "lbfin": "lbf in", "lbfft": "lbf ft", "ozfin": "ozf in", "kgfcm": "kgf cm", "kgcm": "kgf cm", "gfcm": "gf cm",
     "gcm": "gf cm", "N_m": "N m", "kg f": "kgf", "lb f": "lbf", "g f": "gf",
 }  # fmt: skip
-"""Units that are looked up as a whole, because their parts have other meanings."""
+"""Spellings that are looked up as a whole, because their parts have other meanings."""
 _TORQUE_BY_SPELLING = {
     "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
     "kg cm": "kgf cm", "g cm": "gf cm",
 }  # fmt: skip
-"""Torques written with a unit of mass: a mass times a length is no signal, and `oz in^2` is an inertia."""
-_SUGGESTED = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "nm": "N m"}
-_SUGGESTED_ALONE = {"c": "degC", "f": "degF", "g": "g"}
-"""Suggestions that are never applied, the second ones where the symbol is the whole unit: pounds and grams are masses,
-too, and a capital is another symbol than a small letter."""
+"""Torques written with a unit of mass: no recorded quantity is a mass times a length, and `oz in^2` is an inertia."""
+_SUGGESTED_UNIT = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "nm": "N m"}
+_SUGGESTED_WHOLE_UNIT = {"c": "degC", "f": "degF", "g": "g"}
+"""Suggested unit of a word, and of a word that is the whole unit. They are suggested to the user but not applied:
+pounds and grams are masses, too, and a capital is another symbol than a small letter."""
 _LEAST_SIMILARITY, _LEAST_SIMILARITY_IN_PRODUCT = 0.8, 0.9
-"""Least similarity (0 to 1, `difflib`) of a suggested symbol that is the whole unit, and of one within a product. By
-hand."""
+"""Least similarity (0 to 1, `difflib`) of a suggested symbol that is the whole unit, and of one within a product.
+Chosen by hand."""
 _POWER_OF_SECOND = re.compile(r"(m|mm|cm|um|rad|mrad|deg|rev)s\^-([12])")
-"""`ms-2` is written for m/s^2, never for one over milliseconds squared."""
+"""`ms^-2` means m/s^2 in recordings, not one over milliseconds squared."""
 _AMPLITUDE = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNORECASE)
-"""Volts and amperes with how they were measured, which is no unit."""
+"""Volts and amperes with the way they were measured (`A (peak)`, `V rms`), which is not part of a unit."""
 
 
 def respell(text: str, known_symbols: Collection[str]) -> str:
-    """Rewrite a unit in the spelling of `signals.units`. known_symbols: symbols of that spelling, which are not
-    changed."""
+    """Rewrite a unit in the spelling of `signals.units`; parts that are not listed are unchanged. known_symbols:
+    symbols of that spelling, which are not changed."""
     spelling = text.strip()
     if amplitude_match := _AMPLITUDE.fullmatch(spelling):
         return amplitude_match["unit"]
@@ -90,19 +92,21 @@ def respell(text: str, known_symbols: Collection[str]) -> str:
         unicodedata.normalize("NFKC", _convert_to_ascii(spelling.replace("**", "^").replace("⁻", "-")))
     )
     spelling = re.sub(r"\s*/\s*", "/", spelling.strip().rstrip("."))
+    # A power without its sign: m/s2 becomes m/s^2, and s-1 becomes s^-1.
     spelling = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", spelling)
     spelling = _POWER_OF_SECOND.sub(
         lambda power_match: f"{power_match[1]}/s" + ("^2" if power_match[2] == "2" else ""), spelling
     )
     spelling = _UNIT_BY_SPELLING.get(spelling.replace("lbs", "lb"), spelling)
+    # A dot or hyphen between symbols is a product: N.m and oz-in become N m and oz in.
     spelling = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", spelling)
-    spelling = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known_symbols), spelling)
+    spelling = re.sub(r"[A-Za-z]+", lambda symbol_match: _respell_symbol(symbol_match[0], known_symbols), spelling)
     return _TORQUE_BY_SPELLING.get(spelling, spelling)
 
 
 def find_nearest_unit(text: str, known_symbols: Collection[str]) -> str:
-    """Find the unit with each unknown symbol replaced by the nearest known one, and without a minus behind a slash;
-    empty where a symbol has none."""
+    """Find the unit with each unknown symbol replaced by the nearest known one, and without a negative power behind a
+    slash (m/s^-2 becomes m/s^2); empty where no known symbol is similar to one of them."""
     spelling = re.sub(
         r"(/[A-Za-z]+)\^-([1-9])",
         lambda match: match[1] + f"^{match[2]}".removesuffix("^1"),
@@ -119,8 +123,8 @@ def _convert_to_ascii(text: str) -> str:
 
 
 def _respell_symbol(word: str, known_symbols: Collection[str]) -> str:
-    """Spell a unit's symbol as it is known. In words of two letters the case is kept, because it tells units apart
-    (`mS`, `MM`)."""
+    """Replace a symbol by its known spelling; unchanged where none is listed. In words of two letters the case is kept,
+    because it tells units apart (`mS`, `MM`)."""
     return word if word in known_symbols else _SYMBOL_BY_SPELLING.get(word.lower() if len(word) > 2 else word, word)
 
 
@@ -130,13 +134,17 @@ def _find_nearest_symbol(word: str, known_symbols: Collection[str], is_whole_uni
     if word in known_symbols:
         return word
     if len(word) == 1 and word.isupper():
-        return _SUGGESTED_ALONE.get(word.lower(), "") if is_whole_unit else ""
+        return _SUGGESTED_WHOLE_UNIT.get(word.lower(), "") if is_whole_unit else ""
     ordered_symbols = sorted(
         known_symbols, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol)
     )
     # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
-    symbol_by_spelling = {**_SYMBOL_BY_SPELLING, **{symbol.lower(): symbol for symbol in ordered_symbols}, **_SUGGESTED}
-    symbol_by_spelling |= _SUGGESTED_ALONE if is_whole_unit else {}
+    symbol_by_spelling = {
+        **_SYMBOL_BY_SPELLING,
+        **{symbol.lower(): symbol for symbol in ordered_symbols},
+        **_SUGGESTED_UNIT,
+    }
+    symbol_by_spelling |= _SUGGESTED_WHOLE_UNIT if is_whole_unit else {}
     matches = get_close_matches(
         word.lower(),
         symbol_by_spelling,

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 _FACTOR = re.compile(r"(kg|N|m|s)(?:\^(\d+))?$")
+"""A factor of an SI unit: its symbol, and its power where it is not 1."""
 _RATE_SUFFIXES = ("/s^2", "/s")
+"""Ends of the unit of an acceleration and of a velocity; without them it is the unit of the position."""
 FORCE_UNITS = ("N", "N m")
 """SI units of a command that is a force or a torque."""
 
@@ -30,7 +32,8 @@ class UnitSystem:
 
     def express(self, unit: str) -> str:
         """The unit of the same quantity in this system. unit: SI unit in a translational model, such as "N s/m" or
-        "kg"; a unit that is not made of force, length and time is returned unchanged."""
+        "kg"; a unit that is not made of force, length and time is returned unchanged. Hz becomes one over the unit of
+        time where that is not the second."""
         if unit == "Hz":
             return unit if self.time == "s" else f"1/{self.time}"
         numerator, _, denominator = unit.partition("/")
@@ -77,12 +80,12 @@ LINEAR, ROTATIONAL = UnitSystem(), UnitSystem("N m", "rad")
 
 def determine_unit_system(commands: Sequence[str], motions: Sequence[str], time: str = "s") -> UnitSystem:
     """Determine the unit system of a recording. commands, motions: units of its commands and of its responses
-    (position, velocity or acceleration); those of the first channel are used where channels differ. time: unit of
-    time."""
-    motion = next(
+    (position, velocity or acceleration), at least one each; those of the first channel are used where channels
+    differ. time: unit of time."""
+    position_unit = next(
         (motions[0].removesuffix(suffix) for suffix in _RATE_SUFFIXES if motions[0].endswith(suffix)), motions[0]
     )
-    return UnitSystem(commands[0], motion, time)
+    return UnitSystem(commands[0], position_unit, time)
 
 
 def _decompose_base_unit(name: str) -> tuple[tuple[str, int], ...]:

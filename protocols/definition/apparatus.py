@@ -14,13 +14,14 @@ from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
 Plane = Literal["xy", "yz", "zx"]
+"""Plane of two device axes. Angles in it are counted from the first axis, positive toward the second."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class TestDirections:
     """Two orthogonal directions in a plane, symmetric about the linkage's line of symmetry in that plane.
 
-    Direction 1 lies 45° counter-clockwise of the line, direction 2 lies 45° clockwise. Orthogonal directions are the
+    Direction 1 lies at `symmetry_deg` + 45°, direction 2 at `symmetry_deg` - 45°. Orthogonal directions are the
     easiest pair to distinguish, and therefore give the most conservative limit.
     """
 
@@ -71,7 +72,8 @@ class SpringSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SafetySettings:
-    """Limits of force and time that the safety layer enforces at every tick, independent of the rest of the program."""
+    """Limits of force and time that the safety layer (`study.devices.safe`) enforces at every tick, independent
+    of the rest of the program."""
 
     stimulus_cap_n: Annotated[
         float,

@@ -1,6 +1,7 @@
 """Settings of the preparation of a sitting: consent, set-up, masking noise, demonstration, practice.
 
-Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`.
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`. Played and asked by
+`study.workflows.trial` and `study.session.views.forms`; `protocols.procedure.practice` evaluates the criterion.
 """
 
 from typing import Annotated, Literal, Self
@@ -97,7 +98,8 @@ class SetupSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class MaskingSettings:
-    """Pink masking noise (as of `hapteq noise`) that the program plays, so that the device is not heard."""
+    """Pink masking noise that the program plays, so that the device is not heard; `hapteq noise` writes it to a
+    file."""
 
     play: Annotated[
         bool,
@@ -150,8 +152,8 @@ class DemoSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class PracticeSettings:
-    """Practice runs, one for each frequency, near a fixed level, with a criterion of right answers. Their trials are
-    not part of any result."""
+    """Practice runs, one for each frequency, at a fixed level (roved if `rove_db` is above 0), until a criterion of
+    right answers is met or `trial_limit` is reached. Their trials are not part of any result."""
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
@@ -205,7 +207,7 @@ class PracticeSettings:
 
     @model_validator(mode="after")
     def _require_reachable_criterion(self) -> Self:
-        """Raise InconsistentError for more right answers than of_last, and for fewer trials than of_last."""
+        """Raise InconsistentError where right_needed is above of_last, or trial_limit below it."""
         problems = []
         if self.right_needed > self.of_last:
             problem_text = f"is {self.right_needed}, more than of_last"

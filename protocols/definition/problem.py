@@ -21,7 +21,7 @@ class Problem:
         return f"{self.key} {self.problem}. Allowed: {self.allowed}."
 
     def prefix_key(self, parent: str) -> "Problem":
-        """Return the same problem with its key prefixed by the table `parent`, unless that is empty."""
+        """Return the same problem with its key prefixed by the table `parent`; an empty part is left out."""
         return Problem(".".join(part for part in (parent, self.key) if part), self.problem, self.allowed)
 
 

@@ -75,9 +75,10 @@ class SweepSegment:
     role: Role = ""
 
     @model_validator(mode="after")
-    def _require_rising_cycle(self) -> Self:
-        """Raise InconsistentError unless the sweep rises, and for a period of less than a cycle."""
+    def _require_rising_sweep(self) -> Self:
+        """Raise InconsistentError unless the frequency rises and a period of the sweep contains at least one cycle."""
         _require_rising_band(self.from_hz, self.to_hz)
+        # A logarithmic sweep of T seconds from f1 to f2 contains T (f2 - f1) / ln(f2 / f1) cycles.
         shortest_period_s = math.log(self.to_hz / self.from_hz) / (self.to_hz - self.from_hz)
         problem_text = f"is {self.duration_s} s, less than a cycle of the sweep"
         allowed = f"{math.ceil(1e6 * shortest_period_s) / 1e6:g} s or more"
@@ -89,8 +90,8 @@ class SweepSegment:
 class MultisineSegment:
     """A periodic sum of sinusoids of equal amplitude and random phases, at multiples of 1 / duration_s.
 
-    With odd lines only, the even lines of the response contain noise and even distortion alone. Periods differ in noise
-    only; realisations differ in their phases, and therefore in odd distortion.
+    These multiples are its lines. With odd lines only, the even lines of the response contain noise and even distortion
+    alone. Periods differ in noise only; realisations differ in their phases, and therefore in odd distortion.
     """
 
     kind: Annotated[Literal["multisine"], Field(description="A sum of sinusoids with random phases.")]
@@ -137,10 +138,16 @@ class MultisineSegment:
 
     @model_validator(mode="after")
     def _require_lines(self) -> Self:
-        """Raise InconsistentError for a band that does not rise or contains no line."""
+        """Raise InconsistentError where to_hz is not above from_hz, or no line lies between them, both included."""
         _require_rising_band(self.from_hz, self.to_hz)
-        first, last = math.ceil(self.from_hz * self.duration_s - 1e-9), math.floor(self.to_hz * self.duration_s + 1e-9)
-        lines = [line for line in range(first, min(last, first + 1) + 1) if line % 2 or not self.odd_only]
+        # 1e-9 of a line absorbs the rounding error of a limit that is itself a line.
+        first_line, last_line = (
+            math.ceil(self.from_hz * self.duration_s - 1e-9),
+            math.floor(self.to_hz * self.duration_s + 1e-9),
+        )
+        lines = [
+            line for line in range(first_line, min(last_line, first_line + 1) + 1) if line % 2 or not self.odd_only
+        ]
         line_spacing_hz = (2 if self.odd_only else 1) / self.duration_s
         allowed = f"a period with lines between from_hz and to_hz, which lie {line_spacing_hz:g} Hz apart here"
         refuse([] if lines else [Problem("duration_s", f"is {self.duration_s} s, too short for the band", allowed)])

@@ -23,7 +23,7 @@ class StepChange(Enum):
     """Trial at which the next step size takes effect.
 
     Published staircases of "4 dB, then 1 dB" differ in this: AT_REVERSAL gives thresholds 0.7 to 1.1 dB lower than
-    AFTER_REVERSAL.
+    AFTER_REVERSAL in simulations (tests/references/staircase_variants.py).
     """
 
     AFTER_REVERSAL = "after_reversal"
@@ -153,7 +153,7 @@ class StaircaseRule:
         return self.bayesian.trials > 0
 
     @model_validator(mode="after")
-    def _check_consistency(self) -> Self:
+    def _require_consistent_rule(self) -> Self:
         """Raise InconsistentError where values of the table contradict each other."""
         problems = []
         if self.start_n > self.cap_n:
@@ -180,7 +180,7 @@ class StaircaseRule:
 
 
 def _find_placement_problems(rule: StaircaseRule) -> list[Problem]:
-    """Find contradictions between the keys of the up-down rule and those of the Psi method."""
+    """Find keys of the Psi method that are set without it, and keys of the up-down rule that it does not allow."""
     bayesian, problems = rule.bayesian, []
     if bayesian.spread_db and not rule.is_bayesian:
         problem_text = f"is {bayesian.spread_db} dB, but bayesian.trials is 0"

@@ -1,7 +1,8 @@
 """Consistency checks of a study protocol across its tables: finds values that contradict each other.
 
-Called by `study_protocol` when a protocol is validated. Contradictions within a table are found by the table's class.
-Each check returns problems whose keys are dotted paths; an empty list means that the protocol passed.
+Called by `study_protocol` when a protocol is validated; `study.session.stimulus.limits` uses the formula of roving.
+Contradictions within a table are found by the table's class.
+Each function returns problems whose keys are dotted paths; an empty list means that there is none.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ FORCE_TOLERANCE_N = 1e-9
 def find_contradictions(protocol: StudyProtocol) -> list[Problem]:
     """Find all contradictions between tables of the protocol; empty if it is consistent."""
     return [
-        *_check_caps(protocol),
-        *_check_placement(protocol),
-        *_check_levels(protocol),
-        *_check_times(protocol),
-        *_check_names(protocol),
-        *_check_declared_analysis(protocol),
+        *_find_cap_problems(protocol),
+        *_find_psi_problems(protocol),
+        *_find_level_problems(protocol),
+        *_find_time_problems(protocol),
+        *_find_duplicates(protocol),
+        *_find_analysis_problems(protocol),
         *find_probe_contradictions(protocol),
     ]
 
@@ -38,8 +39,8 @@ def compute_highest_roved_n(level_n: float, rove_db: float) -> float:
     return level_n * float(10.0 ** (rove_db / 2 / 20))
 
 
-def _check_caps(protocol: StudyProtocol) -> list[Problem]:
-    """Compare the staircase's cap, with and without roving, with the stimulus cap of the safety layer."""
+def _find_cap_problems(protocol: StudyProtocol) -> list[Problem]:
+    """Find a staircase's cap, with or without roving, that is above the stimulus cap of the safety layer."""
     cap_n, safety_cap_n, rove_db = protocol.staircase.cap_n, protocol.safety.stimulus_cap_n, protocol.stimulus.rove_db
     if safety_cap_n < cap_n:
         problem_text = f"is {safety_cap_n} N, below staircase.cap_n: the highest levels could not be played"
@@ -54,28 +55,29 @@ def _check_caps(protocol: StudyProtocol) -> list[Problem]:
     return [Problem("staircase.cap_n", problem_text, allowed)]
 
 
-def _check_placement(protocol: StudyProtocol) -> list[Problem]:
-    """Check that Psi, if it is used, has no roved levels, and that no trial limit ends a run before its trials."""
-    problems, trials = [], protocol.staircase.bayesian.trials
+def _find_psi_problems(protocol: StudyProtocol) -> list[Problem]:
+    """Find roved levels, and a trial limit that ends a test or detection run before its trials, where Psi is used."""
+    problems, psi_trials = [], protocol.staircase.bayesian.trials
     if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
         problem_text = f"is {protocol.stimulus.rove_db:g} dB, but Psi assumes that levels are played as planned"
         problems.append(Problem("stimulus.rove_db", problem_text, "0, or 0 in staircase.bayesian.trials"))
     # The limit of a training run may be lower: training needs no threshold.
-    limits = {
+    trial_limits = {
         "staircase.trial_limit": protocol.staircase.trial_limit,
         "detection.trial_limit": protocol.detection.trial_limit if protocol.detection.frequencies_hz else 0,
     }
-    for key, limit in limits.items():
-        if 0 < limit < trials:
-            problem_text = f"is {limit}, and would end every such run before the {trials} trials of Psi"
-            problems.append(Problem(key, problem_text, f"0, or at least {trials}, as in staircase.bayesian.trials"))
+    for key, limit in trial_limits.items():
+        if 0 < limit < psi_trials:
+            problem_text = f"is {limit}, and would end every such run before the {psi_trials} trials of Psi"
+            problems.append(Problem(key, problem_text, f"0, or at least {psi_trials}, as in staircase.bayesian.trials"))
     return problems
 
 
-def _check_levels(protocol: StudyProtocol) -> list[Problem]:
-    """Compare the highest levels of demonstration, practice and detection with the staircase's cap."""
+def _find_level_problems(protocol: StudyProtocol) -> list[Problem]:
+    """Find highest levels of demonstration, practice and detection, roving included, that are above the staircase's
+    cap. Practice and detection without frequencies are not played, and pass."""
     cap_n, practice, detection = protocol.staircase.cap_n, protocol.practice, protocol.detection
-    highest_n = {
+    highest_levels_n = {
         "demo.level_n": compute_highest_roved_n(protocol.demo.level_n, protocol.demo.rove_db),
         "practice.level_n": compute_highest_roved_n(practice.level_n, practice.rove_db)
         if practice.frequencies_hz
@@ -83,7 +85,7 @@ def _check_levels(protocol: StudyProtocol) -> list[Problem]:
         "detection.start_n": detection.start_n if detection.frequencies_hz else 0.0,
     }
     problems = []
-    for key, level_n in highest_n.items():
+    for key, level_n in highest_levels_n.items():
         if level_n > cap_n + FORCE_TOLERANCE_N:
             rove_note = "" if key == "detection.start_n" else ", with its rove_db,"
             problem_text = f"is {level_n:g} N{rove_note} above staircase.cap_n"
@@ -91,8 +93,9 @@ def _check_levels(protocol: StudyProtocol) -> list[Problem]:
     return problems
 
 
-def _check_times(protocol: StudyProtocol) -> list[Problem]:
-    """Check time limit, recorded time and detection interval, and that at least one frequency is played."""
+def _find_time_problems(protocol: StudyProtocol) -> list[Problem]:
+    """Find a time limit of a trial not below the safety limit, a recorded time shorter than a period of the lowest
+    frequency, a detection interval no longer than its fades, and a protocol that plays no frequency at all."""
     problems, time_limit_s = [], protocol.trial.time_limit_s
     if time_limit_s >= protocol.safety.longest_trial_s:
         problem_text = f"is {time_limit_s} s, not below safety.longest_trial_s, which releases the device"
@@ -116,27 +119,30 @@ def _check_times(protocol: StudyProtocol) -> list[Problem]:
     return problems
 
 
-def _check_names(protocol: StudyProtocol) -> list[Problem]:
-    """Check that button numbers and the keys of the questions are not used twice."""
-    problems, buttons = [], protocol.trial.device_buttons
-    if len(set(buttons)) not in (0, 2):
-        problems.append(Problem("trial.device_buttons", f"is {list(buttons)}", "two different button numbers, or none"))
+def _find_duplicates(protocol: StudyProtocol) -> list[Problem]:
+    """Find device buttons that are not two different ones (or none), and keys that a list of questions uses twice."""
+    problems, button_numbers = [], protocol.trial.device_buttons
+    if len(set(button_numbers)) not in (0, 2):
+        problems.append(
+            Problem("trial.device_buttons", f"is {list(button_numbers)}", "two different button numbers, or none")
+        )
     for name, questions in (("before", protocol.before), ("debrief", protocol.debrief)):
         if len({question.key for question in questions}) < len(questions):
             problems.append(Problem(name, "uses a key twice", "a key of its own for every question"))
     return problems
 
 
-def _check_declared_analysis(protocol: StudyProtocol) -> list[Problem]:
-    """Check the declared contrast against the test frequencies, and the interval against the primary analysis."""
-    problems, declared = [], protocol.analysis
-    contrast_hz, frequencies_hz = declared.contrast_hz, protocol.stimulus.frequencies_hz
+def _find_analysis_problems(protocol: StudyProtocol) -> list[Problem]:
+    """Find a declared contrast that is not of two test frequencies, and an interval that the declared primary analysis
+    does not compute."""
+    problems, analysis_settings = [], protocol.analysis
+    contrast_hz, frequencies_hz = analysis_settings.contrast_hz, protocol.stimulus.frequencies_hz
     if contrast_hz and (len(set(contrast_hz)) != 2 or not set(contrast_hz) <= set(frequencies_hz)):
         allowed = "two different ones of stimulus.frequencies_hz, or none"
         problems.append(Problem("analysis.contrast_hz", f"is {list(contrast_hz)}", allowed))
-    matching_interval = INTERVAL_BY_ANALYSIS.get(declared.primary)
-    if declared.interval not in ("undeclared", matching_interval):
-        problem_text = f"is {declared.interval}, while primary is {declared.primary}"
+    matching_interval = INTERVAL_BY_ANALYSIS.get(analysis_settings.primary)
+    if analysis_settings.interval not in ("undeclared", matching_interval):
+        problem_text = f"is {analysis_settings.interval}, while primary is {analysis_settings.primary}"
         allowed = f"{matching_interval}, or undeclared" if matching_interval else "undeclared, or declare primary, too"
         problems.append(Problem("analysis.interval", problem_text, allowed))
     return problems

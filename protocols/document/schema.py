@@ -1,7 +1,8 @@
 """JSON Schema of protocol files, and the values that it allows at each place of a file, in words.
 
 The schema is generated from the dataclasses of `protocols.definition`, the only place where key names, bounds, defaults
-and reasons are written. `explain`, `validation_messages` and the documentation of file formats use these functions.
+and reasons are written. Called by `dumping`, `loading`, `explain`, `validation_messages`,
+`study.importing.map_format.map_toml` and `study.workflows.files` (recognition of files, documentation of formats).
 """
 
 from functools import cache
@@ -34,17 +35,17 @@ UNIT_WORDS = {
     "m_per_s": "m/s",
     "mps2": "m/s²",
 }
-"""Unit in words, by the suffix of a key after an underscore."""
+"""Unit in words, by the suffix of a key after an underscore; a suffix that is missing here gives no unit."""
 
 
 @cache
 def make_protocol_schema(kind: str) -> Node:
-    """Make the JSON Schema of a protocol of this kind, "study" or "recording". Raises KeyError for another kind."""
+    """Make the JSON Schema of a kind of protocol, "study" or "recording". Raises KeyError for another kind."""
     return ADAPTERS[kind].json_schema()
 
 
 def find_node(root: Node, path: ValuePath) -> Node | None:
-    """Find the schema of the value at this place; None where the schema has no such place."""
+    """Find the schema of the value at this path; None where the schema has no such path."""
     node: Node | None = root
     for step in path:
         node = _find_child_node(root, node, step) if node is not None else None
@@ -57,8 +58,8 @@ def list_keys(root: Node, node: Node) -> tuple[str, ...]:
 
 
 def resolve_reference(root: Node, node: Node) -> Node:
-    """The node with its "$ref" replaced by the definition, whose entries the node's own override; other nodes
-    unchanged."""
+    """Replace the "$ref" of a node by the definition it refers to; other entries of the node take precedence over those
+    of the definition. A node without "$ref" is returned unchanged."""
     if "$ref" not in node:
         return node
     target: Node = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
@@ -108,8 +109,8 @@ def _find_child_node(root: Node, node: Node, step: str | int) -> Node | None:
         reference = node["discriminator"]["mapping"].get(step)
         return {"$ref": reference} if reference else None
     child: Node | None = node.get("properties", {}).get(step)
-    if child is None and isinstance(additional := node.get("additionalProperties"), dict):
-        return additional
+    if child is None and isinstance(additional_properties := node.get("additionalProperties"), dict):
+        return additional_properties
     return child
 
 
@@ -134,12 +135,12 @@ def _describe_text(node: Node) -> str:
     """Describe a text: as a name where it has a pattern (that of `field_types`), else by its length."""
     if "pattern" in node:
         return "text in quotes: a lower-case letter, then up to 63 lower-case letters, digits and underscores"
-    shortest, longest = node.get("minLength", 0), node.get("maxLength")
-    return f"text in quotes, {shortest} to {longest} characters long" if longest else "text in quotes"
+    min_length, max_length = node.get("minLength", 0), node.get("maxLength")
+    return f"text in quotes, {min_length} to {max_length} characters long" if max_length else "text in quotes"
 
 
 def _describe_list(root: Node, node: Node, key: str) -> str:
     """Describe a list: the number of its entries, and the values that each may have."""
-    smallest_count, largest_count = node.get("minItems", 0), node.get("maxItems")
-    count_text = f"{smallest_count} to {largest_count}" if largest_count else f"{smallest_count} or more"
+    min_count, max_count = node.get("minItems", 0), node.get("maxItems")
+    count_text = f"{min_count} to {max_count}" if max_count else f"{min_count} or more"
     return f"a list of {count_text} entries, each {describe_allowed(root, node['items'], key)}"

@@ -9,8 +9,8 @@ to be
 
 The next level is a fixed function of the answers before it, so that replaying a log gives the same levels, and the
 likelihood of the answers needs no correction. Levels end at the force cap; thresholds of the grid go beyond it, so that
-the posterior can say that the threshold lies above the cap. Called by `protocols.procedure.staircase`; the analysis
-estimates thresholds by `compute_posterior` and `estimate_threshold`.
+the posterior can say that the threshold lies above the cap. Called by `protocols.procedure.staircase`,
+`analysis.psychophysics.thresholds` (threshold of a run) and `analysis.psychophysics.power` (simulated runs).
 
 Source: L. L. Kontsevich, C. W. Tyler, Vision Res. 39 (1999), 2729-2737.
 """
@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 LEVEL_STEP_DB, LOWEST_LEVEL_DB = 1.0, -34.0
-"""Spacing of the levels (dB), and the lowest level relative to the cap (dB)."""
+"""Spacing of the levels (dB), and the lowest level relative to the cap (dB): 0.02 of it. Chosen by hand."""
 THRESHOLD_MARGIN_DB = 12.0
-"""Distance (dB) by which the thresholds of the grid extend above the cap and below the lowest level."""
+"""Distance (dB) by which the thresholds of the grid extend above the cap and below the lowest level. Chosen by
+hand: thresholds a factor of 4 above the cap remain possible."""
 SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
 """Slopes (Weibull exponents) of the psychometric function over newtons, equally probable a priori, spaced geometrically
 about 2. Chosen by hand."""
@@ -47,7 +48,7 @@ LevelAndAnswer = tuple[float, bool]
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class ThresholdEstimate:
     """Estimate of the threshold from its posterior: mean and standard deviation in dB re 1 N."""
 
     mean_db: float
@@ -68,28 +69,30 @@ def list_levels_db(cap_db: float) -> FloatArray:
 def list_thresholds_db(cap_db: float) -> FloatArray:
     """(thresholds,), ascending: thresholds of the grid in dB re 1 N, LEVEL_STEP_DB apart. cap_db: the cap in dB re 1
     N."""
-    levels = list_levels_db(cap_db)
+    levels_db = list_levels_db(cap_db)
     return np.arange(
-        float(levels[0]) - THRESHOLD_MARGIN_DB, cap_db + THRESHOLD_MARGIN_DB + LEVEL_STEP_DB / 2, LEVEL_STEP_DB
+        float(levels_db[0]) - THRESHOLD_MARGIN_DB, cap_db + THRESHOLD_MARGIN_DB + LEVEL_STEP_DB / 2, LEVEL_STEP_DB
     )
 
 
 def compute_share_right(level_db: FloatArray, cap_db: float) -> FloatArray:
-    """P(right) of every threshold and slope (..., thresholds, slopes) at levels of any shape (...), in dB re 1 N.
+    """Compute P(right) of every threshold and slope (..., thresholds, slopes) at levels of any shape (...), dB re 1 N.
 
     A Weibull curve over newtons, F = 1 - exp(-exp(t0 + slope ln(10)/20 (level - threshold))), scaled from the guessing
-    rate 1/2 to 1: P = lapse / 2 + (1 - lapse) (1 + F) / 2, with t0 so that (1 + F) / 2 is `THRESHOLD_SHARE_RIGHT` at
-    the threshold, and lapse = `LAPSE_RATE`.
+    rate 1/2 to 1: P = lapse / 2 + (1 - lapse) (1 + F) / 2, with t0 (`log_rate_at_threshold`) so that (1 + F) / 2 is
+    `THRESHOLD_SHARE_RIGHT` at the threshold, and lapse = `LAPSE_RATE`.
     """
-    t0 = math.log(-math.log(2.0 - 2.0 * THRESHOLD_SHARE_RIGHT))
+    log_rate_at_threshold = math.log(-math.log(2.0 - 2.0 * THRESHOLD_SHARE_RIGHT))
     level_above_threshold_db = np.asarray(level_db)[..., None, None] - list_thresholds_db(cap_db)[:, None]
-    failure_share = 0.5 * np.exp(-np.exp(t0 + np.array(SLOPES) * (math.log(10.0) / 20.0) * level_above_threshold_db))
-    return LAPSE_RATE / 2 + (1.0 - LAPSE_RATE) * (1.0 - failure_share)
+    wrong_share = 0.5 * np.exp(
+        -np.exp(log_rate_at_threshold + np.array(SLOPES) * (math.log(10.0) / 20.0) * level_above_threshold_db)
+    )
+    return LAPSE_RATE / 2 + (1.0 - LAPSE_RATE) * (1.0 - wrong_share)
 
 
 def compute_posterior(answers: tuple[LevelAndAnswer, ...], cap_db: float) -> FloatArray:
-    """Posterior probability of every threshold and slope (thresholds, slopes) after these answers, from a flat prior.
-    cap_db: the cap in dB re 1 N."""
+    """Compute the posterior probability (thresholds, slopes) of every threshold and slope after these answers, from a
+    flat prior; without answers, the prior. cap_db: the cap in dB re 1 N."""
     log_likelihood = np.zeros((len(list_thresholds_db(cap_db)), len(SLOPES)))
     for level_db, correct in answers:
         answer_probability = compute_share_right(np.array(level_db), cap_db)
@@ -100,30 +103,32 @@ def compute_posterior(answers: tuple[LevelAndAnswer, ...], cap_db: float) -> Flo
 
 
 def choose_level_db(posterior: FloatArray, cap_db: float) -> float:
-    """The level (dB re 1 N) after which the least entropy of threshold and slope is expected; never above the cap.
-    posterior: (thresholds, slopes), as `compute_posterior` gives it."""
-    levels, right_share = list_levels_db(cap_db), _tabulate_share_right(cap_db)
-    expected_entropy = np.zeros(len(levels))
+    """Choose the level (dB re 1 N, at most the cap) after which the least entropy of threshold and slope is expected.
+    posterior: (thresholds, slopes), result of `compute_posterior`; cap_db: the cap in dB re 1 N."""
+    levels_db, right_share = list_levels_db(cap_db), _tabulate_share_right(cap_db)
+    expected_entropy = np.zeros(len(levels_db))
     for answer_probability in (right_share, 1.0 - right_share):
         joint_probability = answer_probability * posterior
         marginal_probability = joint_probability.sum(axis=(1, 2))
-        # Entropy of the posterior after this answer, times the probability of the answer.
+        # Entropy of the posterior after this answer, times the probability of the answer. 1e-300 avoids log(0).
         expected_entropy -= (joint_probability * np.log(np.maximum(joint_probability, 1e-300))).sum(
             axis=(1, 2)
         ) - marginal_probability * np.log(marginal_probability)
-    return float(levels[int(np.flatnonzero(expected_entropy <= expected_entropy.min() + ENTROPY_TOLERANCE_NATS)[0])])
+    return float(levels_db[int(np.flatnonzero(expected_entropy <= expected_entropy.min() + ENTROPY_TOLERANCE_NATS)[0])])
 
 
-def estimate_threshold(posterior: FloatArray, cap_db: float) -> Estimate:
-    """Mean and standard deviation of the threshold's marginal posterior, and its probability above the cap. posterior:
-    (thresholds, slopes), as `compute_posterior` gives it."""
-    thresholds, threshold_probability = list_thresholds_db(cap_db), posterior.sum(axis=1)
-    mean = float((threshold_probability * thresholds).sum())
-    variance = float((threshold_probability * (thresholds - mean) ** 2).sum())
-    return Estimate(mean, math.sqrt(variance), float(threshold_probability[thresholds > cap_db].sum()))
+def estimate_threshold(posterior: FloatArray, cap_db: float) -> ThresholdEstimate:
+    """Compute mean and standard deviation of the threshold's marginal posterior, and its probability above the cap.
+    posterior: (thresholds, slopes), result of `compute_posterior`; cap_db: the cap in dB re 1 N."""
+    thresholds_db, threshold_probability = list_thresholds_db(cap_db), posterior.sum(axis=1)
+    mean_db = float((threshold_probability * thresholds_db).sum())
+    variance_db2 = float((threshold_probability * (thresholds_db - mean_db) ** 2).sum())
+    return ThresholdEstimate(
+        mean_db, math.sqrt(variance_db2), float(threshold_probability[thresholds_db > cap_db].sum())
+    )
 
 
 @cache
 def _tabulate_share_right(cap_db: float) -> FloatArray:
-    """(levels, thresholds, slopes): P(right) at all levels, cached per cap."""
+    """(levels, thresholds, slopes): P(right) at all levels of `list_levels_db`. cap_db: the cap in dB re 1 N."""
     return compute_share_right(list_levels_db(cap_db), cap_db)

@@ -22,9 +22,13 @@ def list_placeholders(text: str) -> frozenset[str] | None:
     """List the names of the placeholders `{name}` in a text; None where braces are unpaired, or contain no name or
     more than a name, such as a format or a conversion."""
     try:
-        fields = [(name, spec, conversion) for _, name, spec, conversion in Formatter().parse(text) if name is not None]
+        placeholders = [
+            (name, format_spec, conversion)
+            for _, name, format_spec, conversion in Formatter().parse(text)
+            if name is not None
+        ]
     except ValueError:
         return None
-    if any(spec or conversion or not name.isidentifier() for name, spec, conversion in fields):
+    if any(format_spec or conversion or not name.isidentifier() for name, format_spec, conversion in placeholders):
         return None
-    return frozenset(name for name, _, _ in fields)
+    return frozenset(name for name, _, _ in placeholders)

@@ -2,11 +2,10 @@
 
 Merged into `english.ENGLISH`, looked up by `words`. A key that ends in `_1` is the singular, in `_n` the form for any
 other count. Names in braces are placeholders that the program fills in; every translation has the same keys and
-placeholders (`translation`).
+placeholders (`translation`). A protocol in German or Spanish contains its texts, and its hash covers them: a new key,
+or a change of a shipped translation, changes the hashes of these protocols.
 """
 
-# A protocol in German or Spanish contains its texts, and its hash covers them: a new key, or a change of a shipped
-# translation, changes the hashes of these protocols.
 SCREEN_TEXTS: dict[str, str] = {
     # Footer: action of each key. Short, because a single line of 80 columns shows all keys of a screen.
     "key_help": "Help",
@@ -193,7 +192,7 @@ SCREEN_TEXTS: dict[str, str] = {
     "note_empty": "Nothing is written yet. Type what happened, or press Esc to leave.",
     "note_long": "At most {most} characters fit; these are {count}.",
     "note_no_writer": "Please choose who writes this.",
-    # Before the device is ready.
+    # Preparation and check of the device; emergency stop.
     "preparing_title": "One moment",
     "preparing_device": "Preparing the device: some ten seconds the first time.",
     "preparing_report": "Making the tables and the report.",
@@ -251,3 +250,4 @@ SCREEN_TEXTS: dict[str, str] = {
     "line_check_look": "Something needs a look before you go on.",
     "line_check_prompt": "Enter continues, c checks again, q leaves: ",
 }
+"""Texts of the screens and of line mode, by key."""

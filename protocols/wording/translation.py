@@ -1,4 +1,4 @@
-"""Translation of a protocol: inserts a language's table of texts into its values, and checks such a table.
+"""Insertion of a language's texts into the values of a protocol, and validation of a table of such texts.
 
 The texts become part of the protocol, and thereby of its hash and of every session log: what a participant read is
 recorded. Called by `study.store.formats.participant_texts` when a protocol is read.
@@ -18,15 +18,15 @@ MAX_TEXT_LENGTH = 4000
 def find_language(values: Mapping[str, Any]) -> str:
     """Find the language that unvalidated values of a protocol state: a code such as "de", or the path of a table; "en"
     where none is stated. An invalid value gives "en", too: the validation of the protocol refuses it later."""
-    text = values.get("text")
-    language = text.get("language", "en") if isinstance(text, dict) else "en"
+    text_table = values.get("text")
+    language = text_table.get("language", "en") if isinstance(text_table, dict) else "en"
     return language if isinstance(language, str) else "en"
 
 
 def find_own_texts(values: Mapping[str, Any]) -> dict[str, Any]:
     """Find the texts by key that unvalidated values of a protocol contain; empty without a valid table."""
-    text = values.get("text")
-    own_texts = text.get("words", {}) if isinstance(text, dict) else {}
+    text_table = values.get("text")
+    own_texts = text_table.get("words", {}) if isinstance(text_table, dict) else {}
     return dict(own_texts) if isinstance(own_texts, dict) else {}
 
 
@@ -47,17 +47,21 @@ def translate_protocol(values: Mapping[str, Any], table: Mapping[str, str], lang
     sentences = {PROTOCOL_TEXTS[key]: table[key] for key in PROTOCOL_TEXTS if key in table}
 
     def translate(text: Any) -> Any:
+        """Replace a sentence of the shipped protocols by its translation; return any other value unchanged."""
         return sentences.get(text, text) if isinstance(text, str) else text
 
-    resolved = {**values, "text": {"language": language, "words": {**table, **find_own_texts(values)}}}
-    resolved["title"] = translate(values.get("title"))
+    translated_values = {**values, "text": {"language": language, "words": {**table, **find_own_texts(values)}}}
+    translated_values["title"] = translate(values.get("title"))
     for table_key, key in (("consent", "statements"), ("consent", "exclusions"), ("setup", "grip")):
         if isinstance(values.get(table_key), dict) and key in values[table_key]:
-            resolved[table_key] = {**resolved[table_key], key: _translate_each(values[table_key][key], translate)}
+            translated_values[table_key] = {
+                **translated_values[table_key],
+                key: _translate_each(values[table_key][key], translate),
+            }
     for table_key in ("before", "debrief"):
         if isinstance(values.get(table_key), list):
-            resolved[table_key] = [_translate_question(question, translate) for question in values[table_key]]
-    return {key: value for key, value in resolved.items() if value is not None}
+            translated_values[table_key] = [_translate_question(question, translate) for question in values[table_key]]
+    return {key: value for key, value in translated_values.items() if value is not None}
 
 
 def _translate_question(question: Any, translate: Callable[[Any], Any]) -> Any:
@@ -65,15 +69,15 @@ def _translate_question(question: Any, translate: Callable[[Any], Any]) -> Any:
     same answer is logged in every language. A value that is no table is returned unchanged."""
     if not isinstance(question, dict):
         return question
-    translated = {key: _translate_each(value, translate) if key in ("question", "choices", "ends") else value
+    translated_question = {key: _translate_each(value, translate) if key in ("question", "choices", "ends") else value
              for key, value in question.items()}  # fmt: skip
-    if question.get("choices") and not question.get("codes") and translated["choices"] != question["choices"]:
-        translated["codes"] = question["choices"]
-    return translated
+    if question.get("choices") and not question.get("codes") and translated_question["choices"] != question["choices"]:
+        translated_question["codes"] = question["choices"]
+    return translated_question
 
 
 def _translate_each(value: Any, translate: Callable[[Any], Any]) -> Any:
-    """Translate a value, or each entry of a list."""
+    """Translate a text, or each text of a list; other values are returned unchanged."""
     return [translate(entry) for entry in value] if isinstance(value, list) else translate(value)
 
 
@@ -84,16 +88,18 @@ def _find_text_problem(key: str, text: Any) -> Problem | None:
         return Problem(key, "is no text of hapteq", "the keys that `hapteq protocol texts` lists")
     if not isinstance(text, str) or not text.strip() or len(text) > MAX_TEXT_LENGTH:
         return Problem(key, "is no text", f"text in quotes, up to {MAX_TEXT_LENGTH} characters")
-    expected, used = list_placeholders(ENGLISH[key]) or frozenset(), list_placeholders(text)
-    if used != expected:
-        expected_text = " ".join(f"{{{name}}}" for name in sorted(expected)) or "no braces"
+    expected_names, used_names = list_placeholders(ENGLISH[key]) or frozenset(), list_placeholders(text)
+    if used_names != expected_names:
+        expected_text = " ".join(f"{{{name}}}" for name in sorted(expected_names)) or "no braces"
         actual_text = (
-            "braces that are not in pairs" if used is None else " ".join(f"{{{name}}}" for name in sorted(used))
+            "braces that are not in pairs"
+            if used_names is None
+            else " ".join(f"{{{name}}}" for name in sorted(used_names))
         )
         return Problem(
             key,
             f"has {actual_text or 'no braces'}",
-            f"each of {expected_text}, and no other" if expected else expected_text,
+            f"each of {expected_text}, and no other" if expected_names else expected_text,
         )
     return None
 

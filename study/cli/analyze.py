@@ -22,7 +22,7 @@ def analyze(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write thresholds.csv, anova.json, figures and report.html."""
+    """Compute thresholds of all sessions and their ANOVA: write thresholds.csv, anova.json, figures and report.html."""
     from study.workflows.results.analysis_files import ANALYSIS_NAME
     from study.workflows.results.analyze_data import analyze_data
 

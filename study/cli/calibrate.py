@@ -1,4 +1,7 @@
-"""`hapteq calibrate`: Jacobian, inertia and gravity of a device's linkage over its workspace."""
+"""Command `hapteq calibrate`: reads Jacobian, inertia and gravity of a device's linkage over its workspace.
+
+Parses the options and calls `study.workflows.recording.calibrate_linkage`. Loaded by `command_table`.
+"""
 
 import json
 from pathlib import Path
@@ -17,8 +20,8 @@ def calibrate(
     depth: Annotated[float, typer.Option(help="Of the grid before and behind the centre, in metres.")] = 0.04,
     as_json: JsonOption = False,
 ) -> None:
-    """Ask the device for Jacobian, inertia and gravity at 185 positions, and compare them about the linkage's three
-    mirror lines. Its library computes them: nothing moves, the device stays braked.
+    """Read Jacobian, inertia and gravity at 185 positions from the device's library, and compare them about the
+    linkage's three mirror lines. The library computes them: nothing moves, the device stays braked.
 
     `hapteq twin --calibration CAL.h5` and `--device simulated:CAL.h5` use the result. (Another calibration, that of the
     encoders after each power-up, is `hapteq doctor --calibrate`.)
@@ -32,8 +35,8 @@ def calibrate(
     )
 
     plan = CalibrationPlan(out, device, radius, depth)
-    with show_late_bar("Calibration (%)", total=100) as show:
-        calibration = calibrate_linkage(plan, lambda share: show(round(100 * share)))
+    with show_late_bar("Calibration (%)", total=100) as show_percent:
+        calibration = calibrate_linkage(plan, lambda share: show_percent(round(100 * share)))
     summary = json.dumps(summarise_calibration(calibration), indent=2)
     typer.echo(summary if as_json else "\n".join((str(out), *format_calibration_lines(calibration))))
     for warning in calibration.warnings:

@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 KEYWORD_MODULES = {"import": "import_recording"}
-"""Module and function names of commands whose names are keywords of Python."""
+"""Name of module and function, by command, of the commands whose names are keywords of Python."""
 
 COMMANDS: dict[str, dict[str, str]] = {
     "Study": {
@@ -78,8 +78,8 @@ class LazyCommands(Mapping[str, Any]):
         app = getattr(module, "app", None)
         if app is None:
             app = typer.Typer(add_completion=False, rich_markup_mode=None)
-            settings = getattr(module, "CONTEXT_SETTINGS", None)
-            app.command(name, short_help=short_help, context_settings=settings)(getattr(module, module_name))
+            context_settings = getattr(module, "CONTEXT_SETTINGS", None)
+            app.command(name, short_help=short_help, context_settings=context_settings)(getattr(module, module_name))
         return get_command(app)
 
     def __iter__(self) -> Iterator[str]:

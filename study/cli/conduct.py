@@ -58,8 +58,8 @@ def run_new_session(
     model: Path | None = None,
 ) -> None:
     """Run a new session in line mode or simulated, and print its results. protocol_name: name or path of the protocol;
-    data: data folder; seed: None for a random one; as_json: print JSON instead of text; model: file of a fitted
-    model of the device, None without one. Raises StudyError."""
+    device: name of the device (`study.devices.opening`); data: data folder; seed: None for a random one; as_json: print
+    JSON instead of text; model: file of a fitted model of the device, None without one. Raises StudyError."""
     plan = plan_sitting(protocol_name, options.subject or _ask_subject(options), options.observer, seed, data, model)
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
@@ -69,13 +69,14 @@ def run_new_session(
     with _provide_participant(
         options.observer, plan.session.seed, options.keys, clock, make_words(plan.session.protocol)
     ) as participant:
-        end = conduct_new(plan.session, device, participant)
-    print_results(end_sitting(end, RealClock().utc()), as_json)
+        sitting_end = conduct_new(plan.session, device, participant)
+    print_results(end_sitting(sitting_end, RealClock().utc()), as_json)
 
 
 def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> None:
-    """Announce that a real device moves by itself, and have it confirmed, where a simulated participant uses one; do
-    nothing otherwise. Raises WrongUseError where that is not confirmed."""
+    """Print a notice that a real device will move by itself, and require its confirmation, where a simulated
+    participant (`observer`) uses one; do nothing otherwise. Raises WrongUseError and KeyboardInterrupt
+    where `announce_motion` does."""
     if observer is not None and device in REAL:
         announce_motion(
             f"A simulated participant ('{observer}') takes this session: the {device} moves by itself, for as long as "
@@ -93,25 +94,27 @@ def run_resumed_session(
     if warning := format_data_folder_warning(folder.path.parent):
         typer.echo(f"Note: {warning}", err=True)
     folded_session = fold_session(folder)
-    state, opened = folded_session.state, folded_session.state.opened
+    state, session_opened = folded_session.state, folded_session.state.opened
     if state.closed:
         print_results(write_missing_results(folder, folded_session), as_json)
         return
-    _confirm_free_handle(opened.observer, device, hands_off)
-    in_real_time = opened.observer is None or needs_real_time(device)
+    _confirm_free_handle(session_opened.observer, device, hands_off)
+    in_real_time = session_opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.resume_at(state.sitting.last_moment.utc)
-    with _provide_participant(opened.observer, opened.seed, keys, clock, make_words(state.protocol)) as participant:
-        end = conduct_resumed(folder, device, participant)
-    print_results(end_sitting(end, RealClock().utc()), as_json)
+    with _provide_participant(
+        session_opened.observer, session_opened.seed, keys, clock, make_words(state.protocol)
+    ) as participant:
+        sitting_end = conduct_resumed(folder, device, participant)
+    print_results(end_sitting(sitting_end, RealClock().utc()), as_json)
 
 
 @contextmanager
 def _provide_participant(
     observer: str | None, seed: int, keys: AnswerKeys, clock: Clock, words: Words
 ) -> Iterator[Participant]:
-    """Context with the participant of a sitting: simulated, or a person in line mode. A person is asked to wait before
-    it, and told after it that the results are for the experimenter. Raises WrongUseError where standard input is
-    closed."""
+    """Context manager that yields the participant of a sitting: simulated, or a person in line mode (`observer` is
+    None). A person is asked to wait before the sitting, and told after it that the results are for the experimenter.
+    Raises WrongUseError for a person where standard input is closed."""
     if observer is not None:
         with show_run_and_trial(f"simulated participant '{observer}'") as show_question:
             yield make_simulated_participant(observer, seed, clock, on_question=show_question)
@@ -131,14 +134,14 @@ def _provide_participant(
 
 
 def make_simulated_code(observer: str) -> str:
-    """Participant code of a simulated participant: the first 15 ASCII letters and digits of its name, then "1". A
-    separate code per observer keeps their sessions apart."""
+    """Make the participant code of a simulated participant: the first 15 ASCII letters and digits of its name, then
+    "1". Each simulated participant has a separate code, so that their sessions are not mixed."""
     return "".join(character for character in observer if character.isascii() and character.isalnum())[:15] + "1"
 
 
 def _ask_subject(options: SittingOptions) -> str:
-    """Participant code: made for a simulated participant, else asked at the terminal until it is valid. Raises
-    WrongUseError without a terminal."""
+    """Return the participant code: made for a simulated participant, else asked at the terminal until it is valid.
+    Raises WrongUseError for a person without a terminal."""
     if options.observer is not None:
         return make_simulated_code(options.observer)
     if sys.stdin is None or not sys.stdin.isatty():

@@ -43,9 +43,9 @@ def contact(
     from study.workflows.equalizer.play_contact import ContactPlan, format_contact, play_contact, summarise_contact
 
     plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
-    with show_late_bar("Plays (%)", total=100) as show:
+    with show_late_bar("Plays (%)", total=100) as show_percent:
         playback = play_contact(
-            plan, lambda share: show(round(100 * share)), partial(announce_motion, hands_off=hands_off)
+            plan, lambda share: show_percent(round(100 * share)), partial(announce_motion, hands_off=hands_off)
         )
     typer.echo(
         json.dumps(summarise_contact(playback), indent=2)

@@ -17,7 +17,7 @@ from study.cli.session_options import HandsOffOption
 
 if TYPE_CHECKING:
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
-    from study.workflows.equalizer.repeat_trajectory import RepeatOrder
+    from study.workflows.equalizer.repeat_trajectory import RepeatOptions
 
 EarlierOption = Annotated[
     Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, from which to continue.")
@@ -57,7 +57,7 @@ def equalize(
     the forces are then computed in three frequency bands.
     """
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
-    from study.workflows.equalizer.repeat_trajectory import RepeatOrder
+    from study.workflows.equalizer.repeat_trajectory import RepeatOptions
 
     _check_arguments(files, repeat, device, earlier)
     *models, trajectory = files
@@ -65,7 +65,7 @@ def equalize(
     summary, lines = (
         _equalize_once(plan)
         if repeat is None or device is None
-        else _repeat_on_device(plan, RepeatOrder(repeat, device, earlier, seed), hands_off)
+        else _repeat_on_device(plan, RepeatOptions(repeat, device, earlier, seed), hands_off)
     )
     typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join((str(out), *lines)))
 
@@ -98,9 +98,9 @@ def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ..
 
 
 def _repeat_on_device(
-    plan: "EqualizePlan", order: "RepeatOrder", hands_off: bool
+    plan: "EqualizePlan", options: "RepeatOptions", hands_off: bool
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
-    """Compute the forces, play them on the device and correct them by the measured error, `order.repeats` times.
+    """Compute the forces, play them on the device and correct them by the measured error, `options.repeats` times.
     Returns the summary for JSON, and the same as lines of text. hands_off: whether the user has confirmed that no
     person holds the handle."""
     from functools import partial
@@ -113,6 +113,6 @@ def _repeat_on_device(
     )
 
     ask = partial(announce_motion, hands_off=hands_off)
-    with show_late_bar("Plays", total=order.repeats + 1) as show:
-        repeated = repeat_trajectory(plan, order, lambda number, share: show(number + share), ask)
+    with show_late_bar("Plays", total=options.repeats + 1) as show:
+        repeated = repeat_trajectory(plan, options, lambda number, share: show(number + share), ask)
     return summarise_repeats(repeated), format_repeat_lines(repeated)

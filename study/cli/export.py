@@ -35,7 +35,7 @@ def export(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write all trials with their protocol, seeds and versions. `hapteq analyze` takes psych-ds and csv back."""
+    """Write all trials with their protocol, seeds and versions. `hapteq analyze` reads psych-ds and csv."""
     from study.workflows.results.collect_sessions import collect_sessions
     from study.workflows.results.export_study import export_study
 

@@ -17,7 +17,7 @@ from study.cli.results import JsonOption
 def import_recording(
     files: Annotated[list[Path], typer.Argument(help="CSV, NPZ, MAT or HDF5 files, or a folder of them.")],
     out: Annotated[Path, typer.Option(help="The recording to write, REC.h5.")],
-    by_map: Annotated[
+    map_name: Annotated[
         str | None,
         typer.Option(
             "--map",
@@ -38,20 +38,22 @@ def import_recording(
 
     check_free(out)
     try:
-        with show_late_bar("Importing (%)", total=100) as show:
-            imported = convert_files(ImportPlan(tuple(files), by_map, out), lambda share: show(round(100 * share)))
+        with show_late_bar("Importing (%)", total=100) as show_percent:
+            imported = convert_files(
+                ImportPlan(tuple(files), map_name, out), lambda share: show_percent(round(100 * share))
+            )
     except MapNeededError as error:
         typer.echo(error.skeleton, nl=False)
         raise
     recording = imported.recording
     if as_json:
-        facts = {
+        document = {
             "recording": str(out), "map": imported.map, "sample_rate_hz": recording.sample_rate_hz,
             "samples": len(recording), "command": list(recording.command.channels),
             "response": list(recording.response.channels), "segments": len(recording.segments),
             "notes": list(imported.notes),
         }  # fmt: skip
-        typer.echo(json.dumps(facts, indent=2))
+        typer.echo(json.dumps(document, indent=2))
     else:
         typer.echo(str(out))
     for note in imported.notes:

@@ -63,7 +63,7 @@ def score(
 
     Without --seal its hash is compared only with the file next to it. A recording without a diagnosis is not right.
     """
-    from study.evaluation.kit.score_kit import score_kit, score_lines
+    from study.evaluation.kit.score_kit import format_score_lines, score_kit
 
-    for line in score_lines(score_kit(labels, diagnoses, out, seal)):
+    for line in format_score_lines(score_kit(labels, diagnoses, out, seal)):
         typer.echo(line)

@@ -1,4 +1,9 @@
-"""`hapteq look`: what is in recordings, and what is wrong with them, before any model."""
+"""Command `hapteq look`: shows the signals of recordings and checks them, before any model is fitted.
+
+Prints, for each recording, a summary, time series, spectra, tables of channels and segments, and the findings of the
+checks. Calls `study.workflows.recording.look_at_recordings`. Loaded by `command_table`; `study.cli.show` uses the
+drawing functions.
+"""
 
 import json
 from collections.abc import Iterable
@@ -20,24 +25,25 @@ def look(
     everything: Annotated[bool, typer.Option("--all", help="Also the checks that found nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Signals, spectra, coherence, levels and repeats; and checks of units, clock, derivatives, lags, clipping and
-    steps. Exit code 0 also where something is wrong: that is a result."""
+    """Show signals, spectra, coherence, levels and repeats; check units, clock, derivatives, lags, clipping and steps.
+    Exit code 0 also where a check fails: that is a result."""
     from study.cli.progress import show_late_bar
     from study.workflows.recording.look_at_recordings import inspect_recordings, make_look_document, write_look_page
 
-    with show_late_bar("Looking (%)", total=100) as show:
-        overviews = inspect_recordings(recordings, lambda share: show(round(100 * share)))
+    with show_late_bar("Looking (%)", total=100) as show_percent:
+        overviews = inspect_recordings(recordings, lambda share: show_percent(round(100 * share)))
     if as_json:
         typer.echo(json.dumps(make_look_document(overviews), indent=2))
     else:
         for overview in overviews:
-            print_lines(look_lines(overview, everything))
+            print_lines(format_overview(overview, everything))
     if out is not None:
         typer.echo(f"Report: {write_look_page(overviews, out)}", err=True)
 
 
-def look_lines(overview: "Overview", everything: bool) -> Iterable[str]:
-    """Checks and measurements of one recording as lines; everything: also passed checks."""
+def format_overview(overview: "Overview", everything: bool) -> Iterable[str]:
+    """Format measurements and checks of one recording as lines. everything: also list the passed checks, which else
+    are only counted."""
     from analysis.reports.look_report import summarise_overview
     from study.tui.text_rows import wrap_hanging
 
@@ -49,14 +55,15 @@ def look_lines(overview: "Overview", everything: bool) -> Iterable[str]:
             yield from wrap_hanging(
                 f"{check.level:6s}  {check.name}: {check.finding} {check.advice}".rstrip(), 8, read_terminal_width()
             )
-    fine = sum(check.level == "fine" for check in overview.checks)
-    if not everything and fine:
-        yield f"fine    {fine} further checks (--all shows them)"
+    fine_count = sum(check.level == "fine" for check in overview.checks)
+    if not everything and fine_count:
+        yield f"fine    {fine_count} further checks (--all shows them)"
     yield ""
 
 
 def draw_recording_lines(overview: "Overview") -> Iterable[str]:
-    """Time series, spectra, and tables of channels and segments."""
+    """Draw time series and spectra (if there are any) of a recording as lines of text, with the tables of channels and
+    segments."""
     from study.tui.drawing.recording_drawing import draw_spectra, draw_time_series
 
     yield ""
@@ -65,38 +72,41 @@ def draw_recording_lines(overview: "Overview") -> Iterable[str]:
     if overview.spectra is not None:
         yield ""
         yield from draw_spectra(overview)
-    yield from ("", *_tables(overview))
+    yield from ("", *_format_tables(overview))
 
 
-def _tables(overview: "Overview") -> Iterable[str]:
+def _format_tables(overview: "Overview") -> Iterable[str]:
+    """Format the table of the channels, and that of the segments (the first `MAX_SEGMENT_ROWS`), if there are any."""
     from analysis.wording import typeset
     from study.tui.text_rows import align_rows
 
     rows: list[tuple[str, ...]] = [("channel", "quantity", "unit", "lowest", "highest", "mean", "rms", "missing")]
     for summary in overview.summaries:
-        sizes = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
-        rows.append((f"{summary.role} {summary.name}", summary.quantity, summary.unit, *sizes, str(summary.missing)))
+        statistics = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
+        rows.append(
+            (f"{summary.role} {summary.name}", summary.quantity, summary.unit, *statistics, str(summary.missing))
+        )
     yield from align_rows(tuple(rows), read_terminal_width())
     segments = overview.recording.segments
     if segments:
         yield ""
-        heads = [f"rms {channel.role} {channel.name}" for channel in overview.channels]
-        table: list[tuple[str, ...]] = [("segment", "role", "start s", "length s", "period", *heads)]
-        for level in overview.levels[:MOST_SEGMENTS]:
-            sizes = [f"{value:.4g}" for value in level.rms]
-            times = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
-            table.append((f"{level.number} {level.kind}", level.role, *times, *sizes))
-        yield from align_rows(tuple(table), read_terminal_width())
-        if len(segments) > MOST_SEGMENTS:
-            yield f"and {len(segments) - MOST_SEGMENTS} segments more"
+        rms_headings = [f"rms {channel.role} {channel.name}" for channel in overview.channels]
+        segment_rows: list[tuple[str, ...]] = [("segment", "role", "start s", "length s", "period", *rms_headings)]
+        for level in overview.levels[:MAX_SEGMENT_ROWS]:
+            statistics = [f"{value:.4g}" for value in level.rms]
+            time_cells = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
+            segment_rows.append((f"{level.number} {level.kind}", level.role, *time_cells, *statistics))
+        yield from align_rows(tuple(segment_rows), read_terminal_width())
+        if len(segments) > MAX_SEGMENT_ROWS:
+            yield f"and {len(segments) - MAX_SEGMENT_ROWS} segments more"
 
 
-MOST_SEGMENTS = 20
-"""Segments printed in the terminal; the page lists all."""
+MAX_SEGMENT_ROWS = 20
+"""Largest number of segments that are listed in the terminal; the page of --out lists all. Chosen."""
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Print lines; control characters from a file are removed."""
+    """Print lines; control characters, which may come from a file, are replaced."""
     from study.session.views.printable import replace_unprintable
 
     for line in lines:

@@ -29,14 +29,14 @@ def model(
         FirstModelPlan,
         fit_first_model,
         format_first_model,
-        summarize_first_model,
+        summarise_first_model,
     )
 
     plan = FirstModelPlan(tuple(recordings), out, structure, tuple(force_constant or ()))
     with show_late_bar("Model (%)", total=100) as show:
         fitted = fit_first_model(plan, lambda share: show(round(100 * share)))
     typer.echo(
-        json.dumps(summarize_first_model(fitted), indent=2) if as_json else "\n".join(format_first_model(fitted))
+        json.dumps(summarise_first_model(fitted), indent=2) if as_json else "\n".join(format_first_model(fitted))
     )
     for remark in fitted.remarks:
         typer.echo(f"Note: {remark}", err=True)

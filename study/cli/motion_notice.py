@@ -15,7 +15,7 @@ def announce_motion(notice: str, hands_off: bool, hand_on_handle: bool = False) 
 
     hands_off: whether the user states that no hand is on the handle (--hands-off); then no confirmation is required
     without a keyboard. hand_on_handle: whether the motion is meant for a held handle, which always requires it. Raises
-    WrongUseError as `require_confirmation`, and KeyboardInterrupt at the end of the input.
+    WrongUseError where `require_confirmation` does, and KeyboardInterrupt at the end of the input.
     """
     from study.cli.screen import has_keyboard
 
@@ -29,7 +29,7 @@ def announce_motion(notice: str, hands_off: bool, hand_on_handle: bool = False) 
 
 def require_confirmation(hands_off: bool, hand_on_handle: bool = False) -> None:
     """Raise WrongUseError unless a person can confirm the motion at a keyboard, or `hands_off` is stated for a motion
-    without a hand. Arguments as of `announce_motion`."""
+    without a hand. hands_off, hand_on_handle: see `announce_motion`."""
     from study.cli.screen import has_keyboard
 
     if has_keyboard() or (hands_off and not hand_on_handle):

@@ -156,7 +156,7 @@ def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str
     )
     compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
     roved = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
-    return [*format_power_lines(points, select_threshold_words(plan.rule).means), "", compared, *roved]
+    return [*format_power_lines(points, select_threshold_words(plan.rule).noun), "", compared, *roved]
 
 
 def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":

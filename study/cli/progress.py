@@ -31,11 +31,12 @@ def show_run_and_trial(title: str) -> Iterator[Callable[[Question], None]]:
     with Progress(*columns, console=Console(file=sys.stderr), transient=True) as progress:
         task_id = progress.add_task(title, where="")
 
-        def show(question: Question) -> None:
+        def show_question(question: Question) -> None:
+            """Show run and trial of the question."""
             run_text = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
             progress.update(task_id, where=f"{run_text}, trial {question.trial_number}")
 
-        yield show
+        yield show_question
 
 
 @contextmanager
@@ -50,11 +51,12 @@ def show_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 @contextmanager
 def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
     """Show a progress bar from the first call of the yielded function on, because files may have to be read or a
-    question asked before. Arguments as of `show_bar`."""
+    question asked before. Without a call, nothing is shown. title, total: see `show_bar`."""
     with ExitStack() as stack:
 
         @cache
         def start_bar() -> Callable[[float], None]:
+            """Show the bar at the first call; return the same callback at every call."""
             return stack.enter_context(show_bar(title, total))
 
         yield lambda completed: start_bar()(completed)
@@ -70,11 +72,13 @@ def show_steps(title: str) -> Iterator[Callable[[str, float], None]]:
 
         @cache
         def start_bar() -> tuple[Progress, TaskID]:
+            """Show the bar at the first call; return the same bar at every call."""
             progress = stack.enter_context(Progress(*columns, console=Console(file=sys.stderr), disable=is_silent))
             return progress, progress.add_task(title, total=1.0)
 
-        def show(step_name: str, share: float) -> None:
+        def show_step(step_name: str, share: float) -> None:
+            """Show the step, and the share done (0 to 1)."""
             progress, task_id = start_bar()
             progress.update(task_id, description=f"{title}: {step_name}", completed=share)
 
-        yield show
+        yield show_step

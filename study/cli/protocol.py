@@ -1,4 +1,8 @@
-"""`hapteq protocol`: the protocols that come with hapteq, what is in one, and how to fix one before data come in."""
+"""Command `hapteq protocol` with its subcommands `list`, `show`, `texts` and `lock`.
+
+They list the shipped protocols, explain every key of one, print the participant's texts for translation, and lock a
+protocol before data are collected. Calls `protocols.document` and `study.store.formats`. Loaded by `command_table`.
+"""
 
 import json
 from pathlib import Path
@@ -22,7 +26,7 @@ NameArgument = Annotated[str, typer.Argument(help="A shipped protocol's name, or
 
 @app.command("list")
 def list_protocols() -> None:
-    """The shipped protocols, one line each."""
+    """List the shipped protocols, one line each."""
     from study.store.formats.protocol_files import list_shipped_protocols, read_protocol
 
     for name in list_shipped_protocols():
@@ -31,28 +35,33 @@ def list_protocols() -> None:
 
 
 @app.command("show")
-def show(
+def show_protocol(
     name: NameArgument,
     text: Annotated[bool, typer.Option("--text", help="The file as it is, to copy and change.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
 ) -> None:
-    """Every key of a protocol with its value, its default and the reason for it."""
+    """Show every key of a protocol with its value, its default and the reason for it."""
     from protocols.document.explain import explain_protocol
     from protocols.document.hashing import hash_protocol
     from study.session.stimulus.limits import describe_forces
     from study.store.formats.protocol_files import read_protocol
 
-    file = read_protocol(name)
+    protocol_file = read_protocol(name)
     if text:
-        typer.echo(file.text, nl=False)
+        typer.echo(protocol_file.text, nl=False)
         return
-    fields = explain_protocol(file.protocol)
+    fields = explain_protocol(protocol_file.protocol)
     if as_json:
-        rows = [{"key": f.key, "value": f.value, "default": f.default, "reason": f.description} for f in fields]
-        typer.echo(json.dumps({"hash": hash_protocol(file.protocol), "fields": rows}, indent=2, default=str))
+        field_rows = [
+            {"key": setting.key, "value": setting.value, "default": setting.default, "reason": setting.description}
+            for setting in fields
+        ]
+        typer.echo(
+            json.dumps({"hash": hash_protocol(protocol_file.protocol), "fields": field_rows}, indent=2, default=str)
+        )
         return
-    typer.echo(f"{file.protocol.title} (hash {hash_protocol(file.protocol)[:12]})")
-    typer.echo(f"Force at the handle: {describe_forces(file.protocol.safety)}.")
+    typer.echo(f"{protocol_file.protocol.title} (hash {hash_protocol(protocol_file.protocol)[:12]})")
+    typer.echo(f"Force at the handle: {describe_forces(protocol_file.protocol.safety)}.")
     for field in fields:
         typer.echo(f"\n{field.key} = {field.value}")
         typer.echo(f"    {field.description}")
@@ -60,18 +69,18 @@ def show(
 
 
 @app.command("texts")
-def texts(
+def print_texts(
     language: Annotated[str, typer.Argument(help="en, de, es, or a file, which is checked first.")] = "en",
 ) -> None:
-    """All texts that a participant reads, as a TOML file to translate, for [text] language in a protocol."""
+    """Print all texts that a participant reads, as a TOML file to translate, for [text] language in a protocol."""
     from study.store.formats.participant_texts import make_language_template
 
     typer.echo(make_language_template(language), nl=False)
 
 
 @app.command("lock")
-def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
-    """Fix a protocol before data come in: sessions in the data folder then refuse any other version of it.
+def write_lock(name: NameArgument, data: DataOption = Path("data")) -> None:
+    """Lock a protocol before data are collected: sessions in the data folder then refuse any other version of it.
 
     The lock states which parts of the analysis the protocol declares.
     """
@@ -83,9 +92,9 @@ def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     from study.store.disk.privacy import make_folder
     from study.store.formats.protocol_files import lock_protocol, read_protocol
 
-    file = read_protocol(name, data)
+    protocol_file = read_protocol(name, data)
     make_folder(data, private=True)
-    path = lock_protocol(file, data, RealClock().utc(), version("hapteq"))
-    typer.echo(str(path))
-    if isinstance(file.protocol, StudyProtocol):
-        typer.echo(f"Fixed with all else: {describe_declaration(file.protocol.analysis)}", err=True)
+    lock_path = lock_protocol(protocol_file, data, RealClock().utc(), version("hapteq"))
+    typer.echo(str(lock_path))
+    if isinstance(protocol_file.protocol, StudyProtocol):
+        typer.echo(f"Fixed with all else: {describe_declaration(protocol_file.protocol.analysis)}", err=True)

@@ -48,11 +48,11 @@ def real(
     from analysis.diagnosis.real_answer.real_answer import real_answer_to_json
     from study.cli.progress import show_steps
     from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
-    from study.evaluation.real.real_summary import real_lines
+    from study.evaluation.real.real_summary import format_real_lines
 
-    with connect_cluster(scheduler) as cluster, show_steps("Real recordings") as show:
-        diagnosed = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show, executor=cluster)
+    with connect_cluster(scheduler) as cluster, show_steps("Real recordings") as show_step:
+        diagnosed_folder = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show_step, executor=cluster)
     if as_json:
-        typer.echo(json.dumps([real_answer_to_json(answer) for answer in diagnosed.results.answers], indent=2))
+        typer.echo(json.dumps([real_answer_to_json(answer) for answer in diagnosed_folder.results.answers], indent=2))
     else:
-        typer.echo("\n".join(real_lines(diagnosed)))
+        typer.echo("\n".join(format_real_lines(diagnosed_folder)))

@@ -25,7 +25,7 @@ def reproduce(
 ) -> None:
     """Draw the paper's figures 1 to 5, each with the values of the paper and of this run.
 
-    Everything is simulated: device and participants. Interrupted, the same command continues.
+    Everything is simulated: device and participants. After an interruption, the same command continues.
     """
     import json
 
@@ -35,12 +35,15 @@ def reproduce(
     from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 
     plan = ReproductionPlan(out, subjects=subjects, seed=seed, workers=workers)
-    with show_bar("Reproduction (%)", total=100) as show:
-        reproduction = reproduce_paper(plan, lambda share: show(round(100 * share)))
+    with show_bar("Reproduction (%)", total=100) as show_percent:
+        written_reproduction = reproduce_paper(plan, lambda share: show_percent(round(100 * share)))
     if as_json:
-        document = {"report": str(reproduction.report), **reproduction_to_json(reproduction.reproduction)}
+        document = {
+            "report": str(written_reproduction.report),
+            **reproduction_to_json(written_reproduction.reproduction),
+        }
         typer.echo(json.dumps(document, indent=2))
     else:
-        for line in reproduction.lines:
+        for line in written_reproduction.lines:
             typer.echo(line)
-    typer.echo(f"Report: {reproduction.report}", err=True)
+    typer.echo(f"Report: {written_reproduction.report}", err=True)

@@ -1,4 +1,8 @@
-"""`hapteq serve`: the screen of `hapteq study` in a browser."""
+"""Command `hapteq serve`: shows the screen of `hapteq study` in a browser, by a web server on this machine.
+
+Checks the address to listen on and the options for `hapteq study`, then runs `study.tui.web_server`. Loaded by
+`command_table`.
+"""
 
 import sys
 from importlib.util import find_spec
@@ -11,10 +15,11 @@ from study.errors import StudyError, WrongUseError
 from study.tui.keys.answer_keys import parse_keys
 
 CONTEXT_SETTINGS = {"allow_extra_args": True, "ignore_unknown_options": True}
-"""Options that `serve` does not know are passed on to `hapteq study`."""
+"""Settings of typer, read by `command_table`: options unknown to `serve` are accepted, and passed on to `hapteq study`.
+"""
 
-EVERYWHERE = ("0.0.0.0", "::", "")
-"""Addresses to listen on that no browser can open."""
+WILDCARD_ADDRESSES = ("0.0.0.0", "::", "")
+"""Wildcard addresses: a server can listen on them, but no browser can open them."""
 
 
 def serve(
@@ -34,15 +39,15 @@ def serve(
         ),
     ] = False,
 ) -> None:
-    """Show the study in a browser; all options of `hapteq study` may follow. The address holds a secret token."""
-    command = [sys.executable, "-P", "-m", "study", "study", *_study_options(context)]
-    if host in EVERYWHERE:
+    """Show the study in a browser; all options of `hapteq study` may follow. The address contains a secret token."""
+    command = [sys.executable, "-P", "-m", "study", "study", *_check_study_options(context)]
+    if host in WILDCARD_ADDRESSES:
         raise WrongUseError(
             "No browser can open this address",
             f"'{host}' means every address of this machine.",
             "Give the one by which the other machine reaches this one, such as --host 192.168.1.20.",
         )
-    if not open_to_network and not _is_this_machine(host):
+    if not open_to_network and not _is_loopback_host(host):
         raise WrongUseError(
             "Other machines would reach this page",
             f"--host {host} listens beyond this computer, and what is sent there is not encrypted.",
@@ -56,10 +61,11 @@ def serve(
             "textual-serve is not installed.",
             f"Install it: {sys.executable} -m pip install textual-serve",
         )
-    _serve(command, host, port)
+    _start_server(command, host, port)
 
 
-def _is_this_machine(host: str) -> bool:
+def _is_loopback_host(host: str) -> bool:
+    """Whether the host is "localhost" or a loopback address; False for any other name."""
     if host == "localhost":
         return True
     try:
@@ -68,27 +74,30 @@ def _is_this_machine(host: str) -> bool:
         return False
 
 
-def _serve(command: list[str], host: str, port: int) -> None:
+def _start_server(command: list[str], host: str, port: int) -> None:
+    """Serve the screen that `command` starts until the server is stopped. Raises StudyError where host and port cannot
+    be used."""
     from study.tui.web_server import ScreenServer
 
     try:
         ScreenServer(command, host, port, print_line=lambda sentence: typer.echo(sentence, err=True)).serve()
-    except OSError as problem:
+    except OSError as error:
         raise StudyError(
             "The page cannot be served",
-            f"{problem.strerror or problem}.",
+            f"{error.strerror or error}.",
             "Choose another --port, or another --host.",
-        ) from problem
+        ) from error
 
 
-def _study_options(context: typer.Context) -> list[str]:
-    """Read by `hapteq study` itself, so that a wrong one is refused here and not in the browser."""
-    group: Any = context.parent.command if context.parent is not None else None
+def _check_study_options(context: typer.Context) -> list[str]:
+    """Return the options for `hapteq study`, parsed once by that command, so that an invalid one is refused here and
+    not in the browser. Raises WrongUseError for options with which it opens no screen."""
+    command_group: Any = context.parent.command if context.parent is not None else None
     options = list(context.args)
-    values = group.commands["study"].make_context("study", list(options), parent=context.parent).params
-    parse_keys(values["keys"])
+    option_values = command_group.commands["study"].make_context("study", list(options), parent=context.parent).params
+    parse_keys(option_values["keys"])
     for name in ("plain", "observer"):
-        if values.get(name):
+        if option_values.get(name):
             raise WrongUseError(
                 "There would be no screen to serve",
                 f"With --{name} hapteq study opens none.",

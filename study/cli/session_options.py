@@ -49,5 +49,6 @@ PlainOption = Annotated[bool, typer.Option("--plain", help="Line mode; answers m
 
 
 def choose_protocol(protocol: str | None, model: Path | None) -> str:
-    """Return the protocol's name; without one, the default for stimuli with a model (equalized) or without."""
+    """Return the name or path of the protocol; for None or an empty text the default, which depends on whether stimuli
+    are equalized by a model."""
     return protocol or ("direction_threshold" if model is None else "equalized_threshold")

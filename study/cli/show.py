@@ -37,13 +37,13 @@ def show(
 ) -> None:
     """Facts, thresholds, warnings and staircases of a session; verdict, effects and fit of a diagnosis; or channels,
     segments and facts of a recording."""
-    from study.importing.arrays.json_arrays import is_own_document
+    from study.importing.arrays.json_arrays import is_hapteq_document
     from study.importing.arrays.read_arrays import FOREIGN_ENDINGS
     from study.store.disk.hdf5_file import is_hdf5
 
     target_path = Path(target)
     is_foreign = (
-        target_path.is_file() and target_path.suffix.lower() in FOREIGN_ENDINGS and not is_own_document(target_path)
+        target_path.is_file() and target_path.suffix.lower() in FOREIGN_ENDINGS and not is_hapteq_document(target_path)
     )
     if is_foreign or (target_path.is_file() and is_hdf5(target_path)):
         _show_recording(Path(target), as_json)

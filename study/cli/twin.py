@@ -1,4 +1,8 @@
-"""`hapteq twin`: the nominal mechanical model of a device, as a laboratory would write it down."""
+"""Command `hapteq twin`: fits the nominal mechanical model of a device (its digital twin) to its responses.
+
+Parses the options, prints the notice before the device moves, and calls `study.workflows.diagnosis.write_twin`. Loaded
+by `command_table`.
+"""
 
 import json
 from pathlib import Path
@@ -42,9 +46,9 @@ def twin(
 
     plan = TwinPlan(out, device, seed, protocol, band, calibration)
     check_output_and_band(plan)
-    with show_late_bar("Twin (%)", total=100) as show:
+    with show_late_bar("Twin (%)", total=100) as show_percent:
         fitted_twin = write_twin(
-            plan, lambda share: show(round(100 * share)), partial(announce_motion, hands_off=hands_off)
+            plan, lambda share: show_percent(round(100 * share)), partial(announce_motion, hands_off=hands_off)
         )
     typer.echo(
         json.dumps(summarise_twin(fitted_twin), indent=2)

@@ -1,4 +1,8 @@
-"""`hapteq validate`: check any of our files and say in words what is wrong."""
+"""Command `hapteq validate`: checks files of hapteq, and prints their problems in words.
+
+Parses the options and calls `study.workflows.files` (`validate_in_process`: each file; `check_model_channels`: models
+against recordings). Loaded by `command_table`.
+"""
 
 import json
 from pathlib import Path
@@ -14,21 +18,26 @@ def validate(
     """Check files: recordings, models, protocols, tables, logs; and models against the recordings that are given with
     them. Exit code 1 if anything is wrong."""
     from study.errors import ExitCode
-    from study.workflows.files.validate_apart import validate_files
-    from study.workflows.files.validate_together import check_model_channels
+    from study.workflows.files.check_model_channels import check_model_channels
+    from study.workflows.files.validate_in_process import validate_files
 
     validations = check_model_channels(list(validate_files(files)))
     if as_json:
-        rows = [
-            {"file": str(v.path), "kind": v.kind, "problems": list(v.problems), "notes": list(v.notes)}
-            for v in validations
+        document = [
+            {
+                "file": str(file_validation.path),
+                "kind": file_validation.kind,
+                "problems": list(file_validation.problems),
+                "notes": list(file_validation.notes),
+            }
+            for file_validation in validations
         ]
-        typer.echo(json.dumps(rows, indent=2))
+        typer.echo(json.dumps(document, indent=2))
     for validation in [] if as_json else validations:
         typer.echo(f"{validation.path}: {validation.kind}: {'not valid' if validation.problems else 'valid'}")
         for problem in validation.problems:
             typer.echo(f"  {problem}")
         for note in validation.notes:
             typer.echo(f"  Note: {note}")
-    if any(v.problems for v in validations):
+    if any(file_validation.problems for file_validation in validations):
         raise typer.Exit(ExitCode.ERROR)

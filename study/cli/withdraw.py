@@ -1,4 +1,8 @@
-"""`hapteq withdraw`: a participant withdraws; the data are erased."""
+"""Command `hapteq withdraw`: erases the data of a participant who withdraws the consent.
+
+Lists what will be erased, asks for confirmation, and calls `study.workflows.session.withdraw_participant`. Loaded by
+`command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,8 +19,8 @@ def withdraw(
 ) -> None:
     """Erase all sessions of a session's participant in this data folder; a tombstone stays.
 
-    Interrupted, the same command continues. Links are not followed. Data that are not proved to be the participant's
-    are listed.
+    After an interruption, the same command continues. Symbolic links are not followed. Data that may be the
+    participant's, but are not proved to be, are listed.
     """
     from study.devices.clock import RealClock
     from study.workflows.session.withdraw_participant import (
@@ -27,20 +31,20 @@ def withdraw(
     from study.workflows.session.withdraw_participant import withdraw as erase
 
     folder = find_session_to_withdraw(session, data)
-    place = folder.path.parent
+    data_folder = folder.path.parent
     plan = plan_withdrawal(folder)
-    derived_paths = ", ".join(str(place / name) for name in plan.derived_roots)
-    analysis = f", and the analysis in {derived_paths}" if derived_paths else ""
-    typer.echo(f"To be erased for good: {', '.join(plan.sessions)}{analysis}", err=True)
+    derived_text = ", ".join(str(data_folder / name) for name in plan.derived_roots)
+    analysis_note = f", and the analysis in {derived_text}" if derived_text else ""
+    typer.echo(f"To be erased for good: {', '.join(plan.sessions)}{analysis_note}", err=True)
     for sentence in plan.doubtful:
         typer.echo(f"Not to be erased: {sentence}", err=True)
     if not yes and not typer.confirm("Erase them?", err=True):
         typer.echo("Nothing was erased.", err=True)
         return
-    copy_notes = list_remaining_copies(place, plan)
-    erase(place, plan, RealClock().utc())
+    copy_notes = list_remaining_copies(data_folder, plan)
+    erase(data_folder, plan, RealClock().utc())
     typer.echo(f"Erased: {', '.join(plan.sessions)}")
-    if derived_paths:
-        typer.echo(f"Erased too, because it was made from them: {derived_paths}. Run hapteq analyze again.", err=True)
+    if derived_text:
+        typer.echo(f"Erased too, because it was made from them: {derived_text}. Run hapteq analyze again.", err=True)
     for sentence in copy_notes:
         typer.echo(sentence, err=True)

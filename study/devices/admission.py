@@ -47,22 +47,23 @@ MAX_PLAUSIBILITY_LIMITS = {
 repeated for settings that do not come from a validated protocol."""
 
 RATES_HZ = (100.0, 10_000.0)
-"""Lowest and highest accepted rate of a device's control loop (Hz)."""
+"""Lowest and highest accepted rate of a device's control loop (Hz). Chosen around the usual 1 kHz."""
 
 MAX_EFFECTIVE_MASS_KG = 10.0
 """Largest accepted effective mass (kg), above that of any handle of a desktop device. The stiffness of the centring
 spring is proportional to the mass that the device reports."""
 
 MAX_FORCE_DROP_S = 1.0
-"""Longest accepted time (s) after the last command until the hardware itself drops the force."""
+"""Longest accepted time (s) after the last command until the hardware itself drops the force. Chosen."""
 
 FADE_SHAPES = ("raised_cosine", "linear")
 """Shapes of a stimulus's fades that the control tick implements."""
 
 
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
-    """Check settings and device before the safety layer uses them. Raises `DeviceError` for a limit outside its bounds
-    or not finite, and for a device that reports an implausible rate or mass."""
+    """Check settings and device before the safety layer uses them. The bounds of spring (10 Hz) and damper (20 N s/m)
+    are those of `protocols.definition.apparatus.SpringSettings`. Raises `DeviceError` for a limit outside its bounds or
+    not finite, and for a device that reports an implausible rate or mass."""
     _check_info(info)
     limits = settings.limits
     setting_values = {name: getattr(limits, name) for name in MAX_SETTINGS if name != "keep_s"} | {
@@ -96,10 +97,10 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 
 
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
-    """Check fades (known shape, 0 to 10 s), format, force and slew rate of a repeated stimulus. Its slew rate includes
-    the steps from the loop's last sample to its first and, with an onset, from zero through the onset into the loop;
-    without one, the fade-in begins at zero. rate_hz: rate of the device. Raises `DeviceError` for a stimulus that is
-    not within the limits."""
+    """Check fades (known shape, 0 to 10 s, chosen), format, force and slew rate of a repeated stimulus. Its slew rate
+    includes the steps from the loop's last sample to its first and, with an onset, from zero through the onset into the
+    loop; without one, the fade-in begins at zero. rate_hz: rate of the device. Raises `DeviceError` for a stimulus that
+    is not within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
         raise _make_refusal_error(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for setting_name, fade_s in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
@@ -121,7 +122,8 @@ def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:
 
 
 def _check_forces(force: Signal, limits: Limits, rate_hz: float) -> None:
-    """Require the device's rate, the shape (n, 3), force in N, finite samples, and norms within the stimulus's cap."""
+    """Require the device's rate, the shape (n, 3), force in N, finite samples, and norms within the stimulus's cap.
+    Raises `DeviceError`."""
     if force.sample_rate_hz != rate_hz:
         raise _make_refusal_error(f"it was made for {force.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz")
     if force.samples.shape[1] != 3 or not len(force):
@@ -136,7 +138,7 @@ def _check_forces(force: Signal, limits: Limits, rate_hz: float) -> None:
 
 
 def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
-    """Require the norms of the steps (n, 3), N per tick, within the slew limit (N/s)."""
+    """Require the norms of the steps (n, 3), N per tick, within the slew limit (N/s). Raises `DeviceError`."""
     max_slew_n_per_s = float(np.linalg.norm(steps, axis=1).max()) * rate_hz
     if max_slew_n_per_s > limits.slew_n_per_s * ROUNDING_FACTOR:
         raise _make_refusal_error(
@@ -145,7 +147,8 @@ def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
 
 
 def _check_info(info: DeviceInfo) -> None:
-    """Require rate and mass of the device within their ranges: spring, fades and all times in ticks depend on them."""
+    """Require rate and mass of the device within their ranges, because spring, fades and all times in ticks depend on
+    them. Raises `DeviceError`."""
     ranges = (
         ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
         ("effective_mass_kg", info.effective_mass_kg, 1e-3, MAX_EFFECTIVE_MASS_KG),
@@ -161,7 +164,7 @@ def _check_info(info: DeviceInfo) -> None:
 
 def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
     """Require force caps (N) within the device's maximum and, unless `beyond_hand_ceiling`, within those for a hand;
-    refuse `beyond_hand_ceiling` with a hand on the handle."""
+    refuse `beyond_hand_ceiling` with a hand on the handle. Raises `DeviceError`."""
     limits, exceeds_hand_ceiling = settings.limits, settings.beyond_hand_ceiling
     if exceeds_hand_ceiling and settings.hand_on_handle:
         raise _make_settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
@@ -173,23 +176,24 @@ def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
 
 
 def _check_within(name: str, value: float, max_value: float, *, allows_zero: bool = False) -> None:
-    """Require 0 < value <= max_value, or 0 <= value <= max_value where `allows_zero`; NaN is refused."""
+    """Require 0 < value <= max_value, or 0 <= value <= max_value where `allows_zero`. Raises `DeviceError`, also for
+    NaN."""
     if not (0 < value <= max_value or (allows_zero and value == 0)):
         allowed = "at least 0" if allows_zero else "above 0"
         raise _make_settings_error(f"{name} is {value:g}; it must be {allowed} and at most {max_value:g}.")
 
 
-def _make_settings_error(problem: str) -> DeviceError:
-    """Error for settings that are refused. problem: a sentence."""
+def _make_settings_error(problem_sentence: str) -> DeviceError:
+    """Make the error for settings that are refused. problem_sentence: with a full stop."""
     return DeviceError(
         "The device was not opened: its limits are not safe",
-        problem,
+        problem_sentence,
         "Correct the [safety] and [spring] sections of the protocol.",
     )
 
 
 def _make_refusal_error(reason: str) -> DeviceError:
-    """Error for a stimulus or commands that are refused. reason: a clause without a full stop."""
+    """Make the error for a stimulus or commands that are refused. reason: a clause without a full stop."""
     return DeviceError(
         "The device did not play this: it is not within the limits",
         f"Nothing has moved. The stimulus was refused because {reason}.",

@@ -80,8 +80,8 @@ class VirtualClock:
 
     @classmethod
     def resume_at(cls, utc: str) -> "VirtualClock":
-        """A virtual clock that starts at `utc` (ISO 8601), or at the present time if that is later. The time in the log
-        of a simulated session may be later than real time, and must not go back when the session is resumed."""
+        """Make a virtual clock that starts at `utc` (ISO 8601), or at the present time if that is later. The time in
+        the log of a simulated session may be later than real time, and must not go back when the session is resumed."""
         return cls(max(datetime.now(UTC), datetime.fromisoformat(utc)))
 
     def listen(self, listener: Callable[[float], None]) -> None:

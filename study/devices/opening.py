@@ -93,11 +93,11 @@ def open_device(
         from study.devices.loop_process.remote_device import open_remotely
 
         return open_remotely(name, settings, seed)
-    from study.devices.rigs_by_name import find_rig
+    from study.devices.rigs_by_name import build_rig
     from study.devices.safe import SafeDevice
     from study.devices.telemetry import Ring
 
-    rig = find_rig(name, settings, seed)
+    rig = build_rig(name, settings, seed)
     ring: Ring | None = None
     try:
         _check_acceptance(name, rig.info, settings)

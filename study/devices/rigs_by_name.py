@@ -9,7 +9,7 @@ from pathlib import Path
 
 from study.devices.device import CALIBRATED, REPLAY, DeviceSettings
 from study.devices.force_dimension.device_models import MODELS
-from study.devices.force_dimension.rigs import open_force_dimension_rig
+from study.devices.force_dimension.open_rig import open_force_dimension_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.parameters import Omega3Parameters
@@ -19,21 +19,22 @@ from study.store.formats.calibration_file import read_calibration
 
 
 def make_simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """The simulated omega.3. Raises `DeviceError` where `settings.place_m` is outside the workspace."""
+    """Make the simulated omega.3. Raises `DeviceError` where `settings.place_m` is outside the workspace."""
     return _build_simulated(settings, seed, friction=True)
 
 
 def make_frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """The simulated omega.3 without dry friction in its drives. Raises as `make_simulated_rig`."""
+    """Make the simulated omega.3 without dry friction in its drives. Raises `DeviceError` where `settings.place_m` is
+    outside the workspace."""
     return _build_simulated(settings, seed, friction=False)
 
 
 def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> CompiledRig:
-    """The simulated device with the linkage and the inertia of the calibration file `path`. Raises `StudyError` for a
-    file that cannot be used, `DeviceError` where no linkage of its kind fits."""
+    """Make the simulated device with the linkage and the inertia of the calibration file `path`. Raises `StudyError`
+    for a file that cannot be used, `DeviceError` where no linkage of its kind fits."""
     calibration = read_calibration(path)
     try:
-        fitted = fit_linkage(calibration)
+        fitted_linkage = fit_linkage(calibration)
     except ValueError as error:
         raise DeviceError(
             "The simulated device cannot be opened",
@@ -41,13 +42,13 @@ def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> Comp
             f"Use --device simulated, which needs no calibration; `hapteq validate {path}` says what the file "
             "contains.",
         ) from error
-    return _build_simulated(settings, seed, friction=True, parameters=fitted.parameters)
+    return _build_simulated(settings, seed, friction=True, parameters=fitted_linkage.parameters)
 
 
 def _build_simulated(
     settings: DeviceSettings, seed: int, friction: bool, parameters: Omega3Parameters | None = None
 ) -> CompiledRig:
-    """`build_omega3`, whose ValueError becomes a `DeviceError`."""
+    """Build the simulated device (`build_omega3`). Raises `DeviceError` for settings that it refuses."""
     try:
         return build_omega3(seed, settings.hand_on_handle, settings.place_m, friction, parameters)
     except ValueError as error:
@@ -57,7 +58,7 @@ def _build_simulated(
 
 
 def _make_real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
-    """The rig of a real device. `seed` is not used, because nothing in the driver is random."""
+    """Open the rig of a real device. `seed` is not used, because nothing in the driver is random."""
     return open_force_dimension_rig(name, settings)
 
 
@@ -69,9 +70,9 @@ RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
 """Builder of a rig from settings and seed, by device name; the same names as in `study.devices.opening`."""
 
 
-def find_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
+def build_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
     """Build the rig of a name in `RIGS_BY_NAME`, of a replay (`REPLAY` and a path) or of a calibrated simulation
-    (`CALIBRATED` and a path). Raises `StudyError`."""
+    (`CALIBRATED` and a path). Raises `StudyError` where it cannot be built, and KeyError for any other name."""
     if name.startswith(REPLAY):
         # Imported only here: the import loads compiled code, which other devices do not need.
         from study.devices.replay.replay_rig import make_replay_rig

@@ -18,7 +18,7 @@ from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, PlaybackResult
 from study.devices.drive.last_reading import make_look
 from study.devices.drive.realtime_drive import RealtimeDrive
-from study.devices.drive.recorded_run import record_commands, record_held_stimulus
+from study.devices.drive.recorded_run import make_commands_recording, make_stimulus_recording
 from study.devices.drive.runner import CompiledRunner, Runner
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
@@ -121,7 +121,7 @@ class SafeDevice:
         self._governor.request_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held_stimulus = None
-        result = record_held_stimulus(self._governor, self._info, self._own_clock_sensor)
+        result = make_stimulus_recording(self._governor, self._info, self._own_clock_sensor)
         return replace(result, health=self._add_failure_reason(result.health))
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
@@ -135,7 +135,7 @@ class SafeDevice:
             raise
         self._wait_until_still(0.0)
         self._require_connected()
-        return record_commands(self._governor, self._info, self._own_clock_sensor)
+        return make_commands_recording(self._governor, self._info, self._own_clock_sensor)
 
     def look(self) -> Look:
         """Wait for the loop's next reading, at most `realtime_drive.READING_TIMEOUT_S`."""

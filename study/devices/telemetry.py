@@ -27,12 +27,12 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 
 RING_ROWS = 16384
-"""Rows of a ring: 16 s at 1 kHz, for which a reader may pause and loses nothing."""
+"""Rows of a ring: 16 s at 1 kHz, for which a reader may pause and loses nothing. Chosen."""
 
 FORMAT_VERSION = 2.0
 """Version of the rows. In version 1 the checksum was the exclusive or of the cells' bits, which does not detect equal
 changes in two cells."""
-PREFIX, SUFFIX = "hapteq-", ".ring"
+RING_FILE_PREFIX, RING_FILE_SUFFIX = "hapteq-", ".ring"
 """Beginning and end of a ring's file name."""
 ROW_BYTES = 8 * cells.RING_WIDTH
 """Size of a row, of 64-bit floats."""
@@ -51,7 +51,7 @@ class Ring:
         if not path:
             _remove_abandoned_rings()
             with contextlib.suppress(OSError):
-                self._make(rows)
+                self._make_ring_file(rows)
 
     def map_rows(self, rate_hz: float) -> FloatArray | None:
         """Map the ring into memory for the loop, (1 + rows, RING_WIDTH), with every page present before the first tick
@@ -67,7 +67,7 @@ class Ring:
         return rows
 
     def remove(self) -> None:
-        """Remove the ring's file; a reader keeps what is in it. Never raises; may be called again."""
+        """Remove the ring's file; a reader that has mapped it can still read it. Never raises; may be called again."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             with contextlib.suppress(OSError):
@@ -76,10 +76,10 @@ class Ring:
                 Path(self.path).unlink()
             self.path = ""
 
-    def _make(self, rows: int) -> None:
+    def _make_ring_file(self, rows: int) -> None:
         """Make, lock and fill the ring's file; without memory for all rows, no ring is made."""
         # Kept open: as long as it is locked, the ring is in use.
-        self._descriptor, self.path = tempfile.mkstemp(SUFFIX, PREFIX, _choose_ring_folder())
+        self._descriptor, self.path = tempfile.mkstemp(RING_FILE_SUFFIX, RING_FILE_PREFIX, _choose_ring_folder())
         empty_rows = np.zeros((1 + rows, cells.RING_WIDTH))
         empty_rows[0, cells.RING_FORMAT] = FORMAT_VERSION
         try:
@@ -126,50 +126,50 @@ class TelemetryReader:
     def __init__(self, path: Path) -> None:
         try:
             self._rows = _map_rows(path, mmap.ACCESS_READ)
-        except (OSError, ValueError) as problem:
+        except (OSError, ValueError) as error:
             raise StudyError(
                 "The device's loop cannot be followed",
-                f"{path.name}: {problem}.",
+                f"{path.name}: {error}.",
                 "Begin the sitting anew; its recordings are written all the same.",
-            ) from problem
+            ) from error
         self.rate_hz = float(self._rows[0, cells.RING_RATE_HZ])
         self._next_row = int(self._rows[0, cells.RING_COUNT])
         self.lost = 0
         """Rows that were overwritten before they were read, since the beginning."""
 
     def read(self) -> Telemetry:
-        """The rows since the last call. Rows that were overwritten before are counted in `lost`."""
+        """Read the rows since the last call. Rows that were overwritten before are counted in `lost`."""
         ring_rows = len(self._rows) - 1
         end_row = int(self._rows[0, cells.RING_COUNT])
         first_row = max(self._next_row, end_row - ring_rows)
         row_numbers = np.arange(first_row, end_row)
         rows = self._rows[1 + row_numbers % ring_rows]  # a copy
-        intact = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == row_numbers)
-        # An inconsistent row was overwritten meanwhile, and is lost, or is being written, and is left to the next call.
-        unfinished_rows = row_numbers[~intact & (row_numbers > int(self._rows[0, cells.RING_COUNT]) - ring_rows)]
+        is_intact = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == row_numbers)
+        # An inconsistent row was overwritten meanwhile (it is lost), or is being written (the next call reads it).
+        unfinished_rows = row_numbers[~is_intact & (row_numbers > int(self._rows[0, cells.RING_COUNT]) - ring_rows)]
         if len(unfinished_rows):
             end_row = int(unfinished_rows[0])
-        readable = intact & (row_numbers < end_row)
-        self.lost += end_row - self._next_row - int(np.count_nonzero(readable))
+        is_readable = is_intact & (row_numbers < end_row)
+        self.lost += end_row - self._next_row - int(np.count_nonzero(is_readable))
         self._next_row = end_row
-        return _make_telemetry(rows[readable])
+        return _make_telemetry(rows[is_readable])
 
 
 def _is_consistent(rows: FloatArray) -> np.ndarray:
-    """Mask (n,) of the rows whose checksum is right: sum of (bits ^ (bits >> RING_FOLD)) RING_FACTORS over the cells,
+    """Whether the checksum of each row is right, (n,): sum of (bits ^ (bits >> RING_FOLD)) RING_FACTORS over the cells,
     modulo 2^64."""
-    bits = rows.view(np.int64)
-    checked_bits = bits[:, : cells.RING_CHECK]
+    row_bits = rows.view(np.int64)
+    checked_bits = row_bits[:, : cells.RING_CHECK]
     checksums = np.sum((checked_bits ^ (checked_bits >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
-    consistent: np.ndarray = checksums == bits[:, cells.RING_CHECK]
-    return consistent
+    is_consistent: np.ndarray = checksums == row_bits[:, cells.RING_CHECK]
+    return is_consistent
 
 
 def _make_telemetry(rows: FloatArray) -> Telemetry:
-    """Readings and forces of the rows (n, RING_WIDTH)."""
+    """Convert rows (n, RING_WIDTH) to readings and forces."""
 
     def select_vector(first_column: int) -> FloatArray:
-        """Three columns from this one on, (n, 3)."""
+        """Select three columns (n, 3), from `first_column` on."""
         return rows[:, first_column : first_column + 3]
 
     return Telemetry(
@@ -187,8 +187,8 @@ def _make_telemetry(rows: FloatArray) -> Telemetry:
 
 
 def _map_rows(path: Path, access: int) -> FloatArray:
-    """The file as an array (1 + rows, RING_WIDTH) in shared memory. Raises OSError, and ValueError for what is no
-    ring."""
+    """Map a ring's file into shared memory, as an array (1 + rows, RING_WIDTH). access: a mode of `mmap`. Raises
+    OSError, and ValueError for a file that is no ring of this version."""
     # Only regular files: opening a pipe for reading would wait for its writer.
     with open_regular(path) if access == mmap.ACCESS_READ else path.open("r+b") as file:
         memory = mmap.mmap(file.fileno(), 0, access=access)
@@ -201,13 +201,14 @@ def _map_rows(path: Path, access: int) -> FloatArray:
 
 
 def _choose_ring_folder() -> str:
-    """Folder of the rings: /dev/shm where it exists, else the folder for temporary files."""
+    """Return the folder of the rings: /dev/shm where it exists, else the folder for temporary files."""
     memory_folder = Path("/dev/shm")
     return str(memory_folder) if memory_folder.is_dir() else tempfile.gettempdir()
 
 
 def _lock_file(descriptor: int) -> bool:
-    """Lock the file. False where another program has the lock. Where the system has no such locks, always True."""
+    """Lock the file, and return whether it was locked: False where another program has the lock; always True on
+    Windows, which has no such locks."""
     if sys.platform == "win32":
         return True
     import fcntl
@@ -224,7 +225,7 @@ def _remove_abandoned_rings() -> None:
     no lock, they remain."""
     if sys.platform == "win32":
         return
-    for path in Path(_choose_ring_folder()).glob(f"{PREFIX}*{SUFFIX}"):
+    for path in Path(_choose_ring_folder()).glob(f"{RING_FILE_PREFIX}*{RING_FILE_SUFFIX}"):
         with contextlib.suppress(OSError):
             descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
             try:

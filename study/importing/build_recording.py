@@ -30,7 +30,7 @@ from study.importing.part_signals import ChannelKey, PartSignals, resample_part
 from study.importing.time_base import PLACEHOLDER_RATE_HZ, drop_doubled_rows, make_time_base
 
 _MAX_LISTED_PARTS = 3
-"""Most parts that a sentence names."""
+"""Most parts that a sentence names. Chosen."""
 
 
 class ImportNotes:
@@ -46,7 +46,7 @@ class ImportNotes:
             parts.append(part)
 
     def list_sentences(self, all_parts: Sequence[str]) -> tuple[str, ...]:
-        """All sentences; a sentence that does not hold for all parts begins with its parts. every_part: labels of all
+        """List all sentences; one that does not hold for all parts begins with its parts. all_parts: labels of all
         parts."""
         return tuple(
             sentence if len(parts) == len(all_parts) else f"{_abbreviate_list(parts)}: {sentence}"
@@ -54,10 +54,12 @@ class ImportNotes:
         )
 
 
-def _abbreviate_list(parts: Sequence[str]) -> str:
-    """The first parts, and the number of further ones."""
-    text = ", ".join(parts[:_MAX_LISTED_PARTS])
-    return text + (f" and {len(parts) - _MAX_LISTED_PARTS} more" if len(parts) > _MAX_LISTED_PARTS else "")
+def _abbreviate_list(part_labels: Sequence[str]) -> str:
+    """Join the first parts, and the number of further ones."""
+    listed_parts = ", ".join(part_labels[:_MAX_LISTED_PARTS])
+    return listed_parts + (
+        f" and {len(part_labels) - _MAX_LISTED_PARTS} more" if len(part_labels) > _MAX_LISTED_PARTS else ""
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,8 +82,8 @@ class _Part:
 def build_recording(
     import_map: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
 ) -> BuiltRecording:
-    """Read, align, resample and convert. on_progress: called with the fraction done, 0 to 1. Raises CannotReadError;
-    ImportRefusedError where map and files do not agree or the recording is invalid."""
+    """Build the recording: read, align, resample and convert. on_progress: called with the fraction done, 0 to 1.
+    Raises CannotReadError; ImportRefusedError where map and files do not agree or the recording is invalid."""
     subject = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
     import_notes = ImportNotes()
     try:
@@ -93,7 +95,7 @@ def build_recording(
         for number, part in enumerate(planned_parts):
             counter = _ProgressCounter(number * step_count / len(planned_parts), step_count, on_progress)
             parts.append(_build_part(import_map, part, import_notes, counter, budget))
-        recording, repeats = find_segments(_concatenate(import_map, parts, units))
+        recording, repetition_remark = find_segments(_concatenate(import_map, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(subject, str(error)) from error
     if problems := check_recording(recording):
@@ -101,22 +103,26 @@ def build_recording(
     notes = import_notes.list_sentences([part.label for part in planned_parts])
     return BuiltRecording(
         recording,
-        (*notes, *_list_unit_remarks(import_map), *filter(None, (_describe_rate_problem(recording), repeats))),
+        (
+            *notes,
+            *_list_unit_remarks(import_map),
+            *filter(None, (_describe_rate_problem(recording), repetition_remark)),
+        ),
     )
 
 
 class _ProgressCounter:
-    """Progress: channels done, out of those of all parts."""
+    """Progress of the import: number of finished channels (a fraction at the start of a part), out of all."""
 
-    def __init__(self, done: float, steps: int, on_progress: Callable[[float], None]) -> None:
-        self.done = done
-        self.steps = steps
+    def __init__(self, done_count: float, step_count: int, on_progress: Callable[[float], None]) -> None:
+        self.done_count = done_count
+        self.step_count = step_count
         self.on_progress = on_progress
 
     def step(self) -> None:
         """Count a channel as done, and report the fraction of all."""
-        self.done += 1
-        self.on_progress(min(1.0, self.done / self.steps))
+        self.done_count += 1
+        self.on_progress(min(1.0, self.done_count / self.step_count))
 
 
 def _build_part(
@@ -133,20 +139,20 @@ def _build_part(
         namespace = make_namespace(
             arrays_by_path[path], {**import_map.let, **files.part.let}, files.part.prefix, budget
         )
-        names, remark = drop_doubled_rows(clock, namespace)
+        reduced_namespace, remark = drop_doubled_rows(clock, namespace)
         notes += [remark] if remark else []
-        loggers.append(Logger(clock, names, make_time_base(clock, names)))
+        loggers.append(Logger(clock, reduced_namespace, make_time_base(clock, reduced_namespace)))
 
-    def report(sentence: str) -> None:
+    def report_sentence(sentence: str) -> None:
         import_notes.add(files.label, sentence)
 
     for note in dict.fromkeys((*(note for arrays in arrays_by_path.values() for note in arrays.notes), *notes)):
-        report(note)
-    aligned = align_signals(tuple(loggers), report)
-    signals = resample_part(import_map, files.part, aligned, report, counter.step)
-    numbers = {name: aligned[0].names.compute_number(text) for name, text in import_map.numbers.items()}
-    facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **numbers}
-    offsets = {logger.clock.name: logger.base.offset_s for logger in aligned[1:]}
+        report_sentence(note)
+    aligned_loggers = align_signals(tuple(loggers), report_sentence)
+    signals = resample_part(import_map, files.part, aligned_loggers, report_sentence, counter.step)
+    map_numbers = {name: aligned_loggers[0].namespace.compute_number(text) for name, text in import_map.numbers.items()}
+    facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **map_numbers}
+    offsets = {logger.clock.name: logger.base.offset_s for logger in aligned_loggers[1:]}
     return _Part(signals, {**facts, **({"clock_offsets_s": offsets} if offsets else {})})
 
 
@@ -161,7 +167,7 @@ class _ChannelUnit:
 
 
 def _parse_units(import_map: ImportMap) -> dict[ChannelKey, _ChannelUnit]:
-    """Units of all channels; helpers are not written and need none. Raises ImportProblemError."""
+    """Parse the units of all channels; helpers are not written and need none. Raises ImportProblemError."""
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
     return {
         (channel.role, channel.name): _parse_channel_unit(channel) for channel in channels if channel.role != "helper"
@@ -169,7 +175,7 @@ def _parse_units(import_map: ImportMap) -> dict[ChannelKey, _ChannelUnit]:
 
 
 def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
-    """Unit of one channel. Raises ImportProblemError where it is unknown or does not fit the quantity."""
+    """Parse the unit of one channel. Raises ImportProblemError where it is unknown or does not fit the quantity."""
     try:
         unit = parse_unit(channel.unit.strip() or UNSTATED)
         check_quantity(channel.quantity, unit)
@@ -179,7 +185,7 @@ def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
 
 
 def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
-    """Remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
+    """List remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
     for computed in (entry for entry in import_map.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
@@ -193,7 +199,7 @@ def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
 
 
 def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]) -> Recording:
-    """The recording of all parts, one after another. Raises ImportProblemError for different rates, or without command
+    """Concatenate the parts to one recording. Raises ImportProblemError for different rates, or without command
     or response."""
     _require_one_rate(parts)
     command = _join_signal("command", import_map, parts, units)
@@ -215,32 +221,33 @@ def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Chan
 
 
 def _describe_rate_problem(recording: Recording) -> str:
-    """A sentence on an implausible sample rate; empty for a plausible or unknown one."""
+    """Describe an implausible sample rate in a sentence; empty for a plausible or unknown one."""
     return "" if recording.meta.get("time") == "unknown" else describe_implausible_rate(recording.sample_rate_hz)
 
 
 def _describe_time_origin(import_map: ImportMap) -> dict[str, str]:
-    """Origin of the times, for the metadata: `unknown`, `stamps`, or nothing for a stated rate."""
+    """Describe the origin of the times, for the metadata: `unknown`, `stamps`, or nothing for a stated rate."""
     if any(clock.unknown for clock in import_map.clock):
         return {"time": "unknown"}
     return {"time": "stamps"} if import_map.clock[0].time else {}
 
 
 def _require_one_rate(parts: Sequence[_Part]) -> None:
-    """Raises ImportProblemError where parts have different sample rates."""
-    first = parts[0]
+    """Raise ImportProblemError where parts have different sample rates."""
+    first_part = parts[0]
     for part in parts[1:]:
-        if part.signals.grid.rate_hz != first.signals.grid.rate_hz:
+        if part.signals.grid.rate_hz != first_part.signals.grid.rate_hz:
             raise ImportProblemError(
-                f"{part.facts['file']} is at {part.signals.grid.rate_hz:g} Hz, but {first.facts['file']} at "
-                f"{first.signals.grid.rate_hz:g} Hz; state the rate_hz of the recording, and resample of each channel"
+                f"{part.facts['file']} is at {part.signals.grid.rate_hz:g} Hz, but {first_part.facts['file']} at "
+                f"{first_part.signals.grid.rate_hz:g} Hz; state the rate_hz of the recording, and resample of each "
+                "channel"
             )
 
 
 def _join_signal(
     role: str, import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]
 ) -> Signal | None:
-    """All channels of a role in SI units, with parts concatenated; None without a channel of the role."""
+    """Join all channels of a role in SI units, with parts concatenated; None without a channel of the role."""
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
     names = tuple(channel.name for channel in channels if channel.role == role)
     if not names:
@@ -262,8 +269,9 @@ def _join_signal(
 def _collect_facts_and_segments(
     import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]
 ) -> tuple[list[dict[str, Any]], tuple[Segment, ...]]:
-    """Facts of each part with its range of samples, and segments of all parts by samples of the recording. Amplitudes
-    are converted to SI where all commands have the same factor."""
+    """Collect the facts of each part with its range of samples, and the segments of all parts by samples of the
+    recording. Amplitudes are converted to SI. Raises ImportProblemError for an amplitude where commands have different
+    factors."""
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
     commands = [(channel.role, channel.name) for channel in channels if channel.role == "command"]
     factors = {units[key].factor for key in commands}
@@ -272,17 +280,17 @@ def _collect_facts_and_segments(
             "a segment states its amplitude, but the commands have units of different size; leave amplitude out, so "
             "that it is measured, or give the commands in SI units"
         )
-    scale = factors.pop() if len(factors) == 1 else 1.0
+    common_factor = factors.pop() if len(factors) == 1 else 1.0
     facts, segments, start = [], [], 0
     for part in parts:
         grid = part.signals.grid
         command: FloatArray = np.column_stack(
-            [part.signals.columns[key] * (units[key].factor / scale) for key in commands]
+            [part.signals.columns[key] * (units[key].factor / common_factor) for key in commands]
         )
         label = (str(part.facts["file"]), str(part.facts["prefix"]))
         for segment in place_segments(import_map.segment, label, command, grid.rate_hz):
-            shifted = replace(segment, start=segment.start + start, stop=segment.stop + start)
-            segments.append(replace(shifted, amplitude=segment.amplitude * scale))
+            shifted_segment = replace(segment, start=segment.start + start, stop=segment.stop + start)
+            segments.append(replace(shifted_segment, amplitude=segment.amplitude * common_factor))
         facts.append({**part.facts, "start": start, "stop": start + grid.count})
         start += grid.count
     return facts, tuple(segments)

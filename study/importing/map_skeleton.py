@@ -1,6 +1,6 @@
-"""Make an incomplete map for a file of which only the arrays are known, to be completed by the owner of the file.
+"""Make an incomplete import map for a file of which only the arrays are known, to be completed by the user.
 
-Clocks, channels and runs are proposed from names, units, shapes and data. What is not known is left empty or described
+Clocks, channels and runs are proposed from names, units, shapes and data. Unknown values are left empty or described
 in a comment. Called by `import_recording` and `map_library` where a map is missing.
 """
 
@@ -35,7 +35,7 @@ from study.importing.surplus_arrays import (
 _FORCE_QUANTITIES = ("force", "torque")
 """Quantities of forces: in rotation, torques."""
 _MAX_LISTED_RUNS = 4
-"""Most further runs that a comment of the skeleton names; dots stand for the rest."""
+"""Most further runs that a comment of the skeleton names; dots stand for the rest. Chosen."""
 _ROLE_SUFFIX = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
@@ -43,32 +43,32 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 
 
 def make_map_skeleton(arrays: Arrays) -> str:
-    """The map as TOML text. Unknown values are empty texts, which an import refuses with the name of the key."""
+    """Make the map as TOML text. Unknown values are empty texts, with which an import fails and names the key."""
     return "\n".join(_write_lines(arrays)) + "\n"
 
 
 def _write_lines(all_arrays: Arrays) -> Iterator[str]:
-    """Lines of the map: head, clocks, channels, parts, segment."""
+    """Write the lines of the map: head, clocks, channels, parts, segment."""
     groups = find_runs(all_arrays.by_name, LEAST_SAMPLES)
     ungrouped_names = _find_ungrouped_runs(all_arrays, groups)
     arrays = _select_first_run(all_arrays, groups, ungrouped_names)
-    surplus = find_surplus_arrays(arrays)
+    surplus_reasons = find_surplus_arrays(arrays)
     all_clocks = [
         name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)
     ]
-    clocks = [name for name in all_clocks if name not in surplus]
-    roles = _propose_array_roles(arrays, [*all_clocks, *surplus])
+    kept_clocks = [name for name in all_clocks if name not in surplus_reasons]
+    roles = _propose_array_roles(arrays, [*all_clocks, *surplus_reasons])
     yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
-    yield from _write_clocks(arrays, clocks)
+    yield from _write_clocks(arrays, kept_clocks)
     yield from _write_direction(roles)
     for name, array in arrays.by_name.items():
-        clock = _match_clock(name, arrays, all_clocks) if len(clocks) > 1 else ""
+        clock = _match_clock(name, arrays, all_clocks) if len(kept_clocks) > 1 else ""
         is_numeric = array.dtype.kind in "fiub" and array.size >= LEAST_SAMPLES
-        if name in surplus:
-            yield f"\n# {name} {surplus[name]}"
-        elif name in clocks:
+        if name in surplus_reasons:
+            yield f"\n# {name} {surplus_reasons[name]}"
+        elif name in kept_clocks:
             continue
         elif array.ndim == 1 and is_numeric:
             yield from _write_channel(
@@ -90,18 +90,19 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
 
 
 def _find_ungrouped_runs(all_arrays: Arrays, groups: RunGroups) -> list[str]:
-    """Arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not count."""
-    long_names = [
+    """Find the arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not
+    count."""
+    long_cell_arrays = [
         name
         for name, array in all_arrays.by_name.items()
         if CELL_ENTRY_PREFIX.match(name) and array.size >= LEAST_SAMPLES
     ]
-    return [name for name in long_names if not name.startswith(groups.prefixes)] if groups.prefixes else []
+    return [name for name in long_cell_arrays if not name.startswith(groups.prefixes)] if groups.prefixes else []
 
 
 def _select_first_run(all_arrays: Arrays, groups: RunGroups, ungrouped_names: Sequence[str]) -> Arrays:
-    """Arrays of the first of several runs and those that belong to no run, except `ungrouped`; the times of tables
-    [time, value ...] as separate arrays."""
+    """Select the arrays of the first of several runs and those that belong to no run, except `ungrouped_names`; the
+    times of tables [time, value ...] are added as separate arrays."""
     run_names = [name for name in all_arrays.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
     common_arrays = {
         name: array for name, array in all_arrays.by_name.items() if name not in (*run_names, *ungrouped_names)
@@ -119,14 +120,14 @@ def _select_first_run(all_arrays: Arrays, groups: RunGroups, ungrouped_names: Se
 
 
 def _match_clock(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
-    """The clock with the same number of samples whose name has the longest common prefix; of equal clocks, the one that
-    is kept. Empty without a clock of this length."""
+    """Find the clock with the same number of samples whose name has the longest common prefix; of equal clocks, the one
+    that is kept. Empty without a clock of this length."""
     matching_clocks = [
         clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)
     ]
 
     def count_common_letters(clock: str) -> int:
-        """Length of the common prefix of the clock's name and the array's."""
+        """Count the letters of the common prefix of the clock's name and the array's."""
         return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(name, clock, strict=False)))
 
     best_clock = max(matching_clocks, key=count_common_letters, default="")
@@ -134,16 +135,19 @@ def _match_clock(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
 
 
 def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
-    """A comment that says whether the force or the motion is taken for the command, where names leave it open."""
-    columns = [parse_signal_name(_strip_value_suffix(name)) for name in roles]
-    if may_be_imposed_motion(columns):
-        forces = [
-            roles[name] for name, column in zip(roles, columns, strict=True) if column.quantity in _FORCE_QUANTITIES
+    """Write a comment, in lines of up to 110 characters, that says whether the force or the motion is taken for the
+    command; nothing where the names determine it."""
+    parsed_names = [parse_signal_name(_strip_value_suffix(name)) for name in roles]
+    if may_be_imposed_motion(parsed_names):
+        force_roles = [
+            roles[name]
+            for name, parsed_name in zip(roles, parsed_names, strict=True)
+            if parsed_name.quantity in _FORCE_QUANTITIES
         ]
         yield from (
             "",
             *wrap(
-                IMPOSED_REMARK if "response" in forces else NOT_IMPOSED_REMARK,
+                IMPOSED_REMARK if "response" in force_roles else NOT_IMPOSED_REMARK,
                 110,
                 initial_indent="# ",
                 subsequent_indent="# ",
@@ -152,7 +156,7 @@ def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
 
 
 def _describe_excluded_array(name: str, array: Array) -> Iterator[str]:
-    """A comment on an array that is not a channel: invalid, without numbers, constant, or of more than two
+    """Describe, in a comment, an array that is not a channel: invalid, without numbers, constant, or of more than two
     dimensions."""
     reason = find_unread_reason(array)
     if isinstance(reason, FaultyColumn):
@@ -167,7 +171,7 @@ def _describe_excluded_array(name: str, array: Array) -> Iterator[str]:
 
 
 def _strip_value_suffix(name: str) -> str:
-    """Name without the ending under which Simulink stores the values of a signal: `force` for
+    """Strip the ending of a name under which Simulink stores the values of a signal: `force` for
     `force.signals.values`."""
     for suffix in (".signals.values", ".values", ".Data", ".data"):
         name = name.removesuffix(suffix)
@@ -175,24 +179,25 @@ def _strip_value_suffix(name: str) -> str:
 
 
 def _format_line_expression(name: str, array: Array, number: int) -> str:
-    """Expression for a row or column of a table: the line of this number along its longer side."""
+    """Format the expression for a row or column of a table: the line of this number, from 0, along its longer side."""
     return f"{quote_name(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote_name(name)}[:, {number}]"
 
 
 def _select_first_line(array: Array) -> Array:
-    """First row or column of a table, whichever is longer."""
+    """Select the first row or column of a table, whichever is longer; the column where both are equal."""
     return array[0] if array.shape[0] < array.shape[1] else array[:, 0]
 
 
 def _propose_array_roles(arrays: Arrays, excluded: list[str]) -> dict[str, str]:
-    """Roles by name, where names, units and data determine them. excluded: arrays that are not channels."""
+    """Propose roles by the name of the array, where names, units and data determine them. excluded: arrays that are not
+    channels."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in excluded]
     columns = [replace(parse_signal_name(_strip_value_suffix(name)), header=name) for name in channels]
     return dict(zip(channels, swap_imposed_roles(columns, arrays.by_name, propose_roles(columns)), strict=True))
 
 
 def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
-    """A [[part]] for each run."""
+    """Write a [[part]] for each run."""
     if prefixes:
         yield "\n# Several runs are in the file: their arrays are named without the prefix above."
     for prefix in prefixes:
@@ -201,7 +206,8 @@ def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
 
 
 def _write_ungrouped_runs(ungrouped_names: Sequence[str], groups: RunGroups) -> Iterator[str]:
-    """Comments on runs in cells of another length, and on how to add them where their names identify the arrays."""
+    """Write comments on runs in cells of another length, and on how to add them where their names identify the
+    arrays."""
     if ungrouped_names:
         names_text = ", ".join(ungrouped_names[:_MAX_LISTED_RUNS]) + (
             " ..." if ungrouped_names[_MAX_LISTED_RUNS:] else ""
@@ -219,7 +225,7 @@ def _write_ungrouped_runs(ungrouped_names: Sequence[str], groups: RunGroups) -> 
 
 
 def _write_clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
-    """A [[clock]] for each time column; without one, a clock with the rate of the file, or with a comment."""
+    """Write a [[clock]] for each time column; without one, a clock with the rate of the file, or with a comment."""
     for name in clocks:
         stem, unit = (
             split_bracketed_unit(name)
@@ -243,7 +249,8 @@ def _write_clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
 
 
 def _write_table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
-    """A channel per line of a table; a table [time, value] gives one channel, with the name and role of the table."""
+    """Write a channel per line of a table; a table [time, value] gives one channel, with the name and role of the
+    table."""
     has_time = has_time_line(array)
     for number in range(int(has_time), min(array.shape)):
         is_single = has_time and min(array.shape) == 2
@@ -257,20 +264,20 @@ def _write_table(name: str, array: Array, clock: str, role: str) -> Iterator[str
 
 
 def _write_channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
-    """A [[channel]]. names: of the channel, of its value (an expression), and of the array."""
+    """Write a [[channel]]. names: of the channel, of its value (an expression), and of the array."""
     name, value, header = names
-    parsed = parse_signal_name(header)
+    parsed_name = parse_signal_name(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
     yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
-    yield f"name = {json.dumps(parsed.name if name == header else name)}"
+    yield f"name = {json.dumps(parsed_name.name if name == header else name)}"
     yield f"value = {json.dumps(value)}"
-    unit, doubt = parsed.unit, f"{parsed.doubt}; " if parsed.doubt else ""
+    unit, doubt = parsed_name.unit, f"{parsed_name.doubt}; " if parsed_name.doubt else ""
     yield f'unit = {json.dumps(unit):20s} # {doubt}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
         yield f"clock = {json.dumps(clock)}"
 
 
 def _describe_shape(shape: tuple[int, ...]) -> str:
-    """Shape of an array in words."""
+    """Describe the shape of an array in words."""
     return f"{' x '.join(str(count) for count in shape)} samples" if shape else "one number"

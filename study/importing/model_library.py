@@ -1,5 +1,5 @@
-"""Find a mechanical model by name: a shipped model (`models/`) of a device of the shipped maps, or a file next to a
-map."""
+"""Find the file of a mechanical model by name: a file next to an import map, or a shipped model (`models/`) of a device
+of the shipped maps. Called by `study.evaluation.real.real_folder`."""
 
 from importlib.resources import files as resources
 from pathlib import Path
@@ -9,14 +9,14 @@ from study.importing.map_format.map_errors import suggest_name
 
 
 def list_shipped_models() -> tuple[str, ...]:
-    """Names of the models that come with hapteq, sorted."""
+    """List the names of the models that come with hapteq, sorted; without the ending .toml."""
     entries = resources("study.importing").joinpath("models").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
 
 
-def model_for(name: str, folder: Path) -> Path:
-    """Path of a model: a file in the folder of the map, otherwise a shipped model. Raises WrongUseError where neither
-    exists."""
+def find_model_path(name: str, folder: Path) -> Path:
+    """Find the path of a model: a file of this name in the folder of the map, otherwise a shipped model. Raises
+    WrongUseError where neither exists."""
     if (local_path := folder / name).is_file():
         return local_path
     if name in list_shipped_models():

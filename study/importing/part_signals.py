@@ -78,7 +78,7 @@ def resample_part(
         # Of several channels with the same name, the first is used.
         columns_by_name = {name: column for (_, name), column in reversed(columns.items())}
         columns[computed.role, computed.name] = _compute_channel(
-            computed.name, computed.value, columns_by_name, grid, loggers[0].names
+            computed.name, computed.value, columns_by_name, grid, loggers[0].namespace
         )
         on_channel()
     return PartSignals(grid, columns)
@@ -89,7 +89,7 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
     another shape or length, or infinite values."""
     subject = f"channel '{channel.name}'"
     try:
-        values = logger.names.compute_value(channel.value, logger.base)
+        values = logger.namespace.compute_value(channel.value, logger.base)
     except ImportProblemError as error:
         raise ImportProblemError(f"{subject}: {error}") from error
     if values.ndim > 1:
@@ -115,7 +115,7 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     first_clock = import_map.clock[0].name
     for channel in import_map.channel:
         if (channel.clock or first_clock) == logger.clock.name:
-            values = logger.names.compute_value(channel.value, logger.base)
+            values = logger.namespace.compute_value(channel.value, logger.base)
             if values.ndim == 1:
                 return len(values)
     return 0
@@ -131,7 +131,7 @@ def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...]
             f"clock '{uneven_loggers[0].clock.name}' has uneven stamps (steps of {steps_ms.min():.4g} to "
             f"{steps_ms.max():.4g} ms); state the rate_hz of the recording, and resample (held, band-limited, linear) "
             "of each channel: "
-            f"at the top of the map rate_hz = {uneven_loggers[0].base.fastest_hz:.4g}, under each [[channel]] "
+            f"at the top of the map rate_hz = {uneven_loggers[0].base.typical_rate_hz:.4g}, under each [[channel]] "
             f'resample = "linear". {_COMMAND_ADVICE}'
         )
     rate_hz = import_map.rate_hz or max(logger.base.rate_hz for logger in loggers)

@@ -21,16 +21,17 @@ from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.uniform_stamps import GRID_TOLERANCE, IntArray, find_decimal_unit, fit_uniform_rate
 
 _GAP_STEPS = 3
-"""A step longer than this many median steps is a gap, unless the map states `gap_s`."""
+"""A step longer than this many median steps is a gap, unless the map states `gap_s`. Chosen."""
 _HOUR_S = 3600.0
 """Step (s) of a clock that is set to summer time or back."""
 _COUNTER_LIMITS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
-"""Values at which counters of loggers wrap around to 0, in the unit of the file."""
+"""Values at which counters of loggers wrap around to 0, in the unit of the file: binary counters, and decimal ones
+such as the microseconds or nanoseconds of a second."""
 PLACEHOLDER_RATE_HZ = 1.0
 """Placeholder rate (Hz) of samples whose time is unknown."""
 MAX_SAMPLES = 10**8
 """Most samples of a recording (28 hours at 1 kHz). A wrong stamp would otherwise fill the memory with missing
-samples."""
+samples. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,13 +52,13 @@ class TimeBase:
     """Offset that is added to give the time of the reference clock (s)."""
 
     @property
-    def fastest_hz(self) -> float:
-        """The sample rate; for stamps that are not uniform, the rate of their median step (Hz)."""
+    def typical_rate_hz(self) -> float:
+        """The sample rate (Hz); for stamps that are not uniform, the rate of their median step."""
         return self.rate_hz or 1 / float(np.median(np.diff(self.times_s(0))))
 
     def times_s(self, count: int) -> Value:
-        """(count,) times by the clock of the logger (s). With stamps, `count` is ignored: there are as many times as
-        stamps."""
+        """Compute the times (count,) by the clock of the logger (s). With stamps, `count` is ignored: there are as many
+        times as stamps."""
         if self.stamps_s is None:
             return np.arange(count) / self.rate_hz
         if self.sample_index is not None:
@@ -66,8 +67,8 @@ class TimeBase:
         return self.stamps_s
 
     def describe_gaps(self) -> str:
-        """Sentence with the number of gaps in the stamps, and with the key that declares that nothing is missing; empty
-        without gaps."""
+        """Describe the number of gaps in the stamps, and the key that declares that nothing is missing, in a sentence;
+        empty without gaps."""
         steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
         gaps_s = steps_s[steps_s > self.gap_s]
         if not len(gaps_s):
@@ -80,8 +81,8 @@ class TimeBase:
         )
 
     def describe_wander(self) -> str:
-        """Sentence with the deviation of the stamps from the uniform grid that was fitted; empty where it is
-        negligible."""
+        """Describe the deviation of the stamps from the uniform grid that was fitted, in a sentence; empty where it is
+        within `GRID_TOLERANCE`."""
         if self.stamps_s is None or self.sample_index is None:
             return ""
         deviation_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
@@ -93,8 +94,8 @@ class TimeBase:
         )
 
     def make_samples(self, values: Value) -> Samples:
-        """The values (n,) with their times by the reference clock. Rows that a uniform logger skipped become NaN,
-        unless the map says that there are no gaps."""
+        """Make samples from the values (n,) and their times by the reference clock. Rows that a uniform logger skipped
+        become NaN, unless the map says that there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
         longest_step_s = 0.0 if self.sample_index is None else float(np.max(np.diff(self.sample_index))) / self.rate_hz
         if (
@@ -112,31 +113,32 @@ class TimeBase:
         )
 
 
-def make_time_base(clock: ClockMap, names: Namespace) -> TimeBase:
-    """Time base of a clock of the map, without its offset to other clocks. names: the arrays of the file. Raises
-    ImportProblemError where the rate is not positive or the stamps are unusable."""
+def make_time_base(clock: ClockMap, namespace: Namespace) -> TimeBase:
+    """Make the time base of a clock of the map, without its offset to other clocks. namespace: the arrays of the file.
+    Raises ImportProblemError where the rate is not positive or the stamps are unusable."""
     if clock.time:
-        return _make_base_from_stamps(clock, names)
-    rate_hz = PLACEHOLDER_RATE_HZ if clock.unknown else clock.rate_hz or names.compute_number(clock.rate)
+        return _make_base_from_stamps(clock, namespace)
+    rate_hz = PLACEHOLDER_RATE_HZ if clock.unknown else clock.rate_hz or namespace.compute_number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
     return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)
 
 
-def _make_base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
-    """Time base from time stamps. Raises ImportProblemError."""
+def _make_base_from_stamps(clock: ClockMap, namespace: Namespace) -> TimeBase:
+    """Make the time base from time stamps. Raises ImportProblemError where their unit, shape, values or number of
+    samples are unusable."""
     try:
         unit = parse_unit(clock.time_unit)
     except UnknownUnitError as error:
         raise ImportProblemError(f"clock '{clock.name}': time_unit: {error}") from error
     if unit.si != "s":
         raise ImportProblemError(f"clock '{clock.name}': time_unit is '{clock.time_unit}', which is no unit of time")
-    stamps_s: Value = names.compute_value(clock.time, NoTime()) * unit.factor
+    stamps_s: Value = namespace.compute_value(clock.time, NoTime()) * unit.factor
     if stamps_s.ndim != 1 or len(stamps_s) < 2:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} has the shape {stamps_s.shape}; stamps are one row of two or more"
         )
-    if problem := _find_stamp_problem(stamps_s, _as_expression(clock.time, names), unit.factor):
+    if problem := _find_stamp_problem(stamps_s, _format_stamps_expression(clock.time, namespace), unit.factor):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
     rate_hz, sample_index = fit_uniform_rate(stamps_s, find_decimal_unit(stamps_s / unit.factor) * unit.factor)
     if sample_index is not None and sample_index[-1] >= MAX_SAMPLES:
@@ -154,16 +156,16 @@ def _make_base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
     return TimeBase(clock.name, rate_hz, stamps_s, sample_index, gap_s)
 
 
-def _as_expression(array_name: str, names: Namespace) -> str:
-    """The stamps as an expression that a map can contain: the name of an array that is no identifier is written as
-    array('…')."""
-    return f"array('{array_name}')" if array_name in names.arrays and not array_name.isidentifier() else array_name
+def _format_stamps_expression(array_name: str, namespace: Namespace) -> str:
+    """Format the stamps as an expression that a map can contain: the name of an array that is no identifier is written
+    as array('…')."""
+    return f"array('{array_name}')" if array_name in namespace.arrays and not array_name.isidentifier() else array_name
 
 
 def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) -> str:
-    """Problem with the stamps (n,) and the key of the map that corrects it, as a clause after the name of the stamps;
-    empty if they are finite and increase without a jump of an hour. time_expression: expression of the stamps; unit_s:
-    their unit (s)."""
+    """Find the problem with the stamps (n,) and the key of the map that corrects it, as a clause after the name of the
+    stamps; empty if they are finite and increase without a jump of an hour. time_expression: expression of the stamps;
+    unit_s: their unit (s)."""
     if not np.isfinite(stamps_s).all():
         return f"is no number at sample {int(np.argmax(~np.isfinite(stamps_s)))}; time is never missing"
     steps_s = np.diff(stamps_s)
@@ -182,10 +184,8 @@ def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) ->
             )
         if abs(backward_s - _HOUR_S) > _HOUR_S / 60:
             return f"{problem}; put the rows in order, or cut the file there into several, which are imported together"
-        expression = f"{time_expression} + {_HOUR_S / unit_s:g} * cumsum(diff({time_expression}) < 0)"
-        return (
-            f'{problem}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{expression}"'
-        )
+        remedy = f"{time_expression} + {_HOUR_S / unit_s:g} * cumsum(diff({time_expression}) < 0)"
+        return f'{problem}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{remedy}"'
     if (steps_s == 0).any():
         row = int(np.argmax(steps_s == 0)) + 1
         rate_hz = (len(stamps_s) - 1) / float(np.ptp(stamps_s)) if np.ptp(stamps_s) else 1000.0
@@ -197,36 +197,38 @@ def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) ->
     hour_steps = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
     if len(hour_steps) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:
         is_jump_text = f"diff({time_expression}) > {steps_s[hour_steps[0]] / 2 / unit_s:.4g}"
-        expression = f"{time_expression} - {_HOUR_S / unit_s:g} * cumsum({is_jump_text})"
+        remedy = f"{time_expression} - {_HOUR_S / unit_s:g} * cumsum({is_jump_text})"
         return (
             f"jumps ahead by an hour at sample {hour_steps[0] + 1}, as a clock that is set to summer time; the map's "
-            f'[[clock]] mends it: time = "{expression}"'
+            f'[[clock]] mends it: time = "{remedy}"'
         )
     return ""
 
 
-def drop_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:
+def drop_doubled_rows(clock: ClockMap, namespace: Namespace) -> tuple[Namespace, str]:
     """Remove rows that repeat the row above, with the same stamp. Returns the arrays without them, and a sentence with
     their number, empty where nothing is removed: without stamps, without repeated ones, or if any row with a repeated
-    stamp has other values (row counters aside) than the row above. Raises ImportProblemError."""
+    stamp has other values (row counters aside) than the row above. Raises ImportProblemError where the expression of
+    the stamps cannot be computed."""
     if not clock.time:
-        return names, ""
-    stamps: Value = names.compute_value(clock.time, NoTime())
+        return namespace, ""
+    stamps: Value = namespace.compute_value(clock.time, NoTime())
     if stamps.ndim != 1 or len(stamps) < 2:
-        return names, ""
+        return namespace, ""
     repeated_rows = np.flatnonzero(stamps[1:] == stamps[:-1]) + 1
     row_arrays = [
-        array for array in names.arrays.values() if _has_row_count(array, len(stamps)) and not _is_counter(array)
+        array for array in namespace.arrays.values() if _has_row_count(array, len(stamps)) and not _is_counter(array)
     ]
     if not len(repeated_rows) or not all(_is_repeated(array, repeated_rows) for array in row_arrays):
-        return names, ""
+        return namespace, ""
     kept_rows = np.delete(np.arange(len(stamps)), repeated_rows)
-    arrays = {
-        name: array[kept_rows] if _has_row_count(array, len(stamps)) else array for name, array in names.arrays.items()
+    kept_arrays = {
+        name: array[kept_rows] if _has_row_count(array, len(stamps)) else array
+        for name, array in namespace.arrays.items()
     }
     rows_text = f"{len(repeated_rows)} row{'s' if len(repeated_rows) > 1 else ''}"
     remark = f"Clock '{clock.name}': {rows_text} logged twice (the same stamp, the same values) left out."
-    return replace(names, arrays=arrays), remark
+    return replace(namespace, arrays=kept_arrays), remark
 
 
 def _is_repeated(array: Array, rows: npt.NDArray[np.intp]) -> bool:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from study.importing.expressions.functions import Value
 
 IntArray = npt.NDArray[np.int64]
+"""Array of 64-bit integers."""
 
 GRID_TOLERANCE = 0.02
 """Tolerance for uniform stamps: largest deviation from the grid, as a fraction of a step. Set by hand."""
@@ -19,16 +20,17 @@ MAX_SKIPPED_SHARE = 0.02
 by hand."""
 _MAX_DECIMALS = 6
 """Largest number of decimals of a time stamp that are looked for, in the unit of the file: a microsecond where that is
-the second."""
+the second. Chosen."""
 _BINARY_TOLERANCE = 1e-3
 """Tolerance, in units of the last decimal, for the rounding of binary numbers: a small difference of large stamps is
-not an exact decimal."""
+not an exact decimal. Chosen."""
 _ROUNDED_DIGITS = (4, 5, 6)
-"""Significant digits to which a rate is rounded before it is tried as the exact one, the fewest first."""
+"""Significant digits to which a rate is rounded before it is tried as the exact one, the fewest first. Chosen."""
 
 
 def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
-    """Rate (Hz) and sample index of each stamp (n,); 0 and None for stamps that are not uniform.
+    """Fit the rate (Hz) and the sample index of each stamp (n,); 0 and None for stamps that are not uniform. The stamps
+    must increase.
 
     Two estimates are tried: the mean rate, which is right where no row is missing, and the rate of the median step,
     which is right where some are. Each is first rounded to a few digits (1000 for 1000.0003). unit_s: unit of the last
@@ -41,15 +43,20 @@ def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | 
         for rate_hz in (*(float(f"{estimate_hz:.{digits}g}") for digits in _ROUNDED_DIGITS), estimate_hz):
             sample_index = np.round(elapsed_s * rate_hz).astype(np.int64)
             deviation = np.max(np.abs(elapsed_s * rate_hz - sample_index))
-            steps = np.diff(sample_index)
-            if deviation <= GRID_TOLERANCE and (steps >= 1).all() and np.mean(steps > 1) <= MAX_SKIPPED_SHARE:
+            index_steps = np.diff(sample_index)
+            if (
+                deviation <= GRID_TOLERANCE
+                and (index_steps >= 1).all()
+                and np.mean(index_steps > 1) <= MAX_SKIPPED_SHARE
+            ):
                 return rate_hz, sample_index
     rate_hz = _estimate_rounded_rate(elapsed_s, unit_s)
     return rate_hz, np.arange(len(stamps_s)) if rate_hz else None
 
 
 def _estimate_rounded_rate(elapsed_s: Value, unit_s: float) -> float:
-    """Rate (Hz) of stamps without a gap that are uniform apart from rounding to their last decimal place; else 0.
+    """Estimate the rate (Hz) of stamps without a gap that are uniform apart from rounding to their last decimal place;
+    else 0. elapsed_s: (n,), time since the first stamp.
 
     Rounding moves a stamp by at most half a unit of that place, so deviations from the grid must lie within one unit.
     Among rates whose deviations are nearly as small as those of the mean rate, that with the fewest digits is taken.
@@ -77,8 +84,8 @@ def _estimate_rounded_rate(elapsed_s: Value, unit_s: float) -> float:
 
 
 def _has_skipped_rows(decimal_steps: Value) -> bool:
-    """Whether rows were skipped: all steps are multiples of the shortest, and no more of them are longer than
-    `MAX_SKIPPED_SHARE` allows, plus three standard deviations of a Poisson count and one. decimal_steps: (n - 1,),
+    """Whether rows may have been skipped: all steps are multiples of the shortest (or equal), and no more are longer
+    than `MAX_SKIPPED_SHARE` allows, plus three standard deviations of a Poisson count and one. decimal_steps: (n - 1,),
     steps in units of the last decimal."""
     expected_count = MAX_SKIPPED_SHARE * len(decimal_steps)
     skipped_count = np.count_nonzero(decimal_steps > decimal_steps.min())
@@ -91,7 +98,7 @@ def find_decimal_unit(stamps: Value) -> float:
     """Find the unit of the last decimal place of the stamps, such as 0.001, in their unit; 0 with more than
     `_MAX_DECIMALS` decimals."""
     for digits in range(_MAX_DECIMALS + 1):
-        scaled = stamps * 10**digits
-        if (np.abs(scaled - np.round(scaled)) <= _BINARY_TOLERANCE).all():
+        scaled_stamps = stamps * 10**digits
+        if (np.abs(scaled_stamps - np.round(scaled_stamps)) <= _BINARY_TOLERANCE).all():
             return float(10**-digits)
     return 0.0

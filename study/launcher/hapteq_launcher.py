@@ -14,7 +14,7 @@ PACKAGES = ("study", "analysis", "equalizer", "protocols")
 
 
 def find_home_folder() -> Path | None:
-    """The first folder on the import path that contains all four packages; None without such a folder."""
+    """Find the first folder on the import path that contains all four packages; None without such a folder."""
     for entry in sys.path:
         folder = Path(entry or ".").resolve()
         if all((folder / name / "__init__.py").is_file() for name in PACKAGES):
@@ -23,7 +23,7 @@ def find_home_folder() -> Path | None:
 
 
 def find_foreign_packages() -> list[Path]:
-    """Files that would be imported under the name of one of the packages without belonging to hapteq."""
+    """Find the files that would be imported under the name of one of the packages without belonging to hapteq."""
     home_folder = find_home_folder()
     foreign_paths = []
     for name in PACKAGES:
@@ -35,7 +35,8 @@ def find_foreign_packages() -> list[Path]:
 
 
 def main() -> int:
-    """Run the command line of hapteq. Returns its exit code; 1 where foreign packages hide its own."""
+    """Run the command line of hapteq. Returns its exit code; 1 where files of another program would be
+    imported in place of a package of hapteq."""
     foreign_paths = find_foreign_packages()
     if foreign_paths:
         paths_text = ", ".join(str(path) for path in foreign_paths)

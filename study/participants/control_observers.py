@@ -1,4 +1,4 @@
-"""Simulated participants whose answers do not depend on the sensation: controls that an analysis must recognise as
+"""Simulated participants whose answers do not depend on the felt stimulus: controls that an analysis must recognise as
 such, and a participant with scripted answers. `observer_catalogue` makes them."""
 
 from dataclasses import dataclass
@@ -37,6 +37,7 @@ class ConstantObserver:
 
     name: str
     answer: int
+    """The answer, 1 or 2."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """Give the same answer to every stimulus."""

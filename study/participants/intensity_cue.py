@@ -30,31 +30,34 @@ class IntensityCue:
 
     name: str
     difference_db: float = 3.0
-    """Delivered level of the direction with the number 1 on the screen, relative to the other direction (dB)."""
+    """Delivered level of the direction with the number 1 on the screen, relative to the other direction (dB). An
+    assumption."""
     noise_db: float = 1.0
-    """Standard deviation of one judgement of strength (dB); about the difference limen of vibration."""
+    """Standard deviation of one judgement of strength (dB). An assumption: of the size of the difference limen of
+    vibration."""
     detection_n: float = 0.1
     """Threshold of detection, and level at which the noise has grown by the square root of two (N)."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """Answer (1 or 2) and response time (s) for one presentation."""
+        """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
-        d_prime_at_level = detection.compute_d_prime if felt.phase is Phase.DETECTION else self.compute_d_prime
+        detection_curve = WeibullCurve(self.detection_n, DETECTION_SLOPE)
+        compute_d_prime_at = detection_curve.compute_d_prime if felt.phase is Phase.DETECTION else self.compute_d_prime
         probability_of_1 = NormalDist().cdf(
-            sign * d_prime_at_level(felt.level_n) / 2 + self._compute_rove_deviation(felt)
+            sign * compute_d_prime_at(felt.level_n) / 2 + self._compute_rove_deviation(felt)
         )
         return Reply(1 if choice_draw < probability_of_1 else 2, draw_response_time_s(time_draw))
 
     def _compute_rove_deviation(self, felt: PerceivedStimulus) -> float:
-        """Change of the felt strength by roving, in standard deviations; 0 without roving and in detection trials."""
+        """Compute the change of the felt strength by roving, in standard deviations; 0 without roving and in detection
+        trials."""
         if felt.nominal_n is None or felt.phase is Phase.DETECTION:
             return 0.0
         return 20.0 * math.log10(felt.level_n / felt.nominal_n) / self._compute_noise_db(felt.level_n)
 
     def _compute_noise_db(self, level_n: float) -> float:
-        """Standard deviation of the felt strength at this level (dB)."""
+        """Compute the standard deviation of the felt strength at this level, which is above 0 (dB)."""
         return self.noise_db * math.hypot(1.0, self.detection_n / level_n)
 
     def compute_d_prime(self, level_n: float) -> float:

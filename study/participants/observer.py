@@ -1,14 +1,14 @@
 """Interface of simulated participants: the perceived stimulus, the reply to it, and the protocol `Observer`.
 
 All other modules of this package implement or build an `Observer`; `study.workflows.session.simulated_participant`
-asks it.
+calls `reply`.
 """
 
 from dataclasses import dataclass
 from typing import Protocol
 
 from protocols.trial import Phase
-from study.session.stimulus.delivered import Delivered
+from study.session.stimulus.delivered import DeliveredMotion
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +20,7 @@ class PerceivedStimulus:
     trial: int
     attempt: int
     phase: Phase
+    """Kind of the trial; the alternatives are directions, or intervals in `Phase.DETECTION`."""
     frequency_hz: float
     level_n: float
     """Level (N): amplitude of the commanded force; with an equalizer, see `study.session.facts.level_scale`."""
@@ -30,7 +31,7 @@ class PerceivedStimulus:
     """Number of trials answered so far in this session, training included."""
     nominal_n: float | None = None
     """Level of the staircase (N), where `level_n` was roved around it."""
-    delivered: Delivered | None = None
+    delivered: DeliveredMotion | None = None
     """The stimulus as delivered by the device; None where it was not felt or not measured."""
 
 
@@ -55,5 +56,5 @@ class Observer(Protocol):
         """The name by which `--observer` selects this participant."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The reply to this stimulus. seed: of the session; together with the place of the stimulus in the session it
+        """Reply to this stimulus. seed: of the session; together with run, trial and attempt of the stimulus it
         determines all random draws."""

@@ -47,10 +47,13 @@ _MEMBER_NAME = re.compile(rf"(?P<kind>{'|'.join(MEMBER_KINDS)})_(?P<number>[1-9]
 
 def find_observer(name: str, seed: int) -> Observer:
     """Find the simulated participant of this name, with hyphens or underscores. seed: of the population of which
-    "person" is the first member; unused for other names. Raises WrongUseError for an unknown name."""
+    "person" is the first member; unused for other names. Raises WrongUseError for an unknown name.
+
+    The numbers of the participants below are chosen; units and meanings are those of the fields of `DirectionFeeler`.
+    """
     observer_name = name.replace("-", "_")
-    if match := _MEMBER_NAME.fullmatch(observer_name):
-        return make_member(match["kind"], int(match["number"]), int(match["seed"]))
+    if member_match := _MEMBER_NAME.fullmatch(observer_name):
+        return make_member(member_match["kind"], int(member_match["number"]), int(member_match["seed"]))
     typical_observer = DirectionFeeler(observer_name, TYPICAL_THRESHOLDS_N)
     observers: dict[str, Observer] = {
         "ideal": typical_observer,

@@ -29,9 +29,10 @@ DETECTION_SD_DB = 2.5
 participant, independent of the direction thresholds."""
 
 
-def draw_population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
-    """Participants 1 to n of the population of this seed. Each depends on its number and the seed only, not on n."""
-    return tuple(draw_person(number, seed) for number in range(1, n + 1))
+def draw_population(count: int, seed: int) -> tuple[DirectionFeeler, ...]:
+    """Draw participants 1 to `count` of the population of this seed. Each depends on its number and the seed only, not
+    on `count`."""
+    return tuple(draw_person(number, seed) for number in range(1, count + 1))
 
 
 MEMBER_KINDS = ("person", "delivered", "repeating", "criterion_drift")
@@ -43,8 +44,8 @@ of the evidence): in a session of 350 trials the criterion moves by about 1."""
 
 
 def make_member(kind: str, number: int, seed: int) -> DirectionFeeler | DeliveredFeeler | UnsureRepeater:
-    """Participant `number` (from 1) of the population of this seed, as a `kind` of `MEMBER_KINDS`; the thresholds are
-    the same for all kinds. The name contains number and seed. Raises ValueError for another kind."""
+    """Make participant `number` (from 1) of the population of this seed, as a `kind` of `MEMBER_KINDS`; the thresholds
+    are the same for all kinds. The name contains number and seed. Raises ValueError for another kind."""
     feeler, name = draw_person(number, seed), f"{kind}_{number}_seed_{seed}"
     match kind:
         case "person":
@@ -60,11 +61,11 @@ def make_member(kind: str, number: int, seed: int) -> DirectionFeeler | Delivere
 
 
 def draw_person(number: int, seed: int) -> DirectionFeeler:
-    """Participant `number` (from 1) of the population of this seed. The name contains both numbers, so that the
+    """Draw participant `number` (from 1) of the population of this seed. The name contains both numbers, so that the
     participant can be recreated from a log."""
-    rng = np.random.default_rng([seed, number])
-    person_db = rng.normal(0.0, PERSON_SD_DB)
-    offsets_db = person_db + rng.normal(0.0, FREQUENCY_SD_DB, len(TYPICAL_THRESHOLDS_N))
+    random = np.random.default_rng([seed, number])
+    person_db = random.normal(0.0, PERSON_SD_DB)
+    offsets_db = person_db + random.normal(0.0, FREQUENCY_SD_DB, len(TYPICAL_THRESHOLDS_N))
     return DirectionFeeler(
         name=f"person_{number}_seed_{seed}",
         thresholds_n=tuple(
@@ -72,12 +73,12 @@ def draw_person(number: int, seed: int) -> DirectionFeeler:
             for (frequency_hz, threshold_n), offset_db in zip(TYPICAL_THRESHOLDS_N, offsets_db, strict=True)
         ),
         # Slope: log-normal, median 2. Lapse rate: Beta(1, 60), mean 1/61. Criterion: normal. Drift: half-normal.
-        slope=float(np.exp(rng.normal(np.log(2.0), 0.25))),
-        lapse=float(rng.beta(1.0, 60.0)),
-        criterion=-float(rng.normal(0.0, 0.15)),
-        drift_db_per_100_trials=float(abs(rng.normal(0.0, 0.2))),
+        slope=float(np.exp(random.normal(np.log(2.0), 0.25))),
+        lapse=float(random.beta(1.0, 60.0)),
+        criterion=-float(random.normal(0.0, 0.15)),
+        drift_db_per_100_trials=float(abs(random.normal(0.0, 0.2))),
         # Drawn last, so that the participants of older studies stay the same.
-        detection_n=_shift_thresholds(TYPICAL_DETECTION_N, rng.normal(0.0, DETECTION_SD_DB)),
+        detection_n=_shift_thresholds(TYPICAL_DETECTION_N, random.normal(0.0, DETECTION_SD_DB)),
     )
 
 
@@ -85,4 +86,6 @@ def _shift_thresholds(
     thresholds_n: tuple[tuple[float, float], ...], offset_db: float
 ) -> tuple[tuple[float, float], ...]:
     """Multiply all levels of thresholds (Hz, N) by 10^(offset_db / 20)."""
-    return tuple((frequency_hz, float(n * 10.0 ** (offset_db / 20.0))) for frequency_hz, n in thresholds_n)
+    return tuple(
+        (frequency_hz, float(threshold_n * 10.0 ** (offset_db / 20.0))) for frequency_hz, threshold_n in thresholds_n
+    )

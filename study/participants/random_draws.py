@@ -31,5 +31,5 @@ def draw_uniform(stimulus: PerceivedStimulus, seed: int, count: int) -> tuple[fl
 
 
 def draw_response_time_s(uniform_draw: float) -> float:
-    """Log-normal response time (s). uniform_draw: uniform in (0, 1)."""
+    """Convert a number that is uniform in (0, 1) to a log-normal response time (s)."""
     return _MEDIAN_RESPONSE_S * math.exp(_LOG_RESPONSE_SD * NormalDist().inv_cdf(uniform_draw))

@@ -1,5 +1,5 @@
-"""Dismiss a screen with its reply exactly once, even if two keys that dismiss it arrive together. Every screen uses
-this function instead of `Screen.dismiss`."""
+"""Dismiss a screen with its reply exactly once, even if two keys that dismiss it arrive together. The screens of
+`study.tui.screens` call this function instead of `Screen.dismiss`."""
 
 from __future__ import annotations
 

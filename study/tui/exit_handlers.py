@@ -29,6 +29,7 @@ def install_exit_handlers(app: App[Any], on_exit: Callable[[], None]) -> None:
     event loop; signals are handled only in the main thread."""
 
     def begin_exit() -> None:
+        """Start the timer of the forced exit, and call `on_exit`."""
         forced_exit = threading.Timer(FORCED_EXIT_DELAY_S, os._exit, (ExitCode.INTERRUPTED,))
         forced_exit.daemon = True
         forced_exit.start()

@@ -1,7 +1,7 @@
 """Status of a session in the list of past sessions: a symbol with a word, and a sentence.
 
-Symbol and word differ between states, so that the status can be read without seeing colour. Used by the
-screens of sessions and by `hapteq sessions`.
+Symbol and word differ between states, so that the status can be read without seeing colour. Called by the screens
+`home` and `session`, the table of sessions (`session_table`), `hapteq sessions` and `hapteq show`.
 """
 
 from study.session.views.archive_views import INELIGIBILITY_REASONS, SessionLine, SessionStatus
@@ -26,7 +26,7 @@ STYLES: dict[SessionStatus, str] = {
     "withdrawn": "$foreground 65%",
     "unreadable": "$text-error",
 }
-"""Style of symbol and word for each status, in Textual's notation."""
+"""Style of symbol and word for each status, as a Textual style with theme variables."""
 
 
 def format_status(status: SessionStatus) -> str:
@@ -34,35 +34,38 @@ def format_status(status: SessionStatus) -> str:
     return f"{SYMBOLS[status]} {status}"
 
 
-def describe_session(line: SessionLine) -> str:
-    """Describe a session of the list in one or two sentences, and what can be done with it."""
-    match line.standing:
+def describe_session(session: SessionLine) -> str:
+    """Describe the status of a session of the list in one or two sentences; for an unfinished or running session, also
+    what can be done with it."""
+    match session.standing:
         case "finished":
             return (
-                f"{_format_session_name(line)} finished all {_format_run_count(line.runs)} "
-                f"with {_format_answer_count(line)}."
+                f"{_format_session_name(session)} finished all {_format_run_count(session.runs)} "
+                f"with {_format_answer_count(session)}."
             )
         case "unfinished":
-            progress_text = f"{line.runs_done} of {_format_run_count(line.runs)} done, {_format_answer_count(line)}"
-            return f"{_format_session_name(line)} is not finished: {progress_text}. It can be resumed."
+            progress_text = (
+                f"{session.runs_done} of {_format_run_count(session.runs)} done, {_format_answer_count(session)}"
+            )
+            return f"{_format_session_name(session)} is not finished: {progress_text}. It can be resumed."
         case "running":
-            return f"{_format_session_name(line)} is running now in another program. You can watch it."
+            return f"{_format_session_name(session)} is running now in another program. You can watch it."
         case "refused" | "excluded":
-            return f"{line.name} is over: {INELIGIBILITY_REASONS[line.standing]}. The person does not take part."
+            return f"{session.name} is over: {INELIGIBILITY_REASONS[session.standing]}. The person does not take part."
         case "withdrawn":
-            return f"{line.subject}: {line.remark or 'the participant withdrew; the data were erased.'}"
+            return f"{session.subject}: {session.remark or 'the participant withdrew; the data were erased.'}"
         case "unreadable":
-            return f"{line.name} cannot be read. {line.remark}".rstrip()
+            return f"{session.name} cannot be read. {session.remark}".rstrip()
 
 
-def _format_session_name(line: SessionLine) -> str:
+def _format_session_name(session: SessionLine) -> str:
     """Format the name of a session, with its simulated participant if it has one."""
-    return f"{line.name}{f' (simulated: {line.observer})' if line.observer else ''}"
+    return f"{session.name}{f' (simulated: {session.observer})' if session.observer else ''}"
 
 
-def _format_answer_count(line: SessionLine) -> str:
+def _format_answer_count(session: SessionLine) -> str:
     """Format the number of answers with its noun."""
-    return f"{line.answers} answer{'' if line.answers == 1 else 's'}"
+    return f"{session.answers} answer{'' if session.answers == 1 else 's'}"
 
 
 def _format_run_count(run_count: int) -> str:

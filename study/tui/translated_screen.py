@@ -1,4 +1,5 @@
-"""Base class of the participant's screens: texts, footer and help in the language of the protocol."""
+"""Base class of the participant's screens (`study.tui.screens`): texts, footer and help in the language of the
+protocol."""
 
 from dataclasses import replace
 from typing import ClassVar, TypeVar
@@ -9,11 +10,12 @@ from textual.screen import Screen
 from protocols.wording.words import ENGLISH_WORDS, Words
 
 Reply = TypeVar("Reply")
+"""Type of the result that a screen returns when it is dismissed."""
 
 
 class TranslatedScreen(Screen[Reply]):
-    """A screen with the texts `words`. Descriptions and key names of its bindings are written in English in the code
-    and translated when the footer reads them."""
+    """Screen with texts in the language of `words`. Descriptions and key names of its bindings are written in English
+    in the code and translated when the footer reads them."""
 
     PAGE: ClassVar[str] = ""
     """Key of the screen's help page in the words."""
@@ -29,13 +31,16 @@ class TranslatedScreen(Screen[Reply]):
 
     @property
     def active_bindings(self) -> dict[str, ActiveBinding]:
-        return {key: self._in_words(active) for key, active in super().active_bindings.items()}
+        """Bindings that are active now, by key, with translated descriptions."""
+        return {key: self._translate_binding(active_binding) for key, active_binding in super().active_bindings.items()}
 
-    def _in_words(self, active: ActiveBinding) -> ActiveBinding:
-        binding, key_display = active.binding, active.binding.key_display
+    def _translate_binding(self, active_binding: ActiveBinding) -> ActiveBinding:
+        """Translate the description and the displayed name of the key of a binding; without such a name, it stays
+        empty."""
+        binding, key_display = active_binding.binding, active_binding.binding.key_display
         translated = replace(
             binding,
             description=self.words.translate_key(binding.description),
             key_display=key_display and self.words.translate_key(key_display),
         )
-        return active._replace(binding=translated)
+        return active_binding._replace(binding=translated)

@@ -20,7 +20,7 @@ TIME_OVER = Unanswered("no answer within the time limit", ends_sitting=False, ca
 
 def format_repeat_text(repeats_left: int | None, words: Words = ENGLISH_WORDS) -> str:
     """Format the confirmation of a request to repeat a trial, with the number of further requests. repeats_left: number
-    of allowed requests, this one included; None: no limit."""
+    of allowed requests, this one included, at least 1 (the callers refuse a request at 0); None: no limit."""
     if repeats_left is None:
         return words["repeat_new"]
     return words["repeat_last"] if repeats_left == 1 else words.fill_count("repeat", repeats_left - 1)

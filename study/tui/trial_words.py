@@ -1,4 +1,5 @@
-"""Texts for the participant, for line mode and screens, in the language of the protocol (`Words`).
+"""Texts for the participant in the language of the protocol (`Words`). Called by the line mode (`study.tui.line_mode`)
+and the screens (`study.tui.screens`).
 
 Heading and progress of a trial, outline of a sitting, void trials, exclusion, forms. The progress is stated in runs and
 counts, which do not reveal levels.
@@ -9,7 +10,7 @@ from typing import Literal
 from protocols.trial import Phase
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_UNRESPONSIVE, is_computer_busy
-from study.session.views.form_views import Form, Limits
+from study.session.views.form_views import Form, NumberLimits
 from study.session.views.participant_views import DemoMenu, Progress, Question, Task, Welcome
 
 
@@ -17,7 +18,7 @@ def format_heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
     """Format the heading of a trial: kind and number of its run, number of the trial, and whether it is presented
     again."""
     heading_values = {
-        "run": words[choose_run_text(question)],
+        "run": words[choose_run_key(question)],
         "number": question.run_number,
         "runs": question.runs_in_phase,
         "trial": question.trial_number,
@@ -25,7 +26,7 @@ def format_heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
     return words.fill("heading_again" if question.repeated else "heading", heading_values)
 
 
-def choose_run_text(question: Question) -> str:
+def choose_run_key(question: Question) -> str:
     """Choose the key (in `Words`) of the text that names the kind of run: practice, interval, training or test."""
     if question.practice:
         return "run_practice"
@@ -35,7 +36,8 @@ def choose_run_text(question: Question) -> str:
 
 
 def describe_progress(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
-    """Describe the share of the session that is done (%), and the minutes left where they are known."""
+    """Describe the share of the session that is done, rounded to whole percent, and the minutes left where they are
+    known."""
     share_percent, minutes_left = round(100 * progress.share_done), progress.minutes_left
     if minutes_left is None:
         return words.fill("done", {"share": share_percent})
@@ -44,11 +46,11 @@ def describe_progress(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
     )
 
 
-def describe_plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
+def describe_plan(welcome: Welcome, words: Words = ENGLISH_WORDS) -> str:
     """Describe the sitting: its number of runs, and whether training is among them; without runs, training only."""
-    if not notice.runs:
+    if not welcome.runs:
         return words["plan_training"]
-    return words.fill_count("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
+    return words.fill_count("plan_training_runs" if welcome.training_runs else "plan_runs", welcome.runs)
 
 
 def describe_felt_directions(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
@@ -57,12 +59,13 @@ def describe_felt_directions(menu: DemoMenu, vibration: int, words: Words = ENGL
     felt_numbers = [str(number) for number in (1, 2) if (vibration, number) in menu.played_pairs]
     if not felt_numbers:
         return words["demo_none"]
-    both_numbers = words.fill("demo_and", {"first": felt_numbers[0], "second": felt_numbers[-1]})
-    return words.fill("demo_felt", {"numbers": both_numbers if len(felt_numbers) == 2 else felt_numbers[0]})
+    joined_numbers = words.fill("demo_and", {"first": felt_numbers[0], "second": felt_numbers[-1]})
+    return words.fill("demo_felt", {"numbers": joined_numbers if len(felt_numbers) == 2 else felt_numbers[0]})
 
 
 def describe_void_trial(reason: str, words: Words = ENGLISH_WORDS) -> str:
-    """Describe to the participant why a trial was void. reason: as in the session log."""
+    """Describe to the participant why a trial was void. reason: as in the session log; a reason without a text for the
+    participant is stated itself, translated where `words` has a translation."""
     if is_computer_busy(reason):
         return words["void_busy"]
     if reason == SCREEN_UNRESPONSIVE:
@@ -73,7 +76,8 @@ def describe_void_trial(reason: str, words: Words = ENGLISH_WORDS) -> str:
 
 
 def describe_refusal(outcome: Literal["refused", "excluded"], words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
-    """Choose the last text for a person who does not take part, and a sentence on which data are kept."""
+    """Describe the end of a session for a person who does not take part: the last text, and a sentence on which data
+    are kept."""
     return words[outcome], words[f"{outcome}_kept"]
 
 
@@ -84,6 +88,6 @@ def describe_form_origin(form: Form, words: Words = ENGLISH_WORDS) -> str:
     return " ".join(filter(None, (version_text, ethics_text)))
 
 
-def describe_number_limits(limits: Limits, words: Words = ENGLISH_WORDS) -> str:
+def describe_number_limits(limits: NumberLimits, words: Words = ENGLISH_WORDS) -> str:
     """Describe the range of the numbers that a field of a form accepts."""
     return words.fill("form_number", {"lowest": f"{limits.lowest:g}", "highest": f"{limits.highest:g}"})

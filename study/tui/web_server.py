@@ -21,17 +21,18 @@ from rich.console import Console
 from textual_serve.server import Server
 
 RELOAD_TIMEOUT_S = 10.0
-"""Longest time (s) for which a reloaded page waits until the application of the previous page has ended."""
+"""Longest time (s) for which a reloaded page waits until the application of the previous page has ended. Chosen: longer
+than the end of an application usually takes; after it, another window is assumed to be open."""
 
 LOCAL_HOST_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """Names by which a browser may address this machine."""
 TOKEN_BYTES = 32
-"""Number of random bytes of the token, too many to guess."""
+"""Number of random bytes of the token: 256 bits, too many to guess."""
 
 
 class ScreenServer(Server):
     """Starts `command` for the page, at most once at a time. Closing the page ends it, as closing a terminal would.
-    host, port: where to listen; print_line: prints a line for the user."""
+    host, port: address to listen on; print_line: prints a line for the user."""
 
     def __init__(self, command: Sequence[str], host: str, port: int, print_line: Callable[[str], None]) -> None:
         super().__init__(
@@ -87,7 +88,7 @@ class ScreenServer(Server):
             self._downloads_in_progress.discard(key)
 
     async def _make_app(self) -> web.Application:
-        """The web application: page, WebSocket and resources below the path /TOKEN, downloads below /download."""
+        """Make the web application: page, WebSocket and resources below the path /TOKEN, downloads below /download."""
         app = web.Application(middlewares=[self._require_token])
         app.on_response_prepare.append(self._add_headers)
         app.router.add_get("/download/{key}", self.handle_download, allow_head=False)
@@ -100,10 +101,10 @@ class ScreenServer(Server):
     ) -> web.StreamResponse:
         """Refuse every request without the token in the same way (404), so that existing and unknown addresses cannot
         be distinguished. The comparison takes constant time."""
-        first_part = request.path.split("/")[1]
-        if first_part == "download" and await self._is_offered(request.path.rpartition("/")[2]):
+        first_path_part = request.path.split("/")[1]
+        if first_path_part == "download" and await self._is_offered(request.path.rpartition("/")[2]):
             return await handler(request)
-        if not hmac.compare_digest(first_part.encode("utf-8", "replace"), self._token.encode()):
+        if not hmac.compare_digest(first_path_part.encode("utf-8", "replace"), self._token.encode()):
             raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
         if request.path == f"/{self._token}":
             raise web.HTTPFound(f"/{self._token}/")

@@ -1,7 +1,7 @@
 """Execution of work on the workers of a dask cluster, by the `Executor` interface that local processes also have.
 
 Each worker imports its own installation of hapteq. All must have the same version, because other code could give other
-numbers. `study.cli` opens the executor where the option --scheduler is given.
+numbers. `hapteq power` and `study.cli.scheduler` open the executor where the option --scheduler is given.
 """
 
 import threading
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from distributed import Client
 
 SCHEDULER_TIMEOUT_S = 10.0
-"""Timeout in seconds for the scheduler to answer."""
+"""Longest wait (s) for an answer of the scheduler (chosen)."""
 WORKER_TIMEOUT_S = 60.0
-"""Longest time in seconds that work waits while the scheduler has no worker or does not answer; either may be
-restarting."""
+"""Longest time (s) that work waits while the scheduler has no worker or does not answer. Chosen: long enough for either
+to restart."""
 POLL_INTERVAL_S = 1.0
-"""Interval in seconds at which the workers are counted."""
-RESULTS_KEPT = "What was finished is kept."
+"""Interval (s) at which the workers are counted (chosen: short beside `WORKER_TIMEOUT_S`)."""
+RESULTS_KEPT_TEXT = "What was finished is kept."
 """Sentence on what was saved, for errors after the work began."""
 INSTALL_COMMAND = "pip install 'hapteq[cluster]'"
 """Command that installs dask with its scheduler."""
@@ -47,22 +47,22 @@ def open_cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[
         from distributed import Client, KilledWorker
         from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
-    except ImportError as missing:
+    except ImportError as import_error:
         raise StudyError(
             "There is no access to a cluster",
             "The package distributed is not installed.",
             f"Install it: {INSTALL_COMMAND}. On this computer alone, use --workers.",
             saved="Nothing was begun.",
-        ) from missing
+        ) from import_error
     try:
         client = Client(address, timeout=SCHEDULER_TIMEOUT_S, set_as_default=False)
-    except (OSError, ValueError) as problem:
+    except (OSError, ValueError) as error:
         raise StudyError(
             "The scheduler does not answer",
-            f"At {address}: {str(problem) or type(problem).__name__}.",
+            f"At {address}: {str(error) or type(error).__name__}.",
             "Start it with: dask scheduler. Then give the address that it prints.",
             saved="Nothing was begun.",
-        ) from problem
+        ) from error
     # A recording is sent to its worker as a value; distributed warns against such large arguments.
     with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 GB"}):
         _require_workers(client, address, one_thread)
@@ -70,14 +70,14 @@ def open_cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[
         try:
             with _open_executor(client) as executor, _watch_workers(client, executor, address, causes):
                 yield executor
-        except (KilledWorker, ClosedClientError, CommClosedError, CancelledError) as problem:
-            raise causes[0] if causes else _make_lost_work_error(problem) from problem
-        except (RuntimeError, TypeError, ValueError) as problem:
+        except (KilledWorker, ClosedClientError, CommClosedError, CancelledError) as error:
+            raise causes[0] if causes else _make_lost_work_error(error) from error
+        except (RuntimeError, TypeError, ValueError) as error:
             # A future that was lost with its scheduler has no result, on which distributed's executor fails; an
             # executor that `_watch_workers` cancelled refuses further tasks. Both are errors of the cluster.
             if client.status == "running" and not causes:
                 raise
-            raise causes[0] if causes else _make_lost_work_error(problem) from problem
+            raise causes[0] if causes else _make_lost_work_error(error) from error
 
 
 @contextmanager
@@ -117,16 +117,16 @@ def _watch_workers(client: "Client", executor: Executor, address: str, causes: l
 def _await_loss(
     client: "Client", executor: Executor, address: str, causes: list[StudyError], stop_event: threading.Event
 ) -> None:
-    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or they are lost; runs in the thread of
-    `_watch_workers`."""
+    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or they were lost for `WORKER_TIMEOUT_S`;
+    then append the cause to `causes` and cancel all tasks. Runs in the thread of `_watch_workers`."""
     last_seen_s = time.monotonic()
     while not stop_event.wait(POLL_INTERVAL_S):
-        workers, problem = _count_workers(client)
+        workers, error = _count_workers(client)
         if workers:
             last_seen_s = time.monotonic()
         elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not stop_event.is_set():
             causes.append(
-                _make_no_workers_error(address) if problem is None else _make_silent_scheduler_error(address, problem)
+                _make_no_workers_error(address) if error is None else _make_silent_scheduler_error(address, error)
             )
             _cancel_tasks(executor)
             return
@@ -136,8 +136,8 @@ def _count_workers(client: "Client") -> tuple[int, Exception | None]:
     """Count the scheduler's workers; 0 and the error where it does not answer within `SCHEDULER_TIMEOUT_S`."""
     try:
         return len(client.nthreads(callback_timeout=SCHEDULER_TIMEOUT_S)), None
-    except Exception as problem:  # noqa: BLE001 — distributed has many for a lost scheduler, and none may end the watch
-        return 0, problem
+    except Exception as error:  # noqa: BLE001 — distributed has many for a lost scheduler, and none may end the watch
+        return 0, error
 
 
 def _make_no_workers_error(address: str) -> StudyError:
@@ -146,29 +146,29 @@ def _make_no_workers_error(address: str) -> StudyError:
         "The cluster has no workers any more",
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
         f"Start some: dask worker {address}. Then run the same command again: it continues where it stopped.",
-        saved=RESULTS_KEPT,
+        saved=RESULTS_KEPT_TEXT,
     )
 
 
-def _make_silent_scheduler_error(address: str, problem: Exception) -> StudyError:
+def _make_silent_scheduler_error(address: str, error: Exception) -> StudyError:
     """Make the error for a scheduler that did not answer for `WORKER_TIMEOUT_S`."""
     return StudyError(
         "The scheduler does not answer any more",
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} named no worker. When last asked: "
-        f"{type(problem).__name__}: {problem}".rstrip(" :.")
+        f"{type(error).__name__}: {error}".rstrip(" :.")
         + ".",
         "Look at the scheduler and the network, then run the same command again: it continues where it stopped.",
-        saved=RESULTS_KEPT,
+        saved=RESULTS_KEPT_TEXT,
     )
 
 
-def _make_lost_work_error(problem: BaseException) -> StudyError:
+def _make_lost_work_error(error: BaseException) -> StudyError:
     """Make the error for tasks that were lost with a worker or the scheduler."""
     return StudyError(
         "The cluster did not do this",
-        f"{type(problem).__name__}: {problem}.",
+        f"{type(error).__name__}: {error}.",
         "Look at the scheduler and its workers, then run the same command again: it continues where it stopped.",
-        saved=RESULTS_KEPT,
+        saved=RESULTS_KEPT_TEXT,
     )
 
 
@@ -210,25 +210,25 @@ def _request_setup_in_time(client: "Client", address: str) -> _WorkerSetup:
         """Store the setup of the workers, or the exception, in the future."""
         try:
             setup_future.set_result(_request_worker_setup(client))
-        except BaseException as problem:  # noqa: BLE001 — raised where the result is waited for
-            setup_future.set_exception(problem)
+        except BaseException as error:  # noqa: BLE001 — raised where the result is waited for
+            setup_future.set_exception(error)
 
     threading.Thread(target=store_answer, daemon=True).start()
     try:
         return setup_future.result(timeout=WORKER_TIMEOUT_S)
-    except TimeoutError as problem:
+    except TimeoutError as error:
         if setup_future.done():  # the TimeoutError was raised by `_request_worker_setup` itself, before the time limit
             raise _make_unusable_cluster_error(
                 f"The scheduler at {address} was reached, and asking its workers failed: "
-                f"{str(problem) or type(problem).__name__}.",
+                f"{str(error) or type(error).__name__}.",
                 "Look at the scheduler, its workers and the network, then run the same command again.",
-            ) from problem
+            ) from error
         raise StudyError(
             "The cluster does not answer",
             f"The scheduler at {address} was reached, but it or a worker said nothing more for {WORKER_TIMEOUT_S:g} s.",
             "Look at the scheduler, its workers and the network, then run the same command again.",
             saved="Nothing was begun.",
-        ) from problem
+        ) from error
 
 
 def _require_workers(client: "Client", address: str, one_thread: bool) -> None:

@@ -1,4 +1,5 @@
-"""`map` over forked processes, for work in Python code, where threads would wait for the global interpreter lock.
+"""Parallel `map` over forked processes, for work in Python code, where threads would wait for the global interpreter
+lock.
 
 `map_forked` is used by the diagnosis workflows, `study.evaluation.real` and `picture_files`. A forked process inherits
 all data; results return through a pipe. The worker processes and the calling process take tasks one after another from
@@ -22,14 +23,16 @@ from time import perf_counter, process_time
 from types import CodeType
 from typing import Any, TypeVar
 
-from equalizer.effects.effect import Effect, effects_by_address
+from equalizer.effects.effect import Effect, list_effects_by_address
 
 Result = TypeVar("Result")
 """Type of the result of a task."""
 MIN_FORKED_WORK_S = 0.1
-"""Shortest expected duration (s) of the work that is shared among processes; forking alone takes a fifth of it."""
+"""Shortest expected duration (s) of the work that is shared among processes; forking alone takes a fifth of it.
+Chosen."""
 _TOKEN_BYTES, _MAX_TOKENS = 4, 8192
-"""Bytes of a token; largest number of tokens written to the pipe, which they must not fill."""
+"""Bytes of a token; largest number of tokens written to the pipe, which they must not fill: 32 KiB of the 64 KiB of a
+pipe of Linux."""
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals whose handlers may raise an exception at any point of the program."""
 _mean_task_s: dict[CodeType | type, float] = {}
@@ -43,22 +46,23 @@ _serial_context: list[bool] = []
 
 
 def measure_processor_s() -> float:
-    """Processor time (s) used so far by this process, its ended children, and its parents before the fork."""
+    """Measure the processor time (s) used so far by this process, its ended children, and its parents before the
+    fork."""
     ended_children = os.times()
     return _inherited_processor_s[0] + process_time() + ended_children.children_user + ended_children.children_system
 
 
 def count_cores() -> int:
-    """Number of processors that this process may use."""
+    """Count the processors that this process may use; 1 where the system does not state it."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: int | None = None) -> list[Result]:
-    """Parallel `map` in forked processes, with results in the order of the items. items: iterables of equal length, the
-    arguments of `function`. workers: number of processes including this one; None = `count_cores()`. An exception of
-    `function` is raised here; no process is left running."""
+    """Map in parallel in forked processes, with results in the order of the items. items: iterables of equal length,
+    the arguments of `function`. workers: number of processes including this one; None = `count_cores()`. An exception
+    of `function` is raised here; no process is left running."""
     tasks = list(zip(*items, strict=True))
     process_count = min(len(tasks), workers or count_cores())
     function_key = _identify_function(function)
@@ -79,7 +83,7 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 @contextmanager
 def without_forking() -> Iterator[None]:
-    """Context in which nothing is forked, for processes that already share the processors with others. The results are
+    """Disable forking within this context, for processes that already share the processors with others. The results are
     the same."""
     _serial_context.append(True)
     try:
@@ -95,15 +99,15 @@ class _SharedTasks:
     def __init__(self, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> None:
         """Write the tokens to the pipe. tasks: arguments of each call of `function`."""
         self._function, self._tasks = function, tasks
-        self._known_effects = effects_by_address()
+        self._known_effects = list_effects_by_address()
         self._stride = -(-len(tasks) // _MAX_TOKENS)
-        self._tokens, write_end = os.pipe()
+        self._token_pipe, write_end = os.pipe()
         for first_index in range(0, len(tasks), self._stride):
             os.write(write_end, first_index.to_bytes(_TOKEN_BYTES, "little"))
         os.close(write_end)
 
     def run_with_workers(self, worker_count: int) -> list[Any]:
-        """All results, in the order of the tasks, computed by this process and `worker_count` forked ones. On any
+        """Compute all results, in the order of the tasks, by this process and `worker_count` forked ones. On any
         exception the forked processes are killed."""
         children: list[tuple[int, int]] = []
         try:
@@ -112,12 +116,12 @@ class _SharedTasks:
             with without_forking():
                 results_by_task = self._run_tasks(guarded=False)
             while children:
-                results_by_task.update(_receive(children[0][1], self._known_effects))
+                results_by_task.update(_receive_results(children[0][1], self._known_effects))
                 with _block_signals():
                     _reap_child(*children.pop(0))
         finally:
             with _block_signals():
-                os.close(self._tokens)
+                os.close(self._token_pipe)
                 for process_id, read_end in children:
                     with suppress(ProcessLookupError):
                         os.kill(process_id, signal.SIGKILL)
@@ -125,8 +129,8 @@ class _SharedTasks:
         return self._order_results(results_by_task)
 
     def _order_results(self, results_by_task: dict[int, tuple[Any, Exception | None]]) -> list[Any]:
-        """The results in the order of the tasks; tasks without a result are computed here. Raises the error of the
-        first task that failed."""
+        """Order the results by their tasks; tasks without a result are computed here. Raises the error of the first
+        task that failed."""
         results = []
         for index, task in enumerate(self._tasks):
             if index not in results_by_task:
@@ -170,15 +174,15 @@ class _SharedTasks:
         return True
 
     def _run_child(self, write_end: int, parent_id: int, parent_processor_s: float) -> None:
-        """In the child: take tasks and write their results to the pipe. write_end: its descriptor. parent_id: process
-        id of the parent. parent_processor_s: processor time (s) used before the fork."""
+        """Run in the child process: take tasks and write their results to the pipe. write_end: its descriptor.
+        parent_id: process id of the parent. parent_processor_s: processor time (s) used before the fork."""
         # A terminal sends Ctrl-C to all processes; the child ignores it, and its parent ends it.
         for signal_number in _SIGNALS:
             signal.signal(signal_number, signal.SIG_IGN if signal_number == signal.SIGINT else signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
         _serial_context.append(True)
         _inherited_processor_s[0] = parent_processor_s
-        packed_results = _pack(self._run_tasks(guarded=True, parent_id=parent_id), self._known_effects)
+        packed_results = _pack_results(self._run_tasks(guarded=True, parent_id=parent_id), self._known_effects)
         with os.fdopen(write_end, "wb") as pipe:
             pipe.write(packed_results)
 
@@ -188,7 +192,7 @@ class _SharedTasks:
         Not guarded: an error is raised."""
         results_by_task: dict[int, tuple[Any, Exception | None]] = {}
         start_s = perf_counter()
-        while token := os.read(self._tokens, _TOKEN_BYTES):
+        while token := os.read(self._token_pipe, _TOKEN_BYTES):
             first_index = int.from_bytes(token, "little")
             for index in range(first_index, min(first_index + self._stride, len(self._tasks))):
                 if guarded and os.getppid() != parent_id:
@@ -207,7 +211,7 @@ class _SharedTasks:
 
 @contextmanager
 def _block_signals() -> Iterator[None]:
-    """Context in which `_SIGNALS` are blocked; they are delivered after it."""
+    """Block `_SIGNALS` within this context; they are delivered after it."""
     previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
         yield
@@ -223,8 +227,8 @@ def _reap_child(process_id: int, read_end: int) -> None:
 
 
 def _identify_function(function: Callable[..., Any]) -> CodeType | type:
-    """Key of a function in `_mean_task_s` and `_unforkable`: its code object or class, the same for closures and
-    partial functions that are created anew for each map."""
+    """Identify a function by its key in `_mean_task_s` and `_unforkable`: its code object or class, the same for
+    closures and partial functions that are created anew for each map."""
     unwrapped = unwrap(function)
     while isinstance(unwrapped, partial):
         unwrapped = unwrap(unwrapped.func)
@@ -240,7 +244,7 @@ class _Pickler(pickle.Pickler):
         self._known_effects = known_effects
 
     def persistent_id(self, obj: object) -> int | None:
-        """Address of an effect; None for any other object, which is pickled as usual."""
+        """Return the address of an effect; None for any other object, which is pickled as usual."""
         if not isinstance(obj, Effect):
             return None
         if id(obj) not in self._known_effects:
@@ -256,34 +260,36 @@ class _Unpickler(pickle.Unpickler):
         self._known_effects = known_effects
 
     def persistent_load(self, pid: int) -> Effect:
-        """The effect with the address `pid`."""
+        """Return the effect with the address `pid`."""
         return self._known_effects[pid]
 
 
-def _pack(results_by_task: dict[int, tuple[Any, Exception | None]], known_effects: Mapping[int, Effect]) -> bytes:
-    """Results of a child as bytes, each pickled separately. Results that cannot be pickled are omitted; the parent
-    computes them again."""
+def _pack_results(
+    results_by_task: dict[int, tuple[Any, Exception | None]], known_effects: Mapping[int, Effect]
+) -> bytes:
+    """Pack the results of a child as bytes, each pickled separately. Results that cannot be pickled are omitted; the
+    parent computes them again."""
     packed_results = io.BytesIO()
-    for index, outcome in results_by_task.items():
+    for index, result_and_error in results_by_task.items():
         buffer = io.BytesIO()
         try:
-            _Pickler(buffer, known_effects).dump((index, outcome))
+            _Pickler(buffer, known_effects).dump((index, result_and_error))
         except (pickle.PicklingError, TypeError, AttributeError, ValueError):
             continue
         packed_results.write(buffer.getbuffer())
     return packed_results.getvalue()
 
 
-def _receive(read_end: int, known_effects: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
-    """Results of a child, by the index of the task, up to the first that is incomplete. read_end: descriptor of its
-    pipe."""
+def _receive_results(read_end: int, known_effects: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
+    """Receive the results of a child, by the index of the task, up to the first that is incomplete. read_end:
+    descriptor of its pipe."""
     with os.fdopen(read_end, "rb", closefd=False) as pipe:
-        received = io.BytesIO(pipe.read())
+        received_bytes = io.BytesIO(pipe.read())
     results_by_task: dict[int, tuple[Any, Exception | None]] = {}
-    while received.tell() < len(received.getbuffer()):
+    while received_bytes.tell() < len(received_bytes.getbuffer()):
         try:
-            index, outcome = _Unpickler(received, known_effects).load()
+            index, result_and_error = _Unpickler(received_bytes, known_effects).load()
         except (pickle.UnpicklingError, EOFError):
             break
-        results_by_task[index] = outcome
+        results_by_task[index] = result_and_error
     return results_by_task

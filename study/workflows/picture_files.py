@@ -59,8 +59,8 @@ def write_drawn_pictures(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -
     file cannot be written."""
     try:
         make_folder(folder)
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem
+    except OSError as error:
+        raise CannotWriteError(folder, error) from error
     for drawn_picture in drawn_pictures:
         write_text(
             folder / f"{drawn_picture.picture.name}.svg", render_picture_svg(drawn_picture.picture), overwrite=True

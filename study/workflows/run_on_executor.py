@@ -19,7 +19,7 @@ Key = TypeVar("Key")
 Result = TypeVar("Result")
 """Type of the result of a task."""
 MAX_IN_FLIGHT = 100
-"""Largest number of tasks in flight. Chosen: bounds the memory for arguments and results."""
+"""Largest number of tasks in flight by default. Chosen: bounds the memory for arguments and results."""
 _FREED_BYTES = 30 * 2**20
 """Size of the block that `keep_freed_memory` allocates and frees (bytes): below 32 MiB, the largest size to which glibc
 adapts its thresholds (DEFAULT_MMAP_THRESHOLD_MAX on 64-bit systems)."""
@@ -45,9 +45,12 @@ def run_tasks(
                 keys_in_flight[executor.submit(_run_in_worker, tuple(sys.argv), function, arguments)] = key
             if not keys_in_flight:
                 return
-            done = wait(keys_in_flight, return_when=FIRST_COMPLETED).done
+            finished_futures = wait(keys_in_flight, return_when=FIRST_COMPLETED).done
             # Results before errors: an error ends the iteration, and results that finished with it would be lost.
-            for future in sorted(done, key=lambda finished: finished.cancelled() or finished.exception() is not None):
+            for future in sorted(
+                finished_futures,
+                key=lambda finished_future: finished_future.cancelled() or finished_future.exception() is not None,
+            ):
                 key = keys_in_flight.pop(future)
                 yield key, future.result()
     finally:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_pictures
+from analysis.figures.diagnosis.diagnosis_pictures import draw_diagnosis_pictures
 from protocols.definition.apparatus import SafetySettings, TestDirections
 from protocols.definition.preparation import PracticeSettings
 from protocols.definition.session_settings import CatchSettings, DetectionSettings
@@ -238,4 +238,4 @@ def friction_findings(diagnosed):
 @pytest.fixture(scope="session")
 def friction_pictures(friction_findings):
     """Drawn once."""
-    return diagnosis_pictures(friction_findings)
+    return draw_diagnosis_pictures(friction_findings)

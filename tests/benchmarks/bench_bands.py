@@ -76,9 +76,9 @@ def figures(equalizer: BandedEqualizer, wanted: np.ndarray) -> tuple[float, floa
     start = time.perf_counter()
     found = equalizer.compute_forces(wanted)
     took_ms = 1e3 * (time.perf_counter() - start)
-    late = np.zeros_like(found.entering)
-    late[found.rows_of_wanted(len(wanted))] = wanted
-    played = plants.omega_like().play(found.entering)
+    late = np.zeros_like(found.total_forces)
+    late[found.find_reference_rows(len(wanted))] = wanted
+    played = plants.omega_like().play(found.total_forces)
     lines = np.fft.rfftfreq(8 * len(late), 1 / plants.RATE_HZ)
     was, should = (np.fft.rfft(samples, 8 * len(late), axis=0) for samples in (played, late))
     inside, above = (lines >= 5) & (lines <= 35), (lines >= 36) & (lines <= 450)

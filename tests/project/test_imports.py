@@ -45,7 +45,7 @@ def test_headless_packages_load_no_screen_and_no_plots(package):
 def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
     loaded = loaded_by(
         "import study.tui.engine.engine_commands, study.workflows.session.end_sitting\n"
-        "import study.workflows.files.validate_apart\n"
+        "import study.workflows.files.validate_in_process\n"
         "import study.devices.safe, study.devices.rigs_by_name"  # as a device is opened
     )
     assert "numba" in loaded

@@ -20,8 +20,8 @@ import numpy as np
 
 from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_group_means
-from analysis.psychophysics.coverage.coverage_words import THRESHOLDS_BY_HZ, MeasuredCoverage, format_coverage_table
-from analysis.psychophysics.coverage.measured_coverage import MEASURED
+from analysis.psychophysics.coverage.coverage_words import MEDIAN_TEXTS, MeasuredCoverage, format_coverage_table
+from analysis.psychophysics.coverage.measured_coverage import MEASURED_COVERAGES
 from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.primary import compute_primary_analysis
 from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood
@@ -88,7 +88,7 @@ def measure(studies: int) -> list[MeasuredCoverage]:
     found: dict[tuple[str, float], list[tuple[float | None, bool]]] = {}
     for number in range(studies):
         for name, frequency_hz, error, covers in judge(number):
-            if frequency_hz in THRESHOLDS_BY_HZ or name == "one-way":
+            if frequency_hz in MEDIAN_TEXTS or name == "one-way":
                 found.setdefault((name, frequency_hz), []).append((error, bool(covers)))
     rows = []
     for (name, frequency_hz), each in found.items():
@@ -98,12 +98,12 @@ def measure(studies: int) -> list[MeasuredCoverage]:
     return sorted(rows, key=lambda row: (row.analysis, row.frequency_hz))
 
 
-MODULE_DOCSTRING = '''"""Measured coverage near the force cap: how many intervals of a study report hold the true value.
+MODULE_DOCSTRING = '''"""Measured coverage near the force cap: how many intervals of a report contain the true value.
 
-Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.TITLES`),
-frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None where the analysis gives no size in
-dB), intervals of 95 % that held the truth (one-way: studies in which a difference was found that was not there), and
-all intervals.
+Reports print these counts beside each interval (`coverage_words`). Each row: analysis
+(`coverage_words.INTERVAL_TITLES`), frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None
+where the analysis gives no size in dB), 95 % intervals that contain the true value (one-way: studies with a significant
+difference although there is none), and all intervals.
 
 Counted in simulated studies of ten people with known thresholds under the published staircase and cap, and written by
 `make coverage` (tests/references/coverage_of_analyses.py), never by hand; docs/statistics.md has the same table.
@@ -118,7 +118,7 @@ def module_text(rows: list[MeasuredCoverage]) -> str:
     return (
         f"{MODULE_DOCSTRING}\n\n"
         "from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage\n\n"
-        f"MEASURED = (\n{lines}\n)\n"
+        f"MEASURED_COVERAGES = (\n{lines}\n)\n"
     )
 
 
@@ -129,7 +129,7 @@ def page_text(page: str, rows: list[MeasuredCoverage]) -> str:
 
 if __name__ == "__main__":
     asked = int(sys.argv[1]) if len(sys.argv) > 1 else 400
-    counted = measure(asked) if asked else list(MEASURED)
+    counted = measure(asked) if asked else list(MEASURED_COVERAGES)
     MODULE.write_text(module_text(counted), "utf-8")
     PAGE.write_text(page_text(PAGE.read_text("utf-8"), counted), "utf-8")
     sys.stdout.write("\n".join(format_coverage_table(counted)) + "\n")

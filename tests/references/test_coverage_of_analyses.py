@@ -3,34 +3,34 @@
 import pytest
 
 from analysis.psychophysics.coverage.coverage_words import (
-    THRESHOLDS_BY_HZ,
-    TITLES,
+    INTERVAL_TITLES,
+    MEDIAN_TEXTS,
     describe_coverage,
     format_coverage_table,
 )
-from analysis.psychophysics.coverage.measured_coverage import MEASURED
+from analysis.psychophysics.coverage.measured_coverage import MEASURED_COVERAGES
 from tests.references.coverage_of_analyses import BEGIN, END, PAGE, judge, measure, module_text
 
 
 def test_the_page_has_what_was_counted():
     table = PAGE.read_text("utf-8").split(BEGIN)[1].split(END)[0].strip()
-    assert table.splitlines() == format_coverage_table(MEASURED)
+    assert table.splitlines() == format_coverage_table(MEASURED_COVERAGES)
 
 
 def test_every_interval_was_counted_at_every_median():
-    assert {(row.analysis, row.frequency_hz) for row in MEASURED} == {
-        *((name, frequency_hz) for name in TITLES if name != "one-way" for frequency_hz in THRESHOLDS_BY_HZ),
+    assert {(row.analysis, row.frequency_hz) for row in MEASURED_COVERAGES} == {
+        *((name, frequency_hz) for name in INTERVAL_TITLES if name != "one-way" for frequency_hz in MEDIAN_TEXTS),
         ("one-way", 0.0),
     }
-    assert min(row.intervals for row in MEASURED) >= 200
-    assert all(describe_coverage(MEASURED, name) for name in TITLES)
+    assert min(row.intervals for row in MEASURED_COVERAGES) >= 200
+    assert all(describe_coverage(MEASURED_COVERAGES, name) for name in INTERVAL_TITLES)
 
 
 def test_the_counts_are_of_these_analyses():
     """Below the cap the model holds what it says; above it reversal means do not, in any form."""
-    share = {(row.analysis, row.frequency_hz): row.covered / row.intervals for row in MEASURED}
-    assert all(0.9 <= share["model", hz] <= 0.985 for hz in THRESHOLDS_BY_HZ)
-    assert all(0.9 <= share["run", hz] <= 0.985 for hz in THRESHOLDS_BY_HZ)
+    share = {(row.analysis, row.frequency_hz): row.covered / row.intervals for row in MEASURED_COVERAGES}
+    assert all(0.9 <= share["model", hz] <= 0.985 for hz in MEDIAN_TEXTS)
+    assert all(0.9 <= share["run", hz] <= 0.985 for hz in MEDIAN_TEXTS)
     assert max(share["means", 45.0], share["tukey", 45.0]) < 0.2
     assert share["means", 45.0] < share["tobit", 45.0] < 0.9
     assert share["one-way", 0.0] < 0.03
@@ -47,4 +47,4 @@ def test_two_studies_counted_anew_give_a_module_that_says_so():
     assert row.covered == sum(found) + sum(again)
     space: dict[str, object] = {}
     exec(module_text(rows), space)
-    assert list(space["MEASURED"]) == rows
+    assert list(space["MEASURED_COVERAGES"]) == rows

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import DeviceError, ExitCode, StudyError, WrongUseError
-from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
+from study.store.disk.file_errors import AlreadyExistsError, UnusableFileError
 
 
 @pytest.mark.parametrize(
@@ -12,7 +12,7 @@ from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
     [
         StudyError("Title", "It happened.", "Do this.", saved="All is safe."),
         DeviceError("Title", "It happened.", "Do this."),
-        AlreadyThereError(Path("a.h5")),
+        AlreadyExistsError(Path("a.h5")),
         UnusableFileError(Path("a.h5"), "recording", ("it is empty",)),
     ],
 )

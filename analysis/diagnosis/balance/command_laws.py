@@ -16,7 +16,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import Formula
 from analysis.diagnosis.settings import SLEW_REACHED
-from equalizer.effects.force_nonlinearity import square_law_force
+from equalizer.effects.force_nonlinearity import apply_square_law
 from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
 
@@ -189,7 +189,7 @@ def vary_parameters(law: CommandLaw) -> Iterator[CommandLaw]:
 
 def _compute_square_law_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
     """Compute (n, 1): the force of which the share `square` grows with the square of the command (n,)."""
-    return square_law_force(command, parameters["square"], parameters["reference"])[:, None]
+    return apply_square_law(command, parameters["square"], parameters["reference"])[:, None]
 
 
 def _compute_power_law_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:

@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
+from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
 from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
@@ -90,7 +90,7 @@ def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel)
     motion."""
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known_effects = apply_conditions(place_recorded_effects(model, recording), recording)
-    structure = _apply_structural_effects(add_carried_weight(model, recording), known_effects)
+    structure = _apply_structural_effects(add_payload(model, recording), known_effects)
     required = compute_required_force(structure, compute_band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
     applied = compute_actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
@@ -141,7 +141,7 @@ def _compute_mode_columns(
     deviation_steps = DIFFERENCE_STEP * np.eye(len(tuning.names))[first_mode_parameter:]
     base_force, *shifted_forces = (
         compute_required_force(
-            _apply_structural_effects(add_carried_weight(tuning.tune(step), recording), known_effects), output_motion
+            _apply_structural_effects(add_payload(tuning.tune(step), recording), known_effects), output_motion
         ).force
         for step in (0 * deviation_steps[0], *deviation_steps)
     )

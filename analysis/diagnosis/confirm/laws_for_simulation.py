@@ -108,13 +108,13 @@ def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> H
     formula refers to."""
     if judged_law.formula is not None:
         # Imported here to save start-up time: few diagnoses have such a law.
-        from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
+        from analysis.diagnosis.errors.law_hypothesis import make_law_hypothesis
         from equalizer.effects.discovered_law import derive_axis_letters
         from equalizer.laws.law import Law
 
         axis_letter, formula = derive_axis_letters(recording.command.channels)[axis], judged_law.formula
         law_text = _AXIS_SIGNALS.sub(lambda symbol: f"{_SIGNAL_PREFIX[symbol[0]]}{axis_letter}", formula.text)
-        return hypothesis_of_law(Law(law_text, formula.numbers, (), formula.acts_on, axis_letter), axis, recording)
+        return make_law_hypothesis(Law(law_text, formula.numbers, (), formula.acts_on, axis_letter), axis, recording)
     parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters
     return make_claim_hypothesis(
         Claim(EFFECTS[judged_law.law.effect], "one", (axis,)),

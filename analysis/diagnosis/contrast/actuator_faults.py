@@ -19,12 +19,12 @@ import numpy as np
 from analysis.diagnosis.contrast.fault import (
     ColumnChange,
     Fault,
+    Lags,
     ParametersOf,
-    Rows,
     Undo,
     Variant,
     fix_size,
-    proportional_parameter,
+    scale_parameter,
 )
 from analysis.diagnosis.contrast.interpolation import shift_samples
 from analysis.diagnosis.contrast.recording_part import Part
@@ -67,25 +67,25 @@ class _Axis:
 
 
 def make_actuator_faults(
-    axis_index: int, name: str, parts: Sequence[Part], by_force: bool, rows: Rows
+    axis_index: int, name: str, parts: Sequence[Part], by_force: bool, lags: Lags
 ) -> Iterator[Fault]:
     """Make all faults of the actuator of an axis. parts: all compared ones, whose range the grids span. by_force:
-    whether the base predicts the command, not the response. rows: likely delays (`Rows.late_s`)."""
+    whether the base predicts the command, not the response. lags: likely delays."""
     axis = _Axis(axis_index, name)
     commands = np.concatenate([part.command[:, axis_index] for part in parts])
     peak = float(np.abs(commands).max(initial=0.0)) or 1.0
     rms = float(np.std(commands)) or peak
     yield from _make_gain_faults(axis, by_force)
     yield axis.make_fault(
-        "force_offset", [Variant((axis.make_undo(lambda u, rate: u + rms),), proportional_parameter("offset", rms))]
+        "force_offset", [Variant((axis.make_undo(lambda u, rate: u + rms),), scale_parameter("offset", rms))]
     )
-    cubic = Variant((axis.make_undo(lambda u, rate: u + u**3 / peak**2),), proportional_parameter("cubic", 1 / peak**2))
+    cubic = Variant((axis.make_undo(lambda u, rate: u + u**3 / peak**2),), scale_parameter("cubic", 1 / peak**2))
     yield axis.make_fault("actuator_cubic", [cubic])
     longest_part = max(parts, key=lambda part: len(part.command))
     delays_s = choose_trial_delays_s(longest_part.command[:, axis_index], longest_part.rate_hz)
     yield axis.make_fault("transport_delay", [
         *(_make_delay(axis, time_s) for time_s in delays_s),
-        *(replace(fix_size(_make_delay(axis, time_s), rows.late_step_s), column_change=None) for time_s in rows.late_s),
+        *(replace(fix_size(_make_delay(axis, time_s), lags.step_s), column_change=None) for time_s in lags.delays_s),
     ])  # fmt: skip
     yield axis.make_fault("amplifier_lag", [_make_lag(axis, time_s) for time_s in delays_s])
     command_shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / peak
@@ -155,8 +155,8 @@ def _make_delay(axis: _Axis, time_s: float) -> Variant:
         return replace(undone, known=part.known & (np.arange(len(part.known)) >= delay_samples))
 
     at_size = lambda size: _make_delay(axis, size * time_s)  # noqa: E731
-    delay = proportional_parameter("delay", time_s)
-    return Variant((undo,), delay, *SIZE_RANGE, column_change=change, at_size=at_size, exact=True)
+    delay = scale_parameter("delay", time_s)
+    return Variant((undo,), delay, *SIZE_RANGE, column_change=change, at_size=at_size, one_size=True)
 
 
 def _make_lag(axis: _Axis, time_s: float) -> Variant:
@@ -166,7 +166,7 @@ def _make_lag(axis: _Axis, time_s: float) -> Variant:
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
     at_size = lambda size: _make_lag(axis, size * time_s)  # noqa: E731
     return Variant(
-        (undo,), proportional_parameter("time_constant", time_s), *SIZE_RANGE, column_change=change, at_size=at_size
+        (undo,), scale_parameter("time_constant", time_s), *SIZE_RANGE, column_change=change, at_size=at_size
     )
 
 
@@ -185,7 +185,7 @@ def _make_deadband(axis: _Axis, width: float) -> Variant:
     """A dead band from -width to width, in the command's unit."""
     undo = axis.make_undo(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
     at_size = lambda size: _make_deadband(axis, size * width)  # noqa: E731
-    return Variant((undo,), proportional_parameter("width", width), *SIZE_RANGE, at_size=at_size)
+    return Variant((undo,), scale_parameter("width", width), *SIZE_RANGE, at_size=at_size)
 
 
 def choose_trial_delays_s(samples: FloatArray, rate_hz: float) -> list[float]:

@@ -1,4 +1,7 @@
-"""Lists the base models of a comparison: first a force balance where it fits, then an autoregressive model (ARX)."""
+"""Build the base models of a comparison: first a force balance where it fits, then an autoregressive model (ARX).
+
+Called by `rank_faults` and `study.evaluation.real.injected_halves`.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -15,11 +18,12 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 
-def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
-    """Force balances, one per axis, where they fit the clean set; then autoregressive models, one per response. Each
-    list comes with the motions of both sets, which are empty where no motion was measured. faulty: may be empty."""
+def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
+    """Build force balances, one per axis, where all explain the clean set to within `BALANCE_HOLDS`; then
+    autoregressive models, one per response. Each list comes with the motions of both sets, which are empty where no
+    motion was measured. clean: at least one part; faulty: may be empty."""
     recording = clean[0].recording
-    rotational = recording.is_rotational
+    is_rotational = recording.is_rotational
     motions: tuple[Motion, ...] = ()
     with suppress(NoMotionError):
         clean_motions = compute_motions([part.to_observed() for part in clean])
@@ -27,50 +31,62 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
             compute_motions([part.to_observed() for part in faulty], clean_motions[0].band_hz) if faulty else ()
         )
         motions = (*clean_motions, *faulty_motions)
-    forces: list[Base] = []
+    force_bases: list[Base] = []
     if motions and np.isfinite(motions[0].band_hz):
         with suppress(np.linalg.LinAlgError, ValueError):
             bases: list[Base] = [
-                build_force_base(motions, axis, rotational) for axis in range(len(recording.command.channels))
+                build_force_base(motions, axis, is_rotational) for axis in range(len(recording.command.channels))
             ]
-            forces = bases if all(compute_unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
-    if forces:
-        yield forces, motions
-    fewest = min(sum(len(part.known) for part in side) for side in (clean, faulty) if side)
-    step = max(min(choose_decimation_step((*clean, *faulty)), fewest // (2 * FEWEST_ROWS)), 1)
-    count = len(recording.response.channels)
-    yield [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step, count) for channel in range(count)], motions
+            force_bases = bases if all(compute_unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
+    if force_bases:
+        yield force_bases, motions
+    fewest_known_samples = min(sum(len(part.known) for part in part_set) for part_set in (clean, faulty) if part_set)
+    step = max(min(choose_decimation_step((*clean, *faulty)), fewest_known_samples // (2 * FEWEST_ROWS)), 1)
+    response_count = len(recording.response.channels)
+    yield (
+        [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step, response_count) for channel in range(response_count)],
+        motions,
+    )
 
 
 def have_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
-    """Whether the rms of each detrended response differs between the two sets by at most a factor `MOTIONS_APART`."""
-    sizes = np.array(
-        [np.sqrt(np.mean([_compute_detrended_mean_squares(part) for part in side], axis=0)) for side in (clean, faulty)]
+    """Whether the rms of each detrended response differs between the two sets by at most a factor `MOTIONS_APART`.
+    Neither set is empty."""
+    response_rms = np.array(
+        [
+            np.sqrt(np.mean([_compute_detrended_mean_squares(part) for part in part_set], axis=0))
+            for part_set in (clean, faulty)
+        ]
     )
-    return bool(np.all(sizes.max(axis=0) <= MOTIONS_APART * sizes.min(axis=0)))
+    return bool(np.all(response_rms.max(axis=0) <= MOTIONS_APART * response_rms.min(axis=0)))
 
 
 def _compute_detrended_mean_squares(part: Part) -> FloatArray:
-    """(p,): mean squares of the responses about their least-squares lines."""
+    """Compute (p,): mean squares of the responses about their least-squares lines."""
     times = np.arange(len(part.response)) - (len(part.response) - 1) / 2
     centred = part.response - part.response.mean(axis=0)
     return np.asarray(
-        np.mean((centred - times[:, None] * (times @ centred / max(float(times @ times), 1.0))) ** 2, axis=0)
+        np.mean(
+            (centred - times[:, None] * (times @ centred / max(float(times @ times), 1.0))) ** 2,
+            axis=0,
+        )
     )
 
 
 def compute_unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
-    """Standard deviation of a base's residual over that of the signal; infinite where that is constant."""
+    """Compute the standard deviation of a base's least-squares residual over that of the signal; infinite where the
+    signal is constant."""
     return compute_unexplained_share_of_rows(base, base.build_rows(parts), base.mask_valid_samples(parts))
 
 
 def compute_unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
-    """As `compute_unexplained_share`, from the rows (n, 1 + columns) of each part and the masks (n,) of valid rows."""
+    """Compute the same as `compute_unexplained_share` from the rows (n, 1 + columns) of each part and the masks (n,) of
+    valid rows."""
     rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
     signal = base.reconstruct_response(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]
-    size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
-    spread = float(np.std(signal))
-    if spread <= CONSTANT_SIGNAL * float(np.sqrt(np.mean(signal**2))):
+    column_rms = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
+    signal_std = float(np.std(signal))
+    if signal_std <= CONSTANT_SIGNAL * float(np.sqrt(np.mean(signal**2))):
         return np.inf
-    weights = np.linalg.lstsq(rows[:, 1:] / size[1:], rows[:, 0], rcond=1e-10)[0]
-    return float(np.std(rows[:, 0] - rows[:, 1:] / size[1:] @ weights)) / spread
+    weights = np.linalg.lstsq(rows[:, 1:] / column_rms[1:], rows[:, 0], rcond=1e-10)[0]
+    return float(np.std(rows[:, 0] - rows[:, 1:] / column_rms[1:] @ weights)) / signal_std

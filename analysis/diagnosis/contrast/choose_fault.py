@@ -1,10 +1,11 @@
 """Choose which fault to name after a comparison with clean recordings: a fault, a class of faults, or none.
 
-Of the faults that pass all tests of `_find_objection`, the one with the smallest error is the best. Its class contains
-the rivals whose error is not significantly larger (bootstrap over blocks) and those that failed a test but fit about as
-well (`_find_inconclusive`). No fault is named where the class is too large, a fault that failed a test has a clearly
-smaller error, the best explains too small a share of the difference, or its axis is ambiguous. Errors and gains are
-those of `rank_faults`. Called by `compare_with_reference`.
+Of the faults that pass all tests of `_find_objection`, the one with the smallest error is the best, or a special case
+of it that these data cannot distinguish from it. Its class contains the rivals whose error is not significantly larger
+(bootstrap over blocks; a rival that contains the best as a special case only where it is significantly better), and
+those that failed a test but fit about as well (`_find_inconclusive`). No fault is named where the class is too
+large, a fault that failed a test has a clearly smaller error, the best explains too small a share of the difference, or
+its axis is ambiguous. Errors and gains are those of `rank_faults`. Called by `compare_with_reference`.
 """
 
 from collections.abc import Sequence
@@ -69,10 +70,10 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
         return Decision(None, (), 0.0, unnamed)
     best = _choose_simplest(accepted, comparison)
     rivals = [fault for fault in accepted if fault is not best]
-    distinct_rivals = [rival for rival in rivals if not _contains(rival, best)]
+    distinct_rivals = [rival for rival in rivals if not _is_wider(rival, best)]
     inseparable = [rival for rival in distinct_rivals if _is_inseparable(best, rival, comparison)]
-    failed = [fault for fault, flaw in tested if flaw and fault.gain >= LEAST_FAULT_GAIN and not _contains(fault, best)]
-    inseparable += [fault for fault in rivals if _contains(fault, best) and _is_significantly_better(fault, best)]
+    failed = [fault for fault, flaw in tested if flaw and fault.gain >= LEAST_FAULT_GAIN and not _is_wider(fault, best)]
+    inseparable += [fault for fault in rivals if _is_wider(fault, best) and _is_significantly_better(fault, best)]
     members = (
         *inseparable,
         *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
@@ -96,36 +97,39 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
         reason = "these data cannot distinguish it from " + ", ".join(equivalents)
     elif other_axes:
         reason = f"these data do not show whether it is on {best.fault.axis} or on {', '.join(other_axes)}"
-    unnamed_rivals = tuple((rival, NO_GAIN_REASON if _contains(rival, best) else RIVAL_REASON) for rival in rivals)
+    unnamed_rivals = tuple((rival, NO_GAIN_REASON if _is_wider(rival, best) else RIVAL_REASON) for rival in rivals)
     if reason:
         return Decision(None, (), 0.0, ((best, reason), *unnamed_rivals, *unnamed))
     unnamed_candidates = tuple(candidate for candidate in (*unnamed_rivals, *unnamed) if candidate[0] not in members)
     return Decision(best, equivalents, _estimate_probability_of_best(best, distinct_rivals), unnamed_candidates)
 
 
-def _find_inconclusive(failed: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison) -> list[JudgedFault]:
+def _find_inconclusive(
+    failed_faults: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison
+) -> list[JudgedFault]:
     """Find the candidates of other effects that failed a test of `_find_objection`, whose gain has a lower bound above
     0, and whose error differs too little from that of the best to exclude them."""
     return [
         judged_fault
-        for judged_fault in failed
+        for judged_fault in failed_faults
         if judged_fault.fault.effect != best.fault.effect
         and judged_fault.gain_low > 0
         and abs(_sum_gap(judged_fault, best)) <= _find_least_gap(best, comparison)
     ]
 
 
-def _contains(candidate: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `candidate` contains `best` as a special case at the same axis, so that it cannot fit worse."""
+def _is_wider(candidate: JudgedFault, best: JudgedFault) -> bool:
+    """Whether `candidate` is the wider fault: it contains `best` as a special case at the same axis, so that it cannot
+    fit worse."""
     return best.fault.effect in candidate.fault.simpler and best.fault.axis == candidate.fault.axis
 
 
-def _choose_simplest(accepted: Sequence[JudgedFault], comparison: Comparison) -> JudgedFault:
+def _choose_simplest(accepted_faults: Sequence[JudgedFault], comparison: Comparison) -> JudgedFault:
     """Choose the fault with the smallest error, or the first special case of it that these data cannot distinguish from
     it."""
-    best = min(accepted, key=lambda judged_fault: float(judged_fault.block_squares.sum()))
-    for candidate in accepted:
-        if _contains(best, candidate) and _is_inseparable(best, candidate, comparison):
+    best = min(accepted_faults, key=lambda judged_fault: float(judged_fault.block_squares.sum()))
+    for candidate in accepted_faults:
+        if _is_wider(best, candidate) and _is_inseparable(best, candidate, comparison):
             return candidate
     return best
 
@@ -156,8 +160,8 @@ def _compute_distance_from_no_fault(fault: JudgedFault, name: str) -> float:
 
 
 def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Comparison) -> bool:
-    """Whether the error of `rival` exceeds that of the best by at most `_find_least_gap`, or not significantly
-    (bootstrap over blocks)."""
+    """Whether the error of `rival` exceeds that of the best by at most `_find_least_gap`, or not
+    significantly (bootstrap over blocks)."""
     excess_errors = rival.block_squares - best.block_squares
     draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(

@@ -264,7 +264,7 @@ def _compute_error_factor(
 ) -> float:
     """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the module's
     docstring. Interpolation alone scales the errors of an autoregression by `variant.noise_factor`: divided out."""
-    factor = variant.unit
+    factor = variant.error_factor
     if variant.curve is not None:
         factor *= _correct_for_slope(compared, side, variant.curve)
     if isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1:

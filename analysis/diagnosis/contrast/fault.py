@@ -2,6 +2,7 @@
 
 Undoing a fault of size s changes the rows of a base by about s times the change for size 1 (`joint_products`), so that
 the size is found by least squares; nonlinear parameters, such as widths and delays, are fixed in each `Variant`.
+`mechanism_faults`, `actuator_faults` and `sensor_faults` make the faults, `rank_faults` and `fit_faults` fit them.
 """
 
 from collections.abc import Callable
@@ -22,7 +23,7 @@ ParametersOf = Callable[[FloatArray], dict[str, float]]
 Curve = Callable[[FloatArray], FloatArray]
 """Maps readings (n,) to readings, sample by sample: a sensor's gain, saturation or nonlinearity."""
 ALL_CHANNELS = -1
-"""Site number of a fault of all channels."""
+"""Site number of a fault of all channels; no index of an axis or channel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,9 +36,10 @@ class Variant:
     """Parameters of the fault from its sizes."""
     lower_bound: float = -np.inf
     upper_bound: float = np.inf
-    """Bounds of each size: a narrow range about 1 where undoing is not linear in the size."""
-    unit: float = 1.0
-    """Factor by which the errors of a faulty sensor are scaled: otherwise a gain that reduces every error would win."""
+    """Lower and upper bound of each size: a narrow range about 1 where undoing is not linear in the size."""
+    error_factor: float = 1.0
+    """Factor on the errors with the fault undone: 1 / |g'| of the map g that undoes it (see `compared_base`). Without
+    it, a gain that reduces every reading, and so every error, would fit best."""
     curve: Curve | None = None
     """Map of single readings that undoes the fault, where there is one: its slope scales the errors, too."""
     noise_factor: float = 1.0
@@ -50,7 +52,7 @@ class Variant:
     unit."""
     at_size: Callable[[float], "Variant"] | None = None
     """Maps a size to the variant that is linearised about it (that size becomes 1), where undoing is not linear."""
-    exact: bool = False
+    one_size: bool = False
     """Whether only size 1 undoes the fault: undoing half of a delay gives not half the delay but the mean of two
     readings, which has less noise."""
 
@@ -68,6 +70,7 @@ class Fault:
     site: int
     """Index of the axis or channel, or `ALL_CHANNELS`."""
     variants: tuple[Variant, ...]
+    """Each fixes the nonlinear parameters at other values; empty where none suits the recordings."""
     simpler: tuple[str, ...] = ()
     """Faults that it contains as special cases."""
     varies: bool = False
@@ -81,31 +84,32 @@ class ClockRate:
     rate: float
     """Relative error of the readings' clock rate; 0 = correct."""
     step: float
-    """Spacing of the rates that are tried."""
-    runs_on: bool
+    """Spacing of the tried rates, relative as well; the standard error of the rate."""
+    from_file_start: bool
     """Whether its time is counted from the beginning of the file; else of each part."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
-    """Spacing of the rows of a base, and the delays and clock rates that cross-correlations suggest."""
+class Lags:
+    """Delays and clock rates that cross-correlations suggest, and the time step over which a lag is inverted."""
 
     lag_samples: int
-    """Samples of the recordings over which a lag of the responses is inverted: one row of an autoregression."""
-    late_s: tuple[float, ...]
+    """Samples over which a lag of the responses is inverted: 1 for a force balance, one row of an autoregression."""
+    delays_s: tuple[float, ...]
     """Delays in s from `likely_delays.suggest_delays_s`."""
-    late_step_s: float
+    step_s: float
     """Spacing of these delays in s."""
     clocks: tuple[ClockRate, ...]
     """Rates from `likely_delays.suggest_clock_rates`."""
 
 
 def fix_size(variant: Variant, grid_error: float) -> Variant:
-    """The variant at size 1 only, as for a delay over many oscillations, which cannot be scaled. grid_error: standard
-    error of its parameter."""
+    """Restrict a variant to size 1, as for a delay over many oscillations, which cannot be scaled. grid_error: standard
+    error of its parameter, in the parameter's unit."""
     return replace(variant, lower_bound=1.0, upper_bound=1.0, at_size=None, grid_error=grid_error)
 
 
-def proportional_parameter(name: str, value_at_one: float = 1.0) -> ParametersOf:
-    """A fault's parameter in proportion to its only size. value_at_one: the parameter at size 1."""
+def scale_parameter(name: str, value_at_one: float = 1.0) -> ParametersOf:
+    """Make the map from a fault's only size to its parameter, proportional to it. value_at_one: the parameter at size
+    1."""
     return lambda sizes: {name: value_at_one * float(sizes[0])}

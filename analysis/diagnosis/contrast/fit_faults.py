@@ -21,8 +21,8 @@ from analysis.diagnosis.types import TimeBudget
 ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))
 """Numbers of all blocks into which the samples are divided for cross-validation."""
 RELINEARISED_VARIANTS = 3
-"""Of a fault that is valid at size 1 only: number of its variants that are linearised again, besides the best of all
-sizes. Chosen by hand; each takes as long as a first fit."""
+"""Of a fault that is valid at size 1 only: number of its variants, the best at size 1, that are linearised again
+besides the best at any size. Chosen by hand; each takes as long as a first fit."""
 
 
 class FittedVariant(NamedTuple):
@@ -32,6 +32,7 @@ class FittedVariant(NamedTuple):
     """Fitted sizes, and the sums of squared errors with the fault undone."""
     fault: Fault
     variant: Variant
+    """The variant of `fault` that was fitted, possibly linearised about its size."""
     pairs: list[SetPair]
     """Per base (force, sensor or autoregressive model): least-squares products of both sets, with the fault undone."""
 
@@ -103,10 +104,10 @@ def _choose_best_variant(
     fits: Sequence[FittedVariant], unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase]
 ) -> FittedVariant:
     """Choose the variant with the smallest error, after linearisation about its size. Of a fault that is valid at size
-    1 only (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest
-    error."""
+    1 only (`Variant.one_size`), several are compared at size 1: at another size, a wrong variant may have the
+    smallest error."""
     best_at_any_size = min(fits, key=_get_error)
-    if not best_at_any_size.variant.exact:
+    if not best_at_any_size.variant.one_size:
         return _iterate_linearisation(best_at_any_size, unchanged_pairs, compared_bases)
     best_at_size_1 = sorted(fits, key=lambda fit: _get_error(_fit_allowed_size(fit)))[:RELINEARISED_VARIANTS]
     return min(
@@ -121,7 +122,7 @@ def _iterate_linearisation(
     """Return the best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size
     that the last iteration found; in the linearised variant, that size is 1. They end where the fitted size differs
     from 1 by less than `SIZE_IS_NEAR`, where undoing is linear or ill-conditioned, and, unless only size 1 is valid
-    (`Variant.exact`), where the error no longer falls."""
+    (`Variant.one_size`), where the error no longer falls."""
     best = _fit_allowed_size(current)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = current
@@ -132,7 +133,7 @@ def _iterate_linearisation(
             break
         current, previous_best = relinearised, best
         best = min(best, _fit_allowed_size(current), key=_get_error)
-        if best is previous_best and not variant.exact:
+        if best is previous_best and not variant.one_size:
             break
     return best
 
@@ -140,12 +141,12 @@ def _iterate_linearisation(
 def _fit_allowed_size(fitted_variant: FittedVariant) -> FittedVariant:
     """Return the variant as fitted, or refit it with its size fixed at 1 where it is valid at size 1 only."""
     _, fault, variant, pairs = fitted_variant
-    if not variant.exact:
+    if not variant.one_size:
         return fitted_variant
     return FittedVariant(fit_sizes(pairs, restrict_sizes(variant)), fault, variant, pairs)
 
 
 def restrict_sizes(variant: Variant) -> Variant:
-    """Fix the size of a variant at 1 where it is valid at size 1 only (`Variant.exact`); other variants are
+    """Fix the size of a variant at 1 where it is valid at size 1 only (`Variant.one_size`); other variants are
     unchanged."""
-    return fix_size(variant, 0.0) if variant.exact else variant
+    return fix_size(variant, 0.0) if variant.one_size else variant

@@ -2,7 +2,7 @@
 
 Per driven axis, F = M a + D v + K q + c + sum of w phi(q, v): linear regression of the force on the motion of all
 measured channels, a constant, and nonlinear laws phi that lower the cross-validated error (`balance.regression`). The
-laws only make the base accurate; none of them is named. `bases` and `compared_base` use it.
+laws only make the base accurate; none of them is reported. Built by `bases`, used by `compared_base` and `rank_faults`.
 """
 
 from collections.abc import Sequence
@@ -25,10 +25,12 @@ class ForceBase:
     """Base model of one driven axis: makes rows of the force and of the columns (regressors) that predict it."""
 
     axis: int
+    """Index of the driven axis in the command."""
     laws: tuple[Law, ...]
+    """Nonlinear laws beside mass, damping, stiffness and constant; may be empty."""
     band_hz: float
     """Upper end of the band (Hz) to which force and columns are filtered."""
-    turns: bool
+    is_free_rotation: bool
     """Whether a shaft rotates freely, so that the balance has no stiffness (see `Scales`)."""
     rate_hz: float
     """Sample rate of the rows (Hz), after decimation."""
@@ -38,8 +40,8 @@ class ForceBase:
     def build_rows(
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
-        """Build the rows of each part, (kept samples, 1 + columns): the force first. reusable_rows: rows of parts with
-        the same motion, whose columns are reused, so that only the force is filtered again."""
+        """Build the rows of each part, (kept samples, 1 + columns): the force (N or N m) first. reusable_rows: rows of
+        parts with the same motion, whose columns are reused, so that only the force is filtered again."""
         if reusable_rows is not None:
             commands = (
                 filter_band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz)
@@ -47,20 +49,20 @@ class ForceBase:
             )
             step = round(parts[0].rate_hz / self.rate_hz)
             return tuple(
-                np.hstack([target[::step], old_rows[:, 1:]])
-                for target, old_rows in zip(commands, reusable_rows, strict=True)
+                np.hstack([force_column[::step], previous_rows[:, 1:]])
+                for force_column, previous_rows in zip(commands, reusable_rows, strict=True)
             )
         motions = compute_motions([part.to_observed() for part in parts], self.band_hz)
-        targets = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
-        base_regression = build_regression(motions, self.axis, (), self.turns)
+        force_columns = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
+        base_regression = build_regression(motions, self.axis, (), self.is_free_rotation)
         part_rows = []
-        for target, motion, base in zip(targets, motions, base_regression.columns, strict=True):
+        for force_column, motion, linear_columns in zip(force_columns, motions, base_regression.columns, strict=True):
             law_columns = [motion.decimate(law.columns(motion, law.numbers)) for law in self.laws]
-            part_rows.append(np.hstack([target, base, *law_columns]))
+            part_rows.append(np.hstack([force_column, linear_columns, *law_columns]))
         return tuple(part_rows)
 
     def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
-        """Per part, mask of its rows (kept samples,): known samples more than a filter length from the part's ends."""
+        """Mask the rows of each part, (kept samples,): known samples more than a filter length from the part's ends."""
         return tuple(
             motion.mask_valid_samples(part.known)
             for motion, part in zip(
@@ -69,12 +71,12 @@ class ForceBase:
         )
 
 
-def build_force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
+def build_force_base(motions: Sequence[Motion], axis: int, is_rotational: bool) -> ForceBase:
     """Build the base model of one axis: select laws first among the general laws, then with cogging at the pitches that
     the residual force shows. motions: of the compared recordings; all known samples are fitted to."""
-    scales = [measure_scales(motions, channel, rotational) for channel in range(len(motions[0].channels))]
-    turns = any(scale.turns for scale in scales)
-    regression = build_regression(motions, axis, list(make_laws(motions, rotational)), turns)
+    scales = [measure_scales(motions, channel, is_rotational) for channel in range(len(motions[0].channels))]
+    is_free_rotation = any(scale.turns for scale in scales)
+    regression = build_regression(motions, axis, list(make_laws(motions, is_rotational)), is_free_rotation)
     residuals = regression.compute_residuals(regression.select_columns(_select_laws(regression)))
     cogging_laws = [
         make_cogging_law(channel, pitch, scale)
@@ -82,12 +84,12 @@ def build_force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> 
         for pitch in find_likely_pitches(motions, residuals, channel, scale)
     ]
     if cogging_laws:
-        regression = build_regression(motions, axis, (*regression.laws, *cogging_laws), turns)
+        regression = build_regression(motions, axis, (*regression.laws, *cogging_laws), is_free_rotation)
     return ForceBase(
         axis,
         keep_laws(regression, _select_laws(regression)).laws,
         motions[0].band_hz,
-        turns,
+        is_free_rotation,
         motions[0].rate_hz / motions[0].step,
         motions[0].lowest_hz,
     )
@@ -99,13 +101,13 @@ def _select_laws(regression: Regression) -> tuple[int, ...]:
     selected: tuple[int, ...] = ()
     error = float(regression.cross_validate(regression.select_columns(selected)).sum())
     while len(selected) < MOST_BASE_LAWS:
-        trials = [
+        trial_errors = [
             (float(regression.cross_validate(regression.select_columns((*selected, law_index))).sum()), law_index)
             for law_index in range(len(regression.laws))
             if law_index not in selected
         ]
-        if not trials or min(trials)[0] > (1 - BASE_LAW_GAIN) * error:
+        if not trial_errors or min(trial_errors)[0] > (1 - BASE_LAW_GAIN) * error:
             break
-        error, best_law = min(trials)
+        error, best_law = min(trial_errors)
         selected = (*selected, best_law)
     return selected

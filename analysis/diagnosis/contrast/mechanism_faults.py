@@ -18,23 +18,24 @@ import numpy as np
 from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.contrast.fault import Fault, ParametersOf, Undo, Variant, proportional_parameter
+from analysis.diagnosis.contrast.fault import Fault, ParametersOf, Undo, Variant, scale_parameter
 from analysis.diagnosis.contrast.recording_part import Part
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]
 """Maps a part's motion to the force (n,) of a fault of size 1."""
-MotionOf = Callable[[Part], Motion]
+MotionLookup = Callable[[Part], Motion]
 """Maps a part to its measured motion."""
 WIDTH_FACTORS = (1.0, 3.0, 8.0, 20.0)
-"""Widths of the smoothed sign of dry friction, relative to the narrowest."""
+"""Tried widths of the smoothed sign of dry friction, relative to the narrowest. Chosen by hand."""
 PRESLIDING_SHARES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
-"""Tried presliding distances, relative to the travel."""
+"""Tried presliding distances, relative to the travel. Chosen by hand."""
 COGGING_PERIOD_COUNTS = tuple(np.arange(2.0, 40.0, 0.35).tolist())
-"""Numbers of periods of a cogging force within the travel, so close that neighbours cannot be distinguished."""
+"""Tried numbers of periods of a cogging force within the travel, so close that neighbours cannot be distinguished.
+Chosen by hand."""
 STOP_SHARES = tuple(np.arange(0.05, 0.5, 0.05).tolist())
-"""Tried distances of an end stop from the middle of the travel, relative to the travel."""
+"""Tried distances of an end stop from the middle of the travel, relative to the travel. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,16 +43,18 @@ class _Axis:
     """A driven axis with the range of its measured motion, in m or rad and s."""
 
     index: int
+    """Index of the axis in the command."""
     name: str
-    motion_of: MotionOf
+    get_motion: MotionLookup
+    """Returns the motion of a part."""
     channel: int
-    """Channel of the motion."""
+    """Index of the channel of the motion along this axis."""
     middle: float
     """Middle of the travel."""
-    width: float
+    travel: float
     """Travel, from end to end."""
-    sharp: float
-    """Least width of the smoothed sign, a speed."""
+    least_speed_width: float
+    """Least width of the smoothed sign, m/s or rad/s."""
 
     def make_fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
         """Make a fault of the mechanism on this axis. simpler: faults that it contains as special cases."""
@@ -63,7 +66,7 @@ class _Axis:
         """Make a fault whose force is a single parameter times `shape`. parameter_name, lower_bound: of the
         parameter."""
         return self.make_fault(
-            effect, [Variant((self.subtract(shape),), proportional_parameter(parameter_name), lower_bound=lower_bound)]
+            effect, [Variant((self.subtract(shape),), scale_parameter(parameter_name), lower_bound=lower_bound)]
         )
 
     def subtract(self, shape: Shape) -> Undo:
@@ -71,33 +74,35 @@ class _Axis:
 
         def undo(part: Part) -> Part:
             command = part.command.copy()
-            command[:, self.index] -= shape(self.motion_of(part))
+            command[:, self.index] -= shape(self.get_motion(part))
             return replace(part, command=command)
 
         return undo
 
     def compute_position(self, motion: Motion) -> FloatArray:
-        """Position (n,) from the middle of the travel, m or rad."""
+        """Compute the position (n,) from the middle of the travel, m or rad."""
         return np.asarray(motion.position[:, self.channel] - self.middle)
 
     def select_velocity(self, motion: Motion) -> FloatArray:
-        """Velocity (n,) along the channel of this axis, m/s or rad/s."""
+        """Select the velocity (n,) along the channel of this axis, m/s or rad/s."""
         return motion.velocity[:, self.channel]
 
 
 def make_mechanism_faults(
-    axis_index: int, name: str, motions: Sequence[Motion], motion_of: MotionOf, rotational: bool
+    axis_index: int, name: str, motions: Sequence[Motion], get_motion: MotionLookup, is_rotational: bool
 ) -> Iterator[Fault]:
-    """Make all faults of the mechanism along an axis. motions: of all compared parts, whose range the grids span.
-    motion_of: maps a part to its motion. rotational: whether the axis turns; pitches of cogging are then at most a
+    """Make all faults of the mechanism along an axis; its motion is the channel of the same index, or the last channel
+    where there are fewer channels than axes. motions: of all compared parts, whose range the grids span.
+    get_motion: maps a part to its motion. is_rotational: whether the axis turns; pitches of cogging are then at most a
     turn."""
     channel = min(axis_index, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
-    low, travel = float(position.min()), max(float(np.ptp(position)), 1e-300)
-    longest_pitch = min(travel, 2 * np.pi) if rotational else travel
+    # The least values keep divisions by the travel and by the width finite where nothing moves.
+    lower_end, travel = float(position.min()), max(float(np.ptp(position)), 1e-300)
+    longest_pitch = min(travel, 2 * np.pi) if is_rotational else travel
     least_width = max(LEAST_WIDTH_SHARE * float(np.sqrt(np.mean(velocity**2))), 1e-300)
-    axis = _Axis(axis_index, name, motion_of, channel, low + 0.5 * travel, travel, least_width)
+    axis = _Axis(axis_index, name, get_motion, channel, lower_end + 0.5 * travel, travel, least_width)
     yield axis.make_proportional_fault("added_mass", lambda m: m.acceleration[:, channel], "mass")
     yield axis.make_proportional_fault("viscous_damping", axis.select_velocity, "damping")
     yield axis.make_proportional_fault(
@@ -129,16 +134,16 @@ def make_mechanism_faults(
 
 
 def _make_coulomb_variant(axis: _Axis, speed_width: float) -> Variant:
-    """Coulomb friction with a sign smoothed over `speed_width` (m/s or rad/s)."""
+    """Make Coulomb friction with a sign smoothed over `speed_width` (m/s or rad/s)."""
     return Variant(
         (axis.subtract(lambda m: smooth_sign(axis.select_velocity(m), speed_width)),),
-        proportional_parameter("level"),
+        scale_parameter("level"),
         lower_bound=0.0,
     )
 
 
 def _make_asymmetric_variant(axis: _Axis, speed_width: float) -> Variant:
-    """Coulomb friction with one level per direction; speed_width: as in `_make_coulomb_variant`."""
+    """Make Coulomb friction with one level per direction; speed_width: as in `_make_coulomb_variant`."""
     undo = (
         axis.subtract(lambda m: np.maximum(smooth_sign(axis.select_velocity(m), speed_width), 0.0)),
         axis.subtract(lambda m: np.minimum(smooth_sign(axis.select_velocity(m), speed_width), 0.0)),
@@ -147,7 +152,7 @@ def _make_asymmetric_variant(axis: _Axis, speed_width: float) -> Variant:
 
 
 def _make_presliding_variant(axis: _Axis, distance: float) -> Variant:
-    """Dahl's friction with the presliding distance `distance` (m or rad)."""
+    """Make Dahl's friction with the presliding distance `distance` (m or rad)."""
     parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / distance}  # noqa: E731
     return Variant(
         (axis.subtract(lambda m: compute_bristle_deflection(m.position[:, axis.channel], distance)),),
@@ -157,7 +162,7 @@ def _make_presliding_variant(axis: _Axis, distance: float) -> Variant:
 
 
 def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
-    """Cogging with the period `pitch` (m or rad); its two sizes are those of a sine and a cosine."""
+    """Make cogging with the period `pitch` (m or rad); its two sizes are those of a sine and a cosine."""
     undo = (
         axis.subtract(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
         axis.subtract(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
@@ -168,24 +173,25 @@ def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
     })  # fmt: skip
 
 
-def _make_stop_variants(axis: _Axis, reach: float) -> Iterator[Variant]:
-    """Make end stops at both ends of the travel, and at each end alone. reach: distance from its middle, m or rad."""
+def _make_stop_variants(axis: _Axis, stop_distance: float) -> Iterator[Variant]:
+    """Make end stops at both ends of the travel, and at each end alone. stop_distance: distance from its
+    middle, m or rad."""
     two_sided = axis.subtract(
-        lambda m: np.sign(axis.compute_position(m)) * np.maximum(np.abs(axis.compute_position(m)) - reach, 0.0)
+        lambda m: np.sign(axis.compute_position(m)) * np.maximum(np.abs(axis.compute_position(m)) - stop_distance, 0.0)
     )
-    yield Variant((two_sided,), _make_stop_parameters(axis.middle + reach, 1.0), lower_bound=0.0)
-    for side in (1.0, -1.0):
-        yield _make_stop_variant(axis, side, reach)
+    yield Variant((two_sided,), _make_stop_parameters(axis.middle + stop_distance, 1.0), lower_bound=0.0)
+    for direction in (1.0, -1.0):
+        yield _make_stop_variant(axis, direction, stop_distance)
 
 
-def _make_stop_variant(axis: _Axis, side: float, reach: float) -> Variant:
-    """An end stop at one end of the travel. side: 1 (upper end) or -1 (lower end)."""
-    undo = axis.subtract(lambda m: side * np.maximum(side * axis.compute_position(m) - reach, 0.0))
-    return Variant((undo,), _make_stop_parameters(axis.middle + side * reach, side), lower_bound=0.0)
+def _make_stop_variant(axis: _Axis, direction: float, stop_distance: float) -> Variant:
+    """Make an end stop at one end of the travel. direction: 1 (upper end) or -1 (lower end)."""
+    undo = axis.subtract(lambda m: direction * np.maximum(direction * axis.compute_position(m) - stop_distance, 0.0))
+    return Variant((undo,), _make_stop_parameters(axis.middle + direction * stop_distance, direction), lower_bound=0.0)
 
 
-def _make_stop_parameters(position: float, side: float) -> ParametersOf:
-    """Make the map from the size of an end stop to its parameters. side (1 or -1): among them only where the sign of
-    the position (m or rad) does not imply it."""
-    side_parameter = {} if side * position > 0 else {"side": side}
-    return lambda s: {"position": position, "stiffness": float(s[0]), **side_parameter}
+def _make_stop_parameters(position: float, direction: float) -> ParametersOf:
+    """Make the map from the size of an end stop to its parameters: position (m or rad), stiffness, and side
+    (`direction`, 1 or -1) only where the sign of the position does not imply it."""
+    direction_parameter = {} if direction * position > 0 else {"side": direction}
+    return lambda s: {"position": position, "stiffness": float(s[0]), **direction_parameter}

@@ -22,14 +22,14 @@ import numpy as np
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.actuator_faults import make_actuator_faults
 from analysis.diagnosis.contrast.bases import (
-    bases_of,
+    build_bases,
     compute_unexplained_share,
     compute_unexplained_share_of_rows,
     have_similar_motion,
 )
 from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, undo_fault_in_rows
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
+from analysis.diagnosis.contrast.fault import Fault, Lags, Variant
 from analysis.diagnosis.contrast.fit_faults import ALL_BLOCKS, FaultFits, FittedVariant, fit_faults, restrict_sizes
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
@@ -72,7 +72,7 @@ def rank_faults(
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not have_similar_motion(*sides):
         return None
-    for bases, motions in bases_of(*sides):
+    for bases, motions in build_bases(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):
             compared_bases, faults = _prepare_bases(*sides, bases, motions)
             fault_fits = fit_faults(
@@ -100,18 +100,18 @@ def _prepare_bases(
             compared_bases.append(compare_base(base, clean, faulty))
     row_s = compared_bases[0].row_s
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
-    rows = Rows(lag_samples, suggest_delays_s(compared_bases), LATE_STEP * row_s, suggest_clock_rates(compared_bases))
+    lags = Lags(lag_samples, suggest_delays_s(compared_bases), LATE_STEP * row_s, suggest_clock_rates(compared_bases))
     faults: list[Fault] = []
     rotational = recording.is_rotational
     for axis, name in enumerate(recording.command.channels):
         if has_time_axis:
             faults += make_mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], rotational)
         if not recording.meta.get("imposed"):
-            faults += make_actuator_faults(axis, name, (*clean, *faulty), by_force, rows)
+            faults += make_actuator_faults(axis, name, (*clean, *faulty), by_force, lags)
     for channel, name in enumerate(recording.response.channels):
-        faults += make_sensor_faults(channel, name, (*clean, *faulty), rows)
+        faults += make_sensor_faults(channel, name, (*clean, *faulty), lags)
     if len(recording.response.channels) > 1:
-        faults += make_shared_faults((*clean, *faulty), rows)
+        faults += make_shared_faults((*clean, *faulty), lags)
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
         faults.append(make_misalignment_fault())
     return compared_bases, faults
@@ -207,7 +207,7 @@ def _judge_fault(
     fold_fits = [fit_sizes(fold_pairs, variant) for fold_pairs in folds]
     # Errors count at the size that was accepted; only the standard errors need the free size of a timing fault.
     allowed_variant = restrict_sizes(variant)
-    allowed_fits = [fit_sizes(fold_pairs, allowed_variant) for fold_pairs in folds] if variant.exact else fold_fits
+    allowed_fits = [fit_sizes(fold_pairs, allowed_variant) for fold_pairs in folds] if variant.one_size else fold_fits
     held_out_squares = sum(
         compute_held_out_error(fold_pairs, fold_fit.sizes, left_out)
         for left_out, fold_pairs, fold_fit in zip(SIXTHS, folds, allowed_fits, strict=True)

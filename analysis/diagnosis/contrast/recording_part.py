@@ -48,15 +48,15 @@ class Part:
         return self.recording.sample_rate_hz
 
     def to_observed(self) -> Observed:
-        """The part in the form that the force balance reads: known samples are used to fit, none are held out."""
+        """Convert to the record that the force balance reads: known samples are fitted, none are held out."""
         recording = replace(
             self.recording,
             command=replace(self.recording.command, samples=self.command),
             response=replace(self.recording.response, samples=self.response),
             position=_replace_samples(self.recording.position, self.position),
         )
-        no_samples = np.zeros(len(self.known), dtype=np.bool_)
-        return Observed(recording, self.command, self.response, self.known, no_samples, no_samples)
+        empty_mask = np.zeros(len(self.known), dtype=np.bool_)
+        return Observed(recording, self.command, self.response, self.known, empty_mask, empty_mask)
 
 
 def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
@@ -65,21 +65,21 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     parts: list[Part] = []
     for recording in recordings:
         for start, stop in find_parts(recording):
-            first_used = max(start, len(recording) - PART_MOST_SAMPLES)
-            if first_used >= stop:
+            first_sample = max(start, len(recording) - PART_MOST_SAMPLES)
+            if first_sample >= stop:
                 continue
-            known_indices = np.flatnonzero(_mask_finite_samples(cut_part(recording, first_used, stop)))
+            known_indices = np.flatnonzero(_mask_finite_samples(cut_part(recording, first_sample, stop)))
             if len(known_indices) and known_indices[-1] - known_indices[0] + 1 >= PART_LEAST_SAMPLES:
                 parts.append(
                     _cut_filled_part(
-                        recording, first_used + int(known_indices[0]), first_used + int(known_indices[-1]) + 1
+                        recording, first_sample + int(known_indices[0]), first_sample + int(known_indices[-1]) + 1
                     )
                 )
     return tuple(parts)
 
 
 def _mask_finite_samples(part: Recording) -> Mask:
-    """Mask (n,) of the samples at which all channels of response and position are finite."""
+    """Make the mask (n,) of the samples at which all channels of response and position are finite."""
     signals = [part.response.samples, *([] if part.position is None else [part.position.samples])]
     return np.asarray(np.isfinite(np.hstack(signals)).all(axis=1), dtype=np.bool_)
 

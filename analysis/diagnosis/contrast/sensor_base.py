@@ -34,12 +34,12 @@ class SensorBase:
     def build_rows(
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
-        """Build the rows of each part, (kept, 1 + columns): the filtered reading; its regressors, the differentiated
+        """Build the rows of each part, (rows, 1 + columns): the filtered reading; its regressors, the differentiated
         position from `SENSOR_TAPS` rows before to as many after, and 1. reusable_rows: not used."""
         return tuple(self._build_part_rows(part) for part in parts)
 
     def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
-        """Per part, mask of its rows: known samples that are more than one period of `band_hz` from the part's ends."""
+        """Mask the rows of each part: known samples that are more than one period of `band_hz` from the part's ends."""
         masks = []
         for part in parts:
             edge_samples = int(part.rate_hz / self.band_hz) + 1
@@ -50,7 +50,7 @@ class SensorBase:
         return tuple(masks)
 
     def _build_part_rows(self, part: Part) -> FloatArray:
-        """Build the rows (kept, 1 + columns) of one part, see `build_rows`; the part must have a position."""
+        """Build the rows (rows, 1 + columns) of one part, see `build_rows`; the part must have a position."""
         assert part.position is not None
         reading = filter_low_pass(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
         differentiated = differentiate(
@@ -69,6 +69,7 @@ def build_sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tupl
         return ()
     if parts[0].position.shape[1] != parts[0].response.shape[1]:
         return ()
+    # An unknown quantity counts as a low order in the response and a high one in the position: no base is built.
     orders = [
         (DERIVATIVE_OF_QUANTITY.get(response_quantity, -1), DERIVATIVE_OF_QUANTITY.get(position_quantity, 9))
         for response_quantity, position_quantity in zip(

@@ -1,4 +1,4 @@
-"""Faults of a sensor, each as the transformation of its readings y that removes it, for size 1 (see `rank_faults`).
+"""Faults of a sensor, each as the transformation of its readings y that removes it, for size 1.
 
     sensor_gain    y / gain                  sensor_nonlinearity     x with y = x + c x^3
     sensor_offset  y - shift                 sensor_asymmetry        x with y = x + c x^2
@@ -7,7 +7,8 @@
     clock_drift    y(t / (1 + rate error))   sensor_misalignment     y + R y, R skew-symmetric (three axes)
     sensor_lag     (y(t) - k y(t - Dt)) / (1 - k), k = exp(-Dt / T)
 
-T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `compute_drift_shape`.
+T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `compute_drift_shape`. The grids of
+tried values are chosen by hand. Called by `rank_faults`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,12 +29,12 @@ from analysis.diagnosis.contrast.fault import (
     ALL_CHANNELS,
     Curve,
     Fault,
+    Lags,
     ParametersOf,
-    Rows,
     Undo,
     Variant,
     fix_size,
-    proportional_parameter,
+    scale_parameter,
 )
 from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.recording_part import Part
@@ -50,9 +51,9 @@ TRIAL_GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 
 OFFSET_SHARES = (0.03, 0.1, 0.3, 0.7, 1.2)
 """Offsets and drifts that are tried, relative to the standard deviation of the channel."""
 NONLINEARITY_SHARES = (0.02, 0.06, 0.15, 0.3)
-"""Nonlinearity errors at the largest reading, as a share of it."""
+"""Nonlinearity errors at the largest reading that are tried, as a share of it."""
 BACKLASH_SHARES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
-"""Gaps of a backlash before the sensor, relative to the standard deviation of the channel."""
+"""Gaps of a backlash before the sensor that are tried, relative to the standard deviation of the channel."""
 CLOCK_DELAYS = (*np.geomspace(0.004, 0.2, GRID_SIZE // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
 """Delays of a clock at the end of the file that are tried, in periods of the median frequency: first a logarithmic
 grid, then steps of less than half a period."""
@@ -68,7 +69,7 @@ class _Channel:
     """Indices of the channels: a single one, or all."""
     name: str
     """Name of the channel; empty for all."""
-    rms: float
+    std: float
     """Standard deviation of the readings, of the largest channel."""
     peak: float
     """Largest magnitude of the readings."""
@@ -90,70 +91,71 @@ class _Channel:
         return undo
 
 
-def make_sensor_faults(index: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
-    """Make all faults of response channel `index`. parts: all compared ones, whose range the grids span. rows: spacing
-    of the base's rows, and likely delays and clock rates."""
+def make_sensor_faults(index: int, name: str, parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
+    """Make all faults of channel `index`. parts: all compared ones, whose range the grids span; lags: likely delays."""
     readings = np.concatenate([part.response[:, index] for part in parts])
     channel = _Channel((index,), name, float(np.std(readings)) or 1.0, float(np.abs(readings).max(initial=0.0)) or 1.0)
-    longest = max(parts, key=lambda part: len(part.response))
-    yield from _make_common_faults(channel, parts, longest.response[:, index], rows)
-    shares = [side * share for share in NONLINEARITY_SHARES for side in (1.0, -1.0)]
+    longest_part = max(parts, key=lambda part: len(part.response))
+    yield from _make_common_faults(channel, parts, longest_part.response[:, index], lags)
+    shares = [sign * share for share in NONLINEARITY_SHARES for sign in (1.0, -1.0)]
     yield channel.make_fault("sensor_nonlinearity", [_make_power_law(channel, share, 3, "cubic") for share in shares])
     yield channel.make_fault("sensor_asymmetry", [_make_power_law(channel, share, 2, "square") for share in shares])
-    yield channel.make_fault("sensor_play", [_make_backlash(channel, share * channel.rms) for share in BACKLASH_SHARES])
-    for other_channel in range(longest.response.shape[1]):
+    yield channel.make_fault("sensor_play", [_make_backlash(channel, share * channel.std) for share in BACKLASH_SHARES])
+    for other_channel in range(longest_part.response.shape[1]):
         if other_channel != index:
             yield _make_cross_axis_fault(channel, other_channel)
 
 
-def make_shared_faults(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
+def make_shared_faults(parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
     """Make the faults of all channels together, as of one supply, filter or logger. See `make_sensor_faults`."""
     readings = np.vstack([part.response for part in parts])
-    channel_rms = np.std(readings, axis=0)
-    loudest = int(np.argmax(channel_rms))
+    channel_std = np.std(readings, axis=0)
+    largest_channel = int(np.argmax(channel_std))
     peak = float(np.abs(readings).max(initial=0.0)) or 1.0
-    channel = _Channel(tuple(range(readings.shape[1])), "", float(channel_rms[loudest]) or 1.0, peak)
-    longest = max(parts, key=lambda part: len(part.response))
-    has_one_unit = len(set(longest.recording.response.units)) == 1
-    for fault in _make_common_faults(channel, parts, longest.response[:, loudest], rows):
+    channel = _Channel(tuple(range(readings.shape[1])), "", float(channel_std[largest_channel]) or 1.0, peak)
+    longest_part = max(parts, key=lambda part: len(part.response))
+    has_one_unit = len(set(longest_part.recording.response.units)) == 1
+    for fault in _make_common_faults(channel, parts, longest_part.response[:, largest_channel], lags):
         if has_one_unit or fault.effect not in UNIT_DEPENDENT_FAULTS:
             yield fault
 
 
-def _make_common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, rows: Rows) -> Iterator[Fault]:
+def _make_common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, lags: Lags) -> Iterator[Fault]:
     """Make the faults that one channel or all together may have. samples: (n,), readings of the longest part."""
     longest = max(parts, key=lambda part: len(part.response))
     delays_s = choose_trial_delays_s(samples, longest.rate_hz)
     yield channel.make_fault("sensor_gain", [_make_gain(channel, gain) for gain in TRIAL_GAINS])
-    offsets = [side * share * channel.rms for share in OFFSET_SHARES for side in (1.0, -1.0)]
+    offsets = [sign * share * channel.std for share in OFFSET_SHARES for sign in (1.0, -1.0)]
     yield channel.make_fault("sensor_offset", [_make_offset(channel, offset) for offset in offsets])
     drifts = [_make_drift(channel, offset, earlier) for offset in offsets for earlier in EARLIER_DRIFT_SHARES]
     yield replace(channel.make_fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
     yield channel.make_fault("logger_offset", [
         *(_make_logger_offset(channel, time_s, longest.rate_hz) for time_s in delays_s),
-        *(fix_size(_make_logger_offset(channel, time_s, longest.rate_hz), rows.late_step_s) for time_s in rows.late_s),
+        *(fix_size(_make_logger_offset(channel, time_s, longest.rate_hz), lags.step_s) for time_s in lags.delays_s),
     ])  # fmt: skip
-    lags = [time_s for time_s in delays_s if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
+    lag_times_s = [time_s for time_s in delays_s if time_s * longest.rate_hz >= 0.1 * lags.lag_samples]
     yield channel.make_fault(
-        "sensor_lag", [_make_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags]
+        "sensor_lag", [_make_lag(channel, time_s, longest.rate_hz, lags.lag_samples) for time_s in lag_times_s]
     )
     period_samples = longest.rate_hz / compute_median_frequency_hz(samples, longest.rate_hz)
-    rates = [side * delay * period_samples / longest.file_length for delay in CLOCK_DELAYS for side in (1.0, -1.0)]
-    runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
+    rates = [sign * delay * period_samples / longest.file_length for delay in CLOCK_DELAYS for sign in (1.0, -1.0)]
+    clock_origins = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [
-        _make_skew(channel, rate, run_on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for run_on in runs_on
+        _make_skew(channel, rate, from_file_start, parts)
+        for rate in rates
+        if abs(rate) < CLOCK_FASTEST
+        for from_file_start in clock_origins
     ]
     clocks += [
-        fix_size(_make_skew(channel, clock.rate, clock.runs_on, parts), 1e6 * clock.step) for clock in rows.clocks
+        fix_size(_make_skew(channel, clock.rate, clock.from_file_start, parts), 1e6 * clock.step)
+        for clock in lags.clocks
     ]
     yield replace(channel.make_fault("clock_drift", clocks), varies=True)
 
 
 def _make_backlash(channel: _Channel, gap: float) -> Variant:
-    """A backlash before the sensor. gap: its full width, in the channel's unit."""
-    return Variant(
-        (channel.make_undo(lambda y, rate: _undo_play(y, gap)),), proportional_parameter("gap", gap), *WIDE_RANGE
-    )
+    """Make a backlash before the sensor. gap: its full width, in the channel's unit."""
+    return Variant((channel.make_undo(lambda y, rate: _undo_play(y, gap)),), scale_parameter("gap", gap), *WIDE_RANGE)
 
 
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
@@ -173,19 +175,19 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
 
 
 def _make_cross_axis_fault(channel: _Channel, other_channel: int) -> Fault:
-    """Cross-axis sensitivity: the reading of this channel contains that of another one, times the size."""
-    (own_channel,) = channel.indices
+    """Make cross-axis sensitivity: the reading of this channel contains that of another one, times the size."""
+    (channel_index,) = channel.indices
 
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, own_channel] -= part.response[:, other_channel]
+        response[:, channel_index] -= part.response[:, other_channel]
         return replace(part, response=response)
 
-    return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), proportional_parameter("from_next"))])
+    return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), scale_parameter("from_next"))])
 
 
 def _make_gain(channel: _Channel, gain: float) -> Variant:
-    """A wrong gain, linearised about `gain`; its size is 1 there, and 0 at gain 1."""
+    """Make a wrong gain, linearised about `gain`; its size is 1 there, and 0 at gain 1."""
     undo = channel.make_undo(lambda y, rate: y / gain)
     compute_gain: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
     at_size = lambda size: _make_gain(channel, compute_gain(size))  # noqa: E731
@@ -193,65 +195,63 @@ def _make_gain(channel: _Channel, gain: float) -> Variant:
 
 
 def _make_offset(channel: _Channel, shift: float) -> Variant:
-    """A constant offset, in the channel's unit."""
-    return Variant(
-        (channel.make_undo(lambda y, rate: y - shift),), proportional_parameter("offset", shift), *WIDE_RANGE
-    )
+    """Make a constant offset, in the channel's unit."""
+    return Variant((channel.make_undo(lambda y, rate: y - shift),), scale_parameter("offset", shift), *WIDE_RANGE)
 
 
 def _make_drift(channel: _Channel, total: float, earlier_share: float) -> Variant:
-    """An offset that grows linearly to `total`. earlier_share: share of it before the file began."""
+    """Make an offset that grows linearly to `total`. earlier_share: share of it before the file began."""
 
     def undo(part: Part) -> Part:
         response = part.response.copy()
         response[:, list(channel.indices)] -= total * compute_drift_shape(part, earlier_share)[:, None]
         return replace(part, response=response)
 
-    return Variant((undo,), proportional_parameter("total", total), *WIDE_RANGE)
+    return Variant((undo,), scale_parameter("total", total), *WIDE_RANGE)
 
 
-def _make_logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
-    """Readings recorded `time_s` late. rate_hz: of the longest part, for the noise gain of interpolation."""
+def _make_logger_offset(channel: _Channel, delay_s: float, rate_hz: float) -> Variant:
+    """Make a delay: readings recorded `delay_s` late. rate_hz: of the longest part, for `compute_noise_gain`."""
 
     def undo(part: Part) -> Part:
-        delay_samples = time_s * part.rate_hz
+        delay_samples = delay_s * part.rate_hz
         undone = channel.make_undo(lambda y, rate: shift_samples(y[:, None], -delay_samples)[:, 0])(part)
         return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - delay_samples))
 
-    at_size = lambda size: _make_logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
-    noise_factor = compute_noise_gain(time_s * rate_hz)
+    at_size = lambda size: _make_logger_offset(channel, size * delay_s, rate_hz)  # noqa: E731
+    noise_factor = compute_noise_gain(delay_s * rate_hz)
     return Variant(
-        (undo,), proportional_parameter("offset", time_s), *SIZE_RANGE, noise_factor=noise_factor,
-        at_size=at_size, exact=True,
+        (undo,), scale_parameter("offset", delay_s), *SIZE_RANGE, noise_factor=noise_factor,
+        at_size=at_size, one_size=True,
     )  # fmt: skip
 
 
-def _make_lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
-    """A first-order low pass, y += (1 - decay) (x - y) per `samples`, inverted exactly. An autoregression predicts a
-    row from earlier rows alone, so that samples between rows are not used here either. The low pass reduces one-step
-    prediction errors by the geometric mean of its gain, 1 - decay (Kolmogorov's formula)."""
-    decay = float(np.exp(-samples / (time_s * rate_hz)))
+def _make_lag(channel: _Channel, time_s: float, rate_hz: float, row_samples: int) -> Variant:
+    """Make a low pass of first order, y += (1 - decay) (x - y) per `row_samples`, inverted exactly. An autoregression
+    predicts a row from earlier rows alone, so that samples between rows are not used here either. The low pass reduces
+    one-step prediction errors by the geometric mean of its gain, 1 - decay (Kolmogorov's formula)."""
+    decay = float(np.exp(-row_samples / (time_s * rate_hz)))
     undo = channel.make_undo(
-        lambda y, rate: (y - decay * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - decay)
+        lambda y, rate: (y - decay * np.concatenate([y[:1]] * row_samples + [y])[: len(y)]) / (1 - decay)
     )
     parameters_of: ParametersOf = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
-    at_size = lambda size: _make_lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
+    at_size = lambda size: _make_lag(channel, size * time_s, rate_hz, row_samples)  # noqa: E731
     return Variant((undo,), parameters_of, *SIZE_RANGE, 1 - decay, at_size=at_size)
 
 
 def _make_power_law(channel: _Channel, share: float, power: int, parameter_name: str) -> Variant:
-    """A term of power 2 or 3. share: its value at the largest reading, relative to that reading."""
+    """Make an additional term of power 2 or 3. share: its value at the largest reading, relative to that reading."""
     peak = channel.peak
     curve: Curve = lambda y: _invert_power_law(y / peak, share, power) * peak  # noqa: E731
     at_size = lambda size: _make_power_law(channel, size * share, power, parameter_name)  # noqa: E731
-    parameters_of = proportional_parameter(parameter_name, share / peak ** (power - 1))
+    parameters_of = scale_parameter(parameter_name, share / peak ** (power - 1))
     return Variant(
         (channel.make_undo(lambda y, rate: curve(y)),), parameters_of, *WIDE_RANGE, curve=curve, at_size=at_size
     )
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
-    """Solve y = x + share x^power for x (n,), clipped to -3 to 3, by 20 Newton steps. y: readings over the largest."""
+    """Solve y = x + share x^power for x (n,), by 20 Newton steps, clipped to -3 to 3. y: readings over the largest."""
     x = y.copy()
     for _ in range(20):
         slope = 1 + power * share * x ** (power - 1)
@@ -259,12 +259,12 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _make_skew(channel: _Channel, rate_error: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
-    """Clock skew: readings taken at t (1 + rate_error), resampled to t. runs_on: whether t counts from the beginning of
-    the file, else of each part."""
+def _make_skew(channel: _Channel, rate_error: float, from_file_start: bool, parts: Sequence[Part]) -> Variant:
+    """Make clock skew: readings taken at t (1 + rate_error), resampled to t. from_file_start: whether t counts from
+    the beginning of the file, else of each part."""
 
     def compute_read_times(part: Part) -> FloatArray:
-        offset = part.start if runs_on else 0
+        offset = part.start if from_file_start else 0
         return np.asarray((offset + np.arange(len(part.response))) / (1 + rate_error) - offset)
 
     def undo(part: Part) -> Part:
@@ -272,15 +272,15 @@ def _make_skew(channel: _Channel, rate_error: float, runs_on: bool, parts: Seque
         undone = channel.make_undo(lambda y, rate: resample(y, times))(part)
         return replace(undone, known=part.known & (times >= 0) & (times <= len(times) - 1))
 
-    at_size = lambda size: _make_skew(channel, size * rate_error, runs_on, parts)  # noqa: E731
+    at_size = lambda size: _make_skew(channel, size * rate_error, from_file_start, parts)  # noqa: E731
     noise_factor = compute_noise_gain(np.concatenate([compute_read_times(part) for part in parts]))
     return Variant(
-        (undo,), proportional_parameter("ppm", 1e6 * rate_error), *SIZE_RANGE, noise_factor=noise_factor,
-        at_size=at_size, exact=True,
+        (undo,), scale_parameter("ppm", 1e6 * rate_error), *SIZE_RANGE, noise_factor=noise_factor,
+        at_size=at_size, one_size=True,
     )  # fmt: skip
 
 
-ROTATIONS = (
+ROTATION_GENERATORS = (
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
     ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
@@ -290,11 +290,11 @@ readings."""
 
 
 def make_misalignment_fault() -> Fault:
-    """A rotation of a three-axis sensor by small angles, to first order. Its three sizes are angles in rad."""
+    """Make a rotation of a three-axis sensor by small angles, to first order. Its three sizes are angles in rad."""
 
     def make_undo(generator: FloatArray) -> Undo:
         return lambda part: replace(part, response=part.response + part.response @ generator.T)
 
-    undo = tuple(make_undo(np.array(generator)) for generator in ROTATIONS)
+    undo = tuple(make_undo(np.array(generator)) for generator in ROTATION_GENERATORS)
     variant = Variant(undo, lambda s: {"degrees": float(np.degrees(np.linalg.norm(s)))})
     return Fault("sensor_misalignment", "sensor", "", ALL_CHANNELS, (variant,))

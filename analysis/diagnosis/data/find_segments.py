@@ -2,8 +2,8 @@
 
 A candidate period is the first high peak of the command's autocorrelation. It is accepted only where the command
 itself, sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat
-approximately, are not used. Without such a part, no segments are declared. `prepare_recordings` and the import of
-measurements (`study.importing`) call this.
+approximately, are not used. Without such a part, no segments are declared. Called by `prepare_recordings` and
+`study.importing.build_recording`; `analysis.look.repeats` uses the search for a period.
 """
 
 from collections.abc import Sequence
@@ -18,19 +18,22 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
 SHORTEST_PERIOD = 16
-"""Shortest period that is searched for, in samples."""
+"""Shortest period that is searched for, in samples. Chosen by hand."""
 FEWEST_PERIODS = 3
 """Least number of periods of a part: the first contains the transient, and noise needs two more."""
 SHORTEST_DECLARED_PERIOD = 256
-"""Least period in samples for a diagnosis: of a shorter one an odd multiple is declared, so that odd lines stay odd."""
+"""Least period in samples for a diagnosis: of a shorter one an odd multiple is declared, so that odd lines stay odd.
+Chosen by hand."""
 REPEAT_CORRELATION, DIP_CORRELATION = 0.98, 0.7
-"""Least correlation of a command with itself one period later, and level below which it must fall in between."""
+"""Least correlation of a command with itself one period later, and level below which it must fall in between. Chosen by
+hand."""
 SINE_SHARE = 0.98
-"""Share of the power on a single line above which a periodic command is a sine."""
+"""Share of the power on a single line above which a periodic command is a sine. Chosen by hand."""
 EXACT_TOLERANCE = 1e-6
 """Largest difference of a command between periods, relative to its peak: rounding of numbers stored with six digits."""
 ROUNDED_TOLERANCE = 1e-3
-"""Largest rms difference between periods due to rounding, relative to the command's rms."""
+"""Largest rms difference between periods due to rounding, relative to the standard deviation of the
+command. Chosen by hand."""
 MOST_SEARCHED_SAMPLES = 2**19
 """Largest number of samples in which a period is searched for; limits the computing time of the correlation."""
 LARGEST_SAMPLE = 1e100
@@ -38,8 +41,8 @@ LARGEST_SAMPLE = 1e100
 
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:
-    """Find the segments. Returns the recording with them, and a sentence about them; the recording unchanged, and no
-    sentence, where it has segments, or no part of its command repeats."""
+    """Find the segments. Returns the recording with them, and a sentence about them; the recording unchanged and an
+    empty string where it has segments, or no part of its command repeats."""
     if recording.segments:
         return recording, ""
     parts = find_parts(recording)
@@ -71,7 +74,8 @@ def find_designed_command(recording: Recording) -> Signal:
 
 def find_exact_period(command: FloatArray) -> int:
     """Find the period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often
-    enough. Where the shortest period has less than `SHORTEST_DECLARED_PERIOD` samples, an odd multiple of it."""
+    enough. Where the shortest period has less than `SHORTEST_DECLARED_PERIOD` samples, an odd multiple of it, or 0 if
+    no multiple that is long enough fits into the part often enough."""
     period = find_period(command)
     if (
         not period
@@ -81,28 +85,34 @@ def find_exact_period(command: FloatArray) -> int:
         return 0
     if period >= SHORTEST_DECLARED_PERIOD:
         return period
-    # The largest odd multiple of which `MOST_PERIODS` and one for the transient fit into the part; it is also a period.
-    periods_per_part = len(command) // period // (MOST_PERIODS + 1)
-    multiple = period * max(1, periods_per_part - 1 + periods_per_part % 2)
-    return multiple if multiple >= SHORTEST_DECLARED_PERIOD else 0
+    # The largest odd multiple of which `MOST_PERIODS` and one for the transient fit into the part, else the period.
+    largest_multiple = len(command) // period // (MOST_PERIODS + 1)
+    declared_period = period * max(1, largest_multiple - 1 + largest_multiple % 2)
+    return declared_period if declared_period >= SHORTEST_DECLARED_PERIOD else 0
 
 
 def find_period(command: FloatArray) -> int:
     """Find the shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 =
     none."""
-    searched = command[:MOST_SEARCHED_SAMPLES]
-    largest = float(np.abs(searched).max(initial=0.0))
-    if LARGEST_SAMPLE < largest < np.inf:
-        searched = searched / largest
-    deviation = np.std(searched, axis=0) if searched.size else np.zeros(command.shape[1])
-    if not np.isfinite(searched).all() or not (deviation > 0).any() or len(searched) < 2 * SHORTEST_PERIOD:
+    searched_samples = command[:MOST_SEARCHED_SAMPLES]
+    largest_sample = float(np.abs(searched_samples).max(initial=0.0))
+    if LARGEST_SAMPLE < largest_sample < np.inf:
+        searched_samples = searched_samples / largest_sample
+    channel_std = np.std(searched_samples, axis=0) if searched_samples.size else np.zeros(command.shape[1])
+    if (
+        not np.isfinite(searched_samples).all()
+        or not (channel_std > 0).any()
+        or len(searched_samples) < 2 * SHORTEST_PERIOD
+    ):
         return 0
-    scaled = (searched[:, deviation > 0] - searched[:, deviation > 0].mean(axis=0)) / deviation[deviation > 0]
-    correlation = _compute_autocorrelation(scaled)[: len(searched) // 2 + 1]
-    dips = np.flatnonzero(correlation < DIP_CORRELATION)
-    if not len(dips):
+    scaled = (searched_samples[:, channel_std > 0] - searched_samples[:, channel_std > 0].mean(axis=0)) / channel_std[
+        channel_std > 0
+    ]
+    correlation = _compute_autocorrelation(scaled)[: len(searched_samples) // 2 + 1]
+    dip_lags = np.flatnonzero(correlation < DIP_CORRELATION)
+    if not len(dip_lags):
         return 0
-    high_lags = np.flatnonzero(correlation[dips[0] :] > REPEAT_CORRELATION) + dips[0]
+    high_lags = np.flatnonzero(correlation[dip_lags[0] :] > REPEAT_CORRELATION) + dip_lags[0]
     if not len(high_lags) or high_lags[0] < SHORTEST_PERIOD:
         return 0
     # The maximum of the first run of consecutive lags that are high enough.
@@ -124,8 +134,8 @@ def _compute_autocorrelation(samples: FloatArray) -> FloatArray:
 
 
 def _is_exact_repeat(later_period: FloatArray, earlier_period: FloatArray) -> bool:
-    """Whether each channel repeats, up to rounding: to six digits, or by one step of its own resolution with an rms
-    difference of at most `ROUNDED_TOLERANCE`."""
+    """Whether each channel repeats, up to rounding: to six digits, or by one step of its own resolution (1.5 as margin)
+    with an rms difference of at most `ROUNDED_TOLERANCE`. Arrays (n, m); not where a sample is not finite."""
     if not np.isfinite(later_period).all() or not np.isfinite(earlier_period).all():
         return False
     for later_column, earlier_column in zip(later_period.T, earlier_period.T, strict=True):
@@ -155,14 +165,16 @@ def _compute_peak(command: Signal, start: int, stop: int) -> float:
 
 def _describe_segments(segments: Sequence[Segment]) -> str:
     """Describe the segments, of which at least one is periodic, in a sentence."""
-    periodic = [segment for segment in segments if segment.period]
-    periods = conjoin([str(period) for period in sorted({segment.period for segment in periodic})])
-    levels = conjoin([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])
-    subject = (
-        "The command" if len(periodic) == len(segments) else f"In {len(periodic)} of {len(segments)} parts the command"
+    periodic_segments = [segment for segment in segments if segment.period]
+    periods_text = conjoin([str(period) for period in sorted({segment.period for segment in periodic_segments})])
+    levels_text = conjoin([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic_segments})])
+    subject_text = (
+        "The command"
+        if len(periodic_segments) == len(segments)
+        else f"In {len(periodic_segments)} of {len(segments)} parts the command"
     )
-    fewest = min((segment.stop - segment.start) // segment.period for segment in periodic)
+    fewest_periods = min((segment.stop - segment.start) // segment.period for segment in periodic_segments)
     return (
-        f"{subject} repeats exactly, every {periods} samples, {fewest} times or more in each part: segments with that "
-        f"period were made, with peaks of {levels} (SI units)."
+        f"{subject_text} repeats exactly, every {periods_text} samples, {fewest_periods} times or more in each part: "
+        f"segments with that period were made, with peaks of {levels_text} (SI units)."
     )

@@ -1,6 +1,7 @@
-"""Converts commands in A, V or no unit to forces or torques, by a force (torque) constant that the user states.
+"""Convert commands in A, V or no unit to forces or torques, by a force (torque) constant that the user states.
 
 force = constant x command, in N or N m per unit of the command, so that masses and stiffnesses are found in SI units.
+Called by `study.workflows.diagnosis.diagnosis_input`.
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.signals.unit_system import FORCE_UNITS, determine_unit_system
 
-CONVERTED = {"m": ("force", "N"), "rad": ("torque", "N m")}
-"""Quantity and unit of the converted command, by the motion's unit."""
+QUANTITY_AND_UNIT = {"m": ("force", "N"), "rad": ("torque", "N m")}
+"""Quantity and unit of the converted command, by the unit of length of the motion."""
 
 
 class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
@@ -21,14 +22,15 @@ class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
 
 
 def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
-    """The recording with its commands as forces, and a sentence about it. constants: a single value for all commands or
-    a value for each, in N or N m per unit of the command. Raises NoForceConstant where the motion has no SI unit, a
-    command is a force already, or the constants are of a wrong number, zero or not finite."""
+    """Convert the commands to forces, and an excitation with as many channels too. Returns the recording and a sentence
+    about it. constants: a single value for all commands or a value for each, in N or N m per unit of the command.
+    Raises NoForceConstant where the motion has no SI unit, a command is a force already, or the constants are of a
+    wrong number, zero or not finite."""
     command, length_unit = (
         recording.command,
         determine_unit_system(recording.command.units, recording.response.units).length,
     )
-    if length_unit not in CONVERTED:
+    if length_unit not in QUANTITY_AND_UNIT:
         raise NoForceConstant(
             f"the motion is in {length_unit}: no force constant makes SI of it, so give its unit in the map"
         )
@@ -38,21 +40,21 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
         raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
     if not all(np.isfinite(constant) and constant for constant in constants):
         raise NoForceConstant("a force constant must be a number other than 0")
-    quantity, unit = CONVERTED[length_unit]
+    quantity, unit = QUANTITY_AND_UNIT[length_unit]
     factors = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
 
     def convert(signal: Signal) -> Signal:
         return replace(signal, samples=signal.samples * factors, quantity=quantity, unit=unit)
 
     excitation = recording.excitation
-    fits = excitation is not None and len(excitation.channels) == len(command.channels)
-    per = "" if command.units[0] == "1" else f" per {command.units[0]}"
-    text = ", ".join(f"{constant:g}" for constant in constants)
+    has_same_channel_count = excitation is not None and len(excitation.channels) == len(command.channels)
+    per_unit = "" if command.units[0] == "1" else f" per {command.units[0]}"
+    constants_text = ", ".join(f"{constant:g}" for constant in constants)
     return (
         replace(
             recording,
             command=convert(command),
-            excitation=convert(excitation) if excitation is not None and fits else excitation,
+            excitation=convert(excitation) if excitation is not None and has_same_channel_count else excitation,
         ),
-        f"The commands were multiplied by the {quantity} constant that was stated, {text} {unit}{per}.",
+        f"The commands were multiplied by the {quantity} constant that was stated, {constants_text} {unit}{per_unit}.",
     )

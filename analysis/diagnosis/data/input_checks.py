@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.data.observed_parts import count_fit_samples
-from analysis.diagnosis.data.recorded_conditions import find_weight_problems
+from analysis.diagnosis.data.recorded_conditions import find_payload_problems
 from analysis.diagnosis.settings import (
     CYCLES_SHARE,
     DRIVEN_DEVIATIONS,
@@ -144,7 +144,7 @@ def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) ->
         *_compare_quantities(model, first),
         *_find_impossible_model_values(model),
     )
-    problems = problems or find_weight_problems(model, recordings, names)
+    problems = problems or find_payload_problems(model, recordings, names)
     if not problems:
         problems = (
             *_find_unconnected_channels(model, first),

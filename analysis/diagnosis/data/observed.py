@@ -2,7 +2,7 @@
 
 The sets are those of statistical learning: training (`fit`: parameters are fitted to it), validation (`choose`: among
 explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error). All errors and
-force balances are computed from these records.
+force balances of the diagnosis are computed from these records; `observed_parts` makes them.
 """
 
 from collections.abc import Sequence
@@ -41,8 +41,8 @@ class Observed:
     test: Mask
     """(n,): held-out samples, used only in the end."""
 
-    def unseal(self, mask: Mask) -> "Observed":
-        """Copy in which the held-out samples within the mask `mask` (n,) are no longer held out: of each stretch, two
+    def release_test_samples(self, mask: Mask) -> "Observed":
+        """Release the held-out samples within `mask` (n,) for fitting, in a copy: of each stretch, two
         thirds become fit samples, the last third validation samples."""
         mask = mask & self.test
         fit, choose = self.fit.copy(), self.choose.copy()
@@ -57,8 +57,8 @@ class Observed:
         return max((stop - start for start, stop in find_runs(self.test)), default=0)
 
     def mask_alternate_parts(self, part_count: int) -> Mask:
-        """Mask (n,) of the first, third, fifth … part of each held-out stretch, which is divided into `part_count`
-        equal parts."""
+        """Make the mask (n,) of the first, third, fifth … part of each held-out stretch, which is divided into
+        `part_count` equal parts."""
         mask = np.zeros(len(self.test), dtype=np.bool_)
         for start, stop in find_runs(self.test):
             mask[start:stop] = (np.arange(stop - start) * part_count // (stop - start)) % 2 == 0
@@ -74,15 +74,15 @@ class Observed:
         ]
 
     def mask_test_below(self, level: float) -> Mask:
-        """Mask (n,) of the held-out samples in segments whose commands are below `level` in magnitude."""
+        """Make the mask (n,) of the held-out samples in segments whose commands are below `level` in magnitude."""
         mask = np.zeros(len(self.test), dtype=np.bool_)
-        for segment, largest in self.list_test_levels():
-            mask[segment.start : segment.stop] = largest < level
+        for segment, largest_command in self.list_test_levels():
+            mask[segment.start : segment.stop] = largest_command < level
         return mask & self.test
 
-    def fit_to_all(self) -> "Observed":
-        """Join fit and validation samples, and use them for both: for explanations that are chosen by
-        other means than validation."""
+    def join_fit_and_choose(self) -> "Observed":
+        """Join fit and validation samples, and use them for both: for explanations that are chosen by other means than
+        validation."""
         return replace(self, fit=self.fit | self.choose, choose=self.fit | self.choose)
 
     def shorten(self) -> "Observed":
@@ -101,23 +101,23 @@ class Observed:
         )
 
 
-def observe(recording: Recording, responses: int) -> Observed:
-    """Make one record of a recording, with its samples divided by `split_samples`. responses: number of the model's
-    outputs; a position with another number of channels is left out."""
-    measured, complete = stack_measured_signals(recording, responses)
-    fit, choose, test = (mask & complete for mask in split_samples(recording.segments, len(recording)))
+def observe(recording: Recording, response_count: int) -> Observed:
+    """Make one record of a recording, with its samples divided by `split_samples`. response_count: number of the
+    model's outputs; a position with another number of channels is left out."""
+    measured, is_complete = stack_measured_signals(recording, response_count)
+    fit, choose, test = (mask & is_complete for mask in split_samples(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
-def stack_measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
+def stack_measured_signals(recording: Recording, response_count: int) -> tuple[FloatArray, Mask]:
     """Stack response and position side by side, (n, c), with the mask (n,) of samples where all are finite. A position
-    whose number of channels is not `responses` is left out."""
+    whose number of channels is not `response_count` is left out."""
     signals = [recording.response.samples]
-    if recording.position is not None and recording.position.samples.shape[1] == responses:
+    if recording.position is not None and recording.position.samples.shape[1] == response_count:
         signals.append(recording.position.samples)
     measured = np.hstack(signals)
-    complete: Mask = np.asarray(np.isfinite(measured).all(axis=1), dtype=np.bool_)
-    return measured, complete
+    is_complete: Mask = np.asarray(np.isfinite(measured).all(axis=1), dtype=np.bool_)
+    return measured, is_complete
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,12 +141,12 @@ def _find_end_of_motion(samples: FloatArray) -> int:
     its last `LONGEST_TAIL`. The rest value is the median over that tail."""
     samples = samples[:, np.isfinite(samples).any(axis=0)]
     tail_start = int((1 - LONGEST_TAIL) * len(samples))
-    complete: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
-    if not complete[:tail_start].any() or not complete[tail_start:].any():
+    is_complete: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
+    if not is_complete[:tail_start].any() or not is_complete[tail_start:].any():
         return len(samples)
-    is_displaced = np.abs(samples - np.median(samples[tail_start:][complete[tail_start:]], axis=0)) > AT_REST * np.ptp(
-        samples[complete], axis=0
-    )
+    is_displaced = np.abs(
+        samples - np.median(samples[tail_start:][is_complete[tail_start:]], axis=0)
+    ) > AT_REST * np.ptp(samples[is_complete], axis=0)
     moving_samples = np.flatnonzero(is_displaced.any(axis=1))
     if not len(moving_samples) or moving_samples[-1] >= tail_start:
         return len(samples)
@@ -171,16 +171,18 @@ def split_samples(
     """
     if not segments:
         return _split_without_segments(spans or (Span(0, length, length),), length, test_elsewhere)
-    driven_segments = [s for s in segments if s.kind != "rest"]
-    test = _mask_segments([s for s in driven_segments if s.role == "test"], length)
-    fitted = [s for s in driven_segments if s.role == "fit"] or [s for s in driven_segments if s.role != "test"]
-    fit = _mask_segments(fitted, length) if fitted else ~test
-    if driven_segments and all(s.role == "test" for s in driven_segments):
+    driven_segments = [segment for segment in segments if segment.kind != "rest"]
+    test = _mask_segments([segment for segment in driven_segments if segment.role == "test"], length)
+    fitted_segments = [segment for segment in driven_segments if segment.role == "fit"] or [
+        segment for segment in driven_segments if segment.role != "test"
+    ]
+    fit = _mask_segments(fitted_segments, length) if fitted_segments else ~test
+    if driven_segments and all(segment.role == "test" for segment in driven_segments):
         fit[:] = False
     elif not test.any() and not test_elsewhere:
-        test = _mask_segment_ends(fitted, length)
+        test = _mask_segment_ends(fitted_segments, length)
         fit &= ~test
-    choose = _mask_middle_level(fitted, length) & fit
+    choose = _mask_middle_level(fitted_segments, length) & fit
     if not choose.any():
         indices = np.flatnonzero(fit)
         choose[indices[int((1 - CHOOSE_SHARE) * len(indices)) :]] = True
@@ -203,13 +205,14 @@ def _split_without_segments(spans: Sequence[Span], length: int, test_elsewhere: 
 
 def compute_error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
     """Compute (c,): unit by which each channel's errors are divided, sqrt(noise^2 + (MODEL_FLOOR rms)^2), with the rms
-    of the noise, and the share of the signal's rms that no model predicts. measured: (n, c); noise: (c,), rms."""
+    of the noise, and the share of the signal's rms that no model predicts. measured: (n, c), NaN = missing; noise:
+    (c,), rms."""
     rms = np.sqrt(np.nanmean(measured**2, axis=0))
     return np.asarray(np.sqrt(noise**2 + (MODEL_FLOOR * rms) ** 2))
 
 
 def _mask_segments(segments: list[Segment], length: int) -> Mask:
-    """Mask (length,) of the samples in these segments."""
+    """Make the mask (length,) of the samples in these segments."""
     mask = np.zeros(length, dtype=np.bool_)
     for segment in segments:
         mask[segment.start : segment.stop] = True
@@ -217,8 +220,8 @@ def _mask_segments(segments: list[Segment], length: int) -> Mask:
 
 
 def _mask_segment_ends(segments: list[Segment], length: int) -> Mask:
-    """Mask (length,) of the last quarter of each segment, rounded to whole periods but at least one period; of the
-    last quarter of the time where there is one level or none."""
+    """Make the mask (length,) of the last quarter of each segment, rounded to whole periods but at least one period; of
+    the last quarter of the time where there is one level or none."""
     mask = np.zeros(length, dtype=np.bool_)
     if len(_list_levels(segments)) < LEVELS_TO_STRATIFY:
         indices = np.flatnonzero(_mask_segments(segments, length)) if segments else np.arange(length)
@@ -241,10 +244,10 @@ def _list_levels(segments: list[Segment]) -> list[float]:
 
 
 def _mask_middle_level(segments: list[Segment], length: int) -> Mask:
-    """Mask (length,) of the segments of the middle level; all False with fewer than `LEVELS_TO_HOLD_ONE_BACK`
+    """Make the mask (length,) of the segments of the middle level; all False with fewer than `LEVELS_TO_HOLD_ONE_BACK`
     levels."""
     levels = _list_levels(segments)
     if len(levels) < LEVELS_TO_HOLD_ONE_BACK:
         return np.zeros(length, dtype=np.bool_)
-    middle = levels[len(levels) // 2]
-    return _mask_segments([segment for segment in segments if segment.amplitude == middle], length)
+    middle_level = levels[len(levels) // 2]
+    return _mask_segments([segment for segment in segments if segment.amplitude == middle_level], length)

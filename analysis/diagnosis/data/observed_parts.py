@@ -1,8 +1,8 @@
-"""Recordings cut into their parts (continuous stretches between gaps); each part is compared with the model by itself.
+"""Cut recordings into their parts (continuous stretches between gaps); each part is compared with the model by itself.
 
 The samples of each part are split into those to fit, to choose and to test by (`observed.split_samples`). Periods of a
-segment after the first `MOST_PERIODS` are used for the test only. Called wherever recordings are
-compared with a model (`choose_measure`, `balances`, `first_model`).
+segment after the first `MOST_PERIODS` are used for the test only. Called by `choose_measure`, `balances`, the modules
+of `first_model` and others that compare recordings with a model.
 """
 
 from collections.abc import Sequence
@@ -18,27 +18,27 @@ from equalizer.signals.signal import Signal
 
 MOST_PERIODS = 4
 """Largest number of periods of a segment to fit and to choose by: further ones add computing time and little
-information. By hand."""
+information. Chosen by hand."""
 LEAST_SAMPLES = 32
-"""Least number of samples of a part; shorter ones are left out. By hand."""
+"""Least number of samples of a part; shorter ones are left out. Chosen by hand."""
 
 
-def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
-    """Cut all recordings into parts, ready for comparison. responses: number of the model's outputs; a position with
-    another number of channels is not used. Roles are those of the whole set: where a segment of any recording is marked
-    as test, no other samples are held out; where all segments are marked as test, the marks are ignored."""
+def observe_parts(recordings: Sequence[Recording], response_count: int) -> tuple[Observed, ...]:
+    """Cut all recordings into parts, ready for comparison. response_count: number of the model's outputs; a position
+    with another number of channels is not used. Roles are those of the whole set: where a segment of any recording is
+    marked as test, no other samples are held out; where all segments are marked as test, the marks are ignored."""
     roles = [segment.role for recording in recordings for segment in recording.segments]
     if roles and all(role == "test" for role in roles):
         recordings = [_clear_roles(recording) for recording in recordings]
     has_test_segment = any(segment.role == "test" for recording in recordings for segment in recording.segments)
     parts: list[Observed] = []
     for recording in recordings:
-        measured, complete = stack_measured_signals(recording, responses)
+        measured, is_complete = stack_measured_signals(recording, response_count)
         spans = find_moving_spans(recording.response.samples, find_parts(recording))
         fit, choose, test = split_samples(recording.segments, len(recording), has_test_segment, spans)
         masks = (
-            *_exclude_surplus_periods(fit & complete, choose & complete, ~_mask_surplus_periods(recording)),
-            test & complete,
+            *_exclude_surplus_periods(fit & is_complete, choose & is_complete, ~_mask_surplus_periods(recording)),
+            test & is_complete,
         )
         for start, stop in find_parts(recording):
             part_masks: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
@@ -65,7 +65,7 @@ def _exclude_surplus_periods(fit: Mask, choose: Mask, is_used: Mask) -> tuple[Ma
 
 
 def _mask_surplus_periods(recording: Recording) -> Mask:
-    """Mask (n,) of the samples after the first `MOST_PERIODS` periods of a segment."""
+    """Make the mask (n,) of the samples after the first `MOST_PERIODS` periods of a segment."""
     mask = np.zeros(len(recording), dtype=np.bool_)
     for segment in recording.segments:
         if segment.period > 0:
@@ -75,7 +75,7 @@ def _mask_surplus_periods(recording: Recording) -> Mask:
 
 def find_parts(recording: Recording) -> tuple[tuple[int, int], ...]:
     """Find begin and end (exclusive) of each part with at least `LEAST_SAMPLES`, as sample indices; the whole recording
-    where `meta` names no such part."""
+    where `meta` (key "parts") states no such part within it."""
     stated_parts = recording.meta.get("parts")
     parts = [
         (int(stretch["start"]), int(stretch["stop"]))
@@ -127,8 +127,8 @@ def _clear_roles(recording: Recording) -> Recording:
 
 
 def name_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Name the parts in the order of `observe_parts`: the recording's name, with the part's number where there are
-    several."""
+    """Name the parts in the order of `observe_parts`: the recording's name ("recording 2" where `names` is too short),
+    with the part's number where there are several."""
     part_names: list[str] = []
     for number, recording in enumerate(recordings):
         name = names[number] if number < len(names) else f"recording {number + 1}"

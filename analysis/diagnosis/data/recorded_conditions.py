@@ -1,8 +1,9 @@
-"""The model and the effects as they were during a recording.
+"""Adapt the model and the effects to what differed during a recording: payload, conditions, signs of commands.
 
-Three things may differ between recordings of one device: a mass or inertia that it carried (keys of `meta`), recorded
-conditions such as a temperature, on which effects depend, and the sign of commands. The simulations of `errors` call
-this for every recording.
+Three properties may differ between recordings of one device: a mass or inertia that it carried (keys of `meta`),
+recorded conditions such as a temperature, on which effects depend, and the sign of commands. Called for every recording
+by the simulations of `errors`, `forces.predicted_force` and `confirm.balance_with_model`; `input_checks` checks the
+payload.
 """
 
 from collections.abc import Sequence
@@ -28,9 +29,10 @@ REVERSED_CHANNELS = "turned commands"
 """Key of a recording's `meta`: channels of its commands that were reversed."""
 
 
-def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """Add the mass or inertia that the device carried along every driven axis, as the recording's `meta` states."""
-    added_mass = recording.meta.get(_choose_weight_key(model), 0.0)
+def add_payload(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+    """Add the payload, the mass or inertia that the device carried along every driven axis, as the recording's `meta`
+    states; the model unchanged where it states none."""
+    added_mass = recording.meta.get(_choose_payload_key(model), 0.0)
     return add_mass(model, float(added_mass)) if added_mass else model
 
 
@@ -64,8 +66,9 @@ def apply_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> t
 
 
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """The model for the commands as they were recorded. model: for the recording as it is compared, in which commands
-    may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit masses."""
+    """Adapt the model to the commands as they were recorded. model: for the recording as it is compared, in which
+    commands may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit
+    masses."""
     if is_free_motion(recording):
         return replace(model, mass=np.eye(len(model.mass)))
     channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED_CHANNELS)
@@ -75,11 +78,12 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
     return with_reversed_commands(model, signs, channels, recording.response.channels)
 
 
-def find_weight_problems(
+def find_payload_problems(
     model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]
 ) -> tuple[str, ...]:
-    """Find errors in the stated masses and inertias, as sentences without a full stop; empty where there are none."""
-    key = _choose_weight_key(model)
+    """Find errors in the stated payloads (masses and inertias), as sentences without a full stop; empty where there are
+    none."""
+    key = _choose_payload_key(model)
     bad_key = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
     problems = [
         f"{name} says {bad_key}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
@@ -89,21 +93,21 @@ def find_weight_problems(
     problems += [
         f"{name} says {key} = {recording.meta[key]!r}, which must be a number from 0 on"
         for recording, name in zip(recordings, names, strict=True)
-        if key in recording.meta and not _is_weight(recording.meta[key])
+        if key in recording.meta and not _is_valid_payload(recording.meta[key])
     ]
     return tuple(problems)
 
 
-def has_carried_weight(recordings: Sequence[Recording]) -> bool:
+def has_payload(recordings: Sequence[Recording]) -> bool:
     """Whether any recording states a carried mass or inertia."""
     return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
 
 
-def _choose_weight_key(model: MechanicalModel) -> str:
-    """Choose the key of the carried mass of a linear device, or of the inertia of a rotational one."""
+def _choose_payload_key(model: MechanicalModel) -> str:
+    """Choose the key of `meta` that states the payload: a mass for a linear device, an inertia for a rotational one."""
     return ADDED_INERTIA if model.rotational else ADDED_MASS
 
 
-def _is_weight(value: object) -> bool:
+def _is_valid_payload(value: object) -> bool:
     """Whether a value of `meta` is a finite number from 0 on."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and value >= 0

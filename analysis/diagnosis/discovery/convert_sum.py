@@ -12,7 +12,7 @@ from dataclasses import replace
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES, CONSTANT
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses
-from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
+from analysis.diagnosis.errors.law_hypothesis import make_law_hypothesis
 from equalizer.effects.discovered_law import collect_channels, derive_axis_letters, has_memory, list_response_signals
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
@@ -63,7 +63,7 @@ def _renumber_parameters(shape: str, first_index: int) -> str:
 def convert_sum_to_hypothesis(term_sum: Sum, recording: Recording) -> Hypothesis:
     """Convert a sum to a hypothesis that can be simulated: a claim for the sum, and a claim for its partner on another
     axis (antisymmetric pair) if there is one."""
-    hypothesis = hypothesis_of_law(convert_sum_to_law(term_sum, recording), term_sum.axis, recording)
+    hypothesis = make_law_hypothesis(convert_sum_to_law(term_sum, recording), term_sum.axis, recording)
     return (
         hypothesis
         if term_sum.partner is None

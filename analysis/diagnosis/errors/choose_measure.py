@@ -1,8 +1,9 @@
-"""Makes the error measure for recordings and a model, by the rule of `error_measure_rule` or by the user's choice.
+"""Make the error measure for recordings and a model, by the rule of `error_measure_rule` or by the user's choice.
 
 In this order: the samples of each recording are divided into those to fit, to choose and to test by; the noise of each
 channel is estimated; errors get their unit from the noise; the rule selects free simulation, windows or forces.
-Called at the start of a diagnosis (`diagnose`) and wherever models are compared on recordings (`prediction_error`).
+Called at the start of a diagnosis (`diagnose`), by `confirm` and `learn_model_error`, and where models are compared on
+recordings (`prediction_error`).
 """
 
 from collections.abc import Sequence
@@ -31,9 +32,10 @@ Compared = Literal["auto", "motion", "force"]
 """Signals that the user sets to be compared; auto: by the rule."""
 
 LEAST_DITHER = 0.02
-"""Rms noise over the step of a converter below which differences between repeats do not show the noise."""
+"""Rms noise over the step of a converter, below which differences between repeats do not show the noise. Chosen by
+hand."""
 UNTIMED_BAND_SHARE = 0.45
-"""End of the band relative to the sample rate, for samples without a time axis."""
+"""End of the band relative to the sample rate, for samples without a time axis: below half the rate. Chosen by hand."""
 FORCE_REMARK = (
     "The force that the model needs along the measured motion is compared with the force that was applied: the "
     "motion was measured, and small errors of a model that was fitted to it would grow in a simulation."
@@ -46,6 +48,7 @@ NO_STATE_REMARK = (
     "The model integrates freely and the sensors do not show its state, so it was simulated from rest; errors grow "
     "with time."
 )
+"""Remarks for the user on the chosen measure; those of the rule are in `error_measure_rule`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,8 +68,8 @@ def make_measure(
     companions: Sequence[Recording] = (),
     compared: Compared = "auto",
 ) -> MeasureChoice:
-    """The error measure that the rule or `compared` selects. companions: further recordings that must suit the same
-    measure but are not part of it. Windows without an estimable state become a free simulation or, by the rule,
+    """Make the error measure that the rule or `compared` selects. companions: further recordings that must suit the
+    same measure but are not part of it. Windows without an estimable state become a free simulation or, by the rule,
     forces."""
     if compared == "force":
         return make_force_measure(recordings, model, None)
@@ -103,8 +106,8 @@ def make_measure(
 
 
 def make_force_measure(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> MeasureChoice:
-    """The error measure by force without the rule. band_hz: forces are compared up to it; None = by the noise. The
-    recordings must have a motion (`has_motion`)."""
+    """Make the error measure by force without the rule. band_hz: upper end of the band in which forces are compared;
+    None = by the noise. The recordings must have a motion (`has_motion`)."""
     records = observe_parts(recordings, model.outputs)
     model_effects = place_recorded_effects(model, recordings[0])
     floors = [estimate_noise_floor(record.recording) for record in records]
@@ -120,38 +123,42 @@ def _build_force_measure(
     remarks: tuple[str, ...],
     band_hz: float | None = None,
 ) -> MeasureChoice:
-    """The error measure by force, with the end of its band among the remarks."""
+    """Build the error measure by force, with the end of its band among the remarks (except `UNTIMED`)."""
     from analysis.diagnosis.forces.force_views import build_force_views
 
     model_effects = place_recorded_effects(model, records[0].recording)
-    views = build_force_views(records, model, floors, band_hz)
-    band_remark = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
+    force_views = build_force_views(records, model, floors, band_hz)
+    band_remark = "" if UNTIMED in remarks else f"The forces are compared up to {force_views.measure.band_hz:.3g} Hz."
     return MeasureChoice(
-        replace(views.measure, model_effects=model_effects), views.floors, tuple(filter(None, (*remarks, band_remark)))
+        replace(force_views.measure, model_effects=model_effects),
+        force_views.floors,
+        tuple(filter(None, (*remarks, band_remark))),
     )
 
 
 def _describe_model_effects(model_effects: Sequence[PlacedEffect]) -> tuple[str, ...]:
-    """Remark on the effects that the model's file names; none without any."""
+    """Describe the effects that the model's file names, in one remark; empty without any."""
     if not model_effects:
         return ()
-    effect_nouns = ", ".join(dict.fromkeys(get_noun(placed.effect.name) for placed in model_effects))
+    effect_nouns = ", ".join(dict.fromkeys(get_noun(placed_effect.effect.name) for placed_effect in model_effects))
     return (f"The given model contains these effects, which are part of every simulation: {effect_nouns}.",)
 
 
 def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
-    """The record without roles for its initial motion, where that decays soon (`count_samples_to_settle`)."""
-    first_settled = count_samples_to_settle(record, model)
-    if not first_settled:
+    """Remove the samples of the initial motion from all three sets, where that motion decays soon
+    (`count_samples_to_settle`)."""
+    first_settled_sample = count_samples_to_settle(record, model)
+    if not first_settled_sample:
         return record
-    is_settled = np.arange(len(record.command)) >= first_settled
+    is_settled = np.arange(len(record.command)) >= first_settled_sample
     return replace(
         record, fit=record.fit & is_settled, choose=record.choose & is_settled, test=record.test & is_settled
     )
 
 
 def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
-    """(c,): rms noise of each channel in the quietest recording; `UNKNOWN_NOISE_SHARE` of the signal where unknown."""
+    """Estimate (c,): rms noise of each channel in the quietest recording; `UNKNOWN_NOISE_SHARE` of the signal where
+    unknown."""
     channel_count = records[0].measured.shape[1]
     noise_by_record = [
         np.concatenate(
@@ -167,12 +174,12 @@ def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -
 
 
 def _subtract_rounding_noise(floor: NoiseFloor, record: Observed) -> FloatArray:
-    """(p,): rms noise of the response before a converter rounded it (rounding adds step² / 12), because quantisation is
-    an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise that was not
-    estimated from repeats is unchanged, because it cannot be separated from rounding."""
+    """Compute (p,): rms noise of the response before a converter rounded it (rounding adds step² / 12), because
+    quantisation is an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise
+    that was not estimated from repeats is unchanged, because it cannot be separated from rounding."""
     rms_noise = floor.response_rms
     if floor.method != "repeats":
         return rms_noise
-    steps = np.array([find_rounding_step(record.measured[:, c]) for c in range(len(rms_noise))])
+    steps = np.array([find_rounding_step(record.measured[:, channel]) for channel in range(len(rms_noise))])
     unrounded_noise = np.asarray(np.sqrt(np.maximum(rms_noise**2 - steps**2 / 12, 0.0)))
     return np.where(unrounded_noise > LEAST_DITHER * steps, unrounded_noise, rms_noise)

@@ -16,12 +16,13 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 _LEAST_ERROR = 1e-6
-"""Lower limit of an error in `mean_log_error`, so that its logarithm is finite."""
+"""Lower limit of an error in `mean_log_error`, relative to the noise, so that its logarithm is finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitScore:
-    """(c,) each: rms error relative to rms noise; 1 = only noise."""
+    """Rms error of each channel, (c,) each, on the samples to fit, to choose and to test by, relative to the rms noise;
+    1 = only noise, NaN without samples."""
 
     fit: FloatArray
     choose: FloatArray
@@ -41,12 +42,13 @@ class FitScore:
         )
 
     def scale_errors(self, factors: FloatArray) -> "FitScore":
-        """The score with its errors multiplied by `factors`, (c,)."""
+        """Multiply the errors by `factors`, (c,)."""
         return FitScore(self.fit * factors, self.choose * factors, self.test * factors)
 
 
 def compute_fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
-    """The score of residuals, per record (n, c), in units of `measure.unit`; errors are at least `measure.least`."""
+    """Compute the score of residuals, per record (n, c), in units of `measure.unit`; errors are at least
+    `measure.least`."""
     noise_units = measure.unit / measure.noise
     return FitScore(
         *(
@@ -61,10 +63,10 @@ def compute_fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) 
 
 
 def compute_signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
-    """(c,): standard deviation of the measured signals over the masked samples of all records, by which errors are
-    normalised. Positions are taken relative to the mean of each record, because encoders start anywhere; forces, speeds
-    and accelerations relative to the mean of all records, because recordings at different constant speeds differ only
-    in their means."""
+    """Compute (c,): standard deviation of the measured signals over the masked samples of all records, by which errors
+    are normalised. Positions are taken relative to the mean of each record, because encoders start anywhere; forces,
+    speeds and accelerations relative to the mean of all records, because recordings at different constant speeds differ
+    only in their means. masks: (n,) per record. NaN where all masks are empty."""
     used_records = [(record, mask) for record, mask in zip(records, masks, strict=True) if mask.any()]
     if not used_records:
         return np.full(records[0].measured.shape[1], np.nan)
@@ -85,7 +87,7 @@ def compute_signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> Floa
 def compute_residual_rms(
     records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]
 ) -> FloatArray:
-    """(c,): rms residual over the masked samples of all records; NaN where the masks are empty."""
+    """Compute (c,): rms residual over the masked samples of all records; NaN where the masks are empty."""
     sum_of_squares = sum(
         np.einsum("nc,nc->c", residual[mask], residual[mask]) for residual, mask in zip(residuals, masks, strict=True)
     )

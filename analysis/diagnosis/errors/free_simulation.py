@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
-from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
+from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
+from analysis.diagnosis.errors.evidence_from_residuals import make_evidence
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.bodies import Restarts
 from equalizer.effects.simulation.simulator import (
@@ -93,7 +93,7 @@ class FreeSimulation:
         """(k, 2n): positions, then velocities of the n coordinates just before the samples `sample_indices` (k,)."""
         recording = record.recording
         all_effects = apply_conditions((*self.model_effects, *effects), recording)
-        model = add_carried_weight(model, recording)
+        model = add_payload(model, recording)
         return simulate_states_before(
             model, record.command, (recording.sample_rate_hz, recording.hold), all_effects, sample_indices
         )
@@ -110,7 +110,7 @@ class FreeSimulation:
         recording, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
-        model = add_carried_weight(model, recording)
+        model = add_payload(model, recording)
         all_effects = [
             _lengthen_steps(placed_effect, self.step_factor)
             for placed_effect in apply_conditions((*self.model_effects, *effects), recording)
@@ -128,8 +128,8 @@ class FreeSimulation:
         evidence_by_record = []
         for record, residual in zip(self.records, residuals, strict=True):
             simulated = self._simulate(model, effects, record, simulate_mechanism)
-            loaded_model = add_carried_weight(model, record.recording)
-            evidence_by_record.append(evidence_of(loaded_model, record, simulated, residual, (self.unit, self.noise)))
+            loaded_model = add_payload(model, record.recording)
+            evidence_by_record.append(make_evidence(loaded_model, record, simulated, residual, (self.unit, self.noise)))
         return tuple(evidence_by_record)
 
 

@@ -1,6 +1,7 @@
-"""Converts a discovered law, a formula that is no effect of the catalogue, to a hypothesis that `output_error` can fit.
+"""Convert a discovered law, a formula that is no effect of the catalogue, to a hypothesis that `output_error` can fit.
 
 The free numbers of the formula become the parameters of an effect (`make_law_effect`) at one axis or response channel.
+Called by `discovery.convert_sum` and `confirm.laws_for_simulation`.
 """
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, make_claim_hypothesis
@@ -9,8 +10,8 @@ from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
 
-def hypothesis_of_law(law: Law, axis: int, recording: Recording) -> Hypothesis:
-    """Hypothesis with a single claim: the law at an axis, or at a channel for a law of the response. The fit starts
-    from the law's own values. axis: index, from 0."""
+def make_law_hypothesis(law: Law, axis: int, recording: Recording) -> Hypothesis:
+    """Make the hypothesis with a single claim: the law at an axis, or at a channel for a law of the response. The fit
+    starts from the numbers of the law. axis: index of the axis or channel, from 0."""
     effect = make_law_effect(law, collect_channels(recording))
     return make_claim_hypothesis(Claim(effect, "one", (axis,)), [get_law_values(law)])

@@ -39,21 +39,23 @@ from equalizer.signals.signal import FloatArray
 IndexArray = npt.NDArray[np.int64]
 
 STRETCH_S = 0.5
-"""Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time. Chosen."""
+"""Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time. Chosen by
+hand."""
 BOUND_TOLERANCE = 1e-6
-"""Distance of a coordinate from its bound at or below which it counts as at the bound. Chosen."""
+"""Distance of a coordinate from its bound at or below which it counts as at the bound. Chosen by hand."""
 CONVERGED_DECREASE = 0.01
 """Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within a tenth of a standard
 error."""
 FINAL_DAMPINGS = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
 """Dampings of the final steps (pairs as in `output_error.Dampings`), smaller than in a search: in a direction that the
-data do not determine, the prior of the calibration must decide, not the damping. Chosen."""
+data do not determine, the prior of the calibration must decide, not the damping. Chosen by hand."""
 MOST_ROUNDS, STEPS_PER_ROUND = 4, 3
-"""Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round. Chosen."""
+"""Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round. Chosen by
+hand."""
 STEP_FACTOR_LINEAR, STEP_FACTOR = 0.02, 0.2
 """Steps of the central differences, relative to those of a search. Linear simulation: short, because curvature is the
 only error. Other effects, with thresholds or forces that are solved for: longer, because a short step would magnify the
-numerical errors of the simulation. Chosen."""
+numerical errors of the simulation. Chosen by hand."""
 
 
 def compute_full_sensitivity(

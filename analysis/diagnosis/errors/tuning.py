@@ -10,7 +10,8 @@ of Craig and Bampton (AIAA Journal 6 (1968), 1313): the m driven axes, and the m
   the axes times sqrt(1 + dm), and B_kk (1 + df) (1 + dz).
 
 `make_tuning` makes a `Tuning`, whose function `tune` maps deviations, in standard deviations, to a model. The
-deviations are fitted together with hypotheses by `output_error`.
+deviations are fitted together with hypotheses by `output_error`. Called by `search_by_simulation`,
+`confirm.fitting_measures`, `confirm.balance_with_model` and `reference.learn_model_error`.
 """
 
 from collections.abc import Callable
@@ -47,6 +48,7 @@ class Tuning:
     """A model and its free parameters, whose changes are counted in standard deviations of the calibration."""
 
     model: MechanicalModel
+    """The given model, with all deviations 0."""
     names: tuple[str, ...]
     """Names of the parameters: mass, damping, stiffness of each pair of axes, then frequency, mass, damping of each
     mode."""
@@ -61,7 +63,7 @@ class Tuning:
     """Standard deviations of the calibration by which a parameter may move at most."""
 
     def with_wider_bound(self) -> "Tuning":
-        """The same parameters with the bound `WIDER_RETUNING_BOUND`, beyond what a calibration allows. For a model that
+        """Replace the bound by `WIDER_RETUNING_BOUND`, beyond what a calibration allows. For a model that
         was fitted to a recording of the same device with the missing physics in it: that physics biased the parameters
         by more than the stated tolerance."""
         return replace(self, bound=WIDER_RETUNING_BOUND)
@@ -80,13 +82,13 @@ class Tuning:
         )
 
     def to_changes(self, deviations: FloatArray) -> FloatArray:
-        """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
+        """Convert deviations (parameters,), in standard deviations, to changes of the parameters, SI or relative."""
         return np.asarray(deviations * self.deviation)
 
 
 def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
-    """The free parameters of a model. Where it states no tolerance of mass, damping or stiffness, `UNSTATED_SHARE` of
-    the largest at any axis is one standard deviation. input_channels: names of the driven axes."""
+    """Make the free parameters of a model. Where it states no tolerance of mass, damping or stiffness, `UNSTATED_SHARE`
+    of the largest at any axis is one standard deviation. input_channels: names of the driven axes."""
     modal_model = _transform_to_craig_bampton(model)
     m = model.inputs
     axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]
@@ -146,16 +148,16 @@ class _CraigBamptonModel:
 
 
 def _read_stated_deviation(deviation: float | None, axis_block: FloatArray) -> float:
-    """One standard deviation of the entries of a block (m, m) at the driven axes: as stated, else `UNSTATED_SHARE` of
-    the largest diagonal entry; above 0 even where the block is 0."""
+    """Choose the standard deviation of the entries of a block (m, m) at the driven axes: as stated, else
+    `UNSTATED_SHARE` of the largest diagonal entry; above 0 even where the block is 0."""
     if deviation is not None:
         return deviation
     return UNSTATED_SHARE * float(np.abs(np.diagonal(axis_block)).max()) or UNSTATED_SHARE
 
 
 def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
-    """The model in Craig-Bampton coordinates: constraint modes (static shapes) of the driven axes, then fixed-interface
-    modes."""
+    """Transform a model to Craig-Bampton coordinates: constraint modes (static shapes) of the driven axes, then
+    fixed-interface modes."""
     driven_axes = compute_driven_axes(model)
     interior_basis = null_space(driven_axes.T)
     m = driven_axes.shape[1]
@@ -186,7 +188,7 @@ def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
 def _apply_changes(
     model: MechanicalModel, modal_model: _CraigBamptonModel, axis_pairs: list[tuple[int, int]], changes: FloatArray
 ) -> MechanicalModel:
-    """The model with its parameters changed by `changes` (parameters,), in their units; equations: module docstring."""
+    """Change the parameters of a model by `changes` (parameters,), in their units; equations: module docstring."""
     m, mode_count = model.inputs, len(modal_model.frequency_hz)
     axis_changes = changes[: 3 * len(axis_pairs)].reshape(3, len(axis_pairs))
     frequency_change, mass_change, damping_change = changes[3 * len(axis_pairs) :].reshape(3, mode_count)

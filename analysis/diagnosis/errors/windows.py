@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
+from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import fill_gaps
 from analysis.diagnosis.errors.free_simulation import stack_simulated_channels
@@ -111,7 +111,7 @@ class Windows:
         """Simulate all windows from their initial states (windows, 2 n). Returns the simulation, and its residuals (n,
         c) after the fit of the initial states."""
         recording, p = record.recording, model.outputs
-        model = add_carried_weight(model, recording)
+        model = add_payload(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         window_samples = count_window_samples(self.window_s, recording.sample_rate_hz)
         simulated = simulate_windows(
@@ -163,7 +163,7 @@ class Windows:
         actuators' forces and the effects' forces on the axes."""
         simulated, residual = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
-        model = add_carried_weight(model, recording)
+        model = add_payload(model, recording)
         actuator_forces = compute_actuator_force(
             model, record.command, recording.sample_rate_hz, effects, recording.hold
         )
@@ -200,9 +200,7 @@ def build_windows(
     for record in records:
         rate_hz = record.recording.sample_rate_hz
         actuator_forces = compute_actuator_force(model, record.command, rate_hz, (), record.recording.hold)
-        motion: SmoothedMotion = smooth_motion(
-            add_carried_weight(model, record.recording), record, actuator_forces, unit
-        )
+        motion: SmoothedMotion = smooth_motion(add_payload(model, record.recording), record, actuator_forces, unit)
         initial_states.append(motion.states[:: count_window_samples(window_s, rate_hz)])
     return Windows(records, tuple(initial_states), unit, noise, window_s)
 

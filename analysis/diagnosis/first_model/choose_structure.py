@@ -1,4 +1,4 @@
-"""Chooses the structure of a first model: the requested one, or the plainest that fits held-out data about as well.
+"""Choose the structure of a first model: the requested one, or the plainest that fits held-out data about as well.
 
 The structures are those of `model_structures`, fitted by force balance where a motion was measured along the commands,
 else by spectra. A sentence states what the remaining error depends on (`describe_remaining_error`). Called where a user
@@ -35,7 +35,8 @@ REMAINDER_REGRESSORS: dict[str, Callable[[Motion], FloatArray]] = {
     "the square of the position": lambda m: (m.position - m.position.mean(axis=0)) ** 2,
     "the cube of the position, as a hardening spring does": lambda m: (m.position - m.position.mean(axis=0)) ** 3,
 }
-"""Functions of a motion, (n, d) each, by the words for the remaining error that is correlated with them."""
+"""Functions of a motion, (n, d) each, by the words for the remaining error that is correlated with them. The sign of
+the velocity is smoothed over 1 % of its standard deviation: chosen, narrow enough for dry friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,22 +47,27 @@ class TriedStructure:
     error: float | None
     """Root-mean-square error relative to the signal; None where it was refused."""
     refusal: str
+    """Reason of the refusal; empty where it was fitted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Choice:
+class ChosenStructure:
     """The chosen structure, all that were tried, why it was chosen, and a sentence on the error that remains."""
 
     fit: StructureFit
     tried: tuple[TriedStructure, ...]
+    """In the order of the trials; the chosen one among them."""
     reason: str
+    """Why this structure was chosen, in a sentence or two."""
     remains: str
+    """Sentence on the error that remains."""
 
 
 def choose_structure(
     recordings: Sequence[Recording], requested_kind: Kind | None, on_progress: Callable[[float], None]
-) -> Choice:
-    """The fitted structure with the reason for it. requested_kind: None = the best. Raises StructureRefused."""
+) -> ChosenStructure:
+    """Fit the structures and choose one. requested_kind: fit this one only; None = choose. on_progress: receives the
+    share done, 0 to 1. Raises StructureRefused where the requested structure, or all structures, cannot be fitted."""
     try:
         balanced: BalancedRecordings | None = balance_recordings(recordings)
         no_balance_reason = ""
@@ -74,7 +80,7 @@ def choose_structure(
             if is_fitted_by_force and balanced
             else fit_modal_structure(recordings, requested_kind, on_progress)
         )
-        return Choice(
+        return ChosenStructure(
             fit,
             (TriedStructure(fit.kind, fit.error, ""),),
             "The structure was requested.",
@@ -84,22 +90,25 @@ def choose_structure(
     if not fits:
         raise StructureRefused("; ".join(f"{trial.kind}: {trial.refusal}" for trial in trials))
     if balanced is None:
-        ordered = sorted(fits, key=lambda fitted: fitted.model.coordinates)
-        best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
+        fits_by_size = sorted(fits, key=lambda fitted: fitted.model.coordinates)
+        best = (
+            fits_by_size[-1] if fits_by_size[-1].error < (1 - MODES_GAIN) * fits_by_size[0].error else fits_by_size[0]
+        )
         sentence = f"Structures were compared by the held-out error of a free simulation, because {no_balance_reason}."
-        return Choice(best, trials, sentence, describe_remaining_error(None, best))
+        return ChosenStructure(best, trials, sentence, describe_remaining_error(None, best))
     best = choose_simplest(fits)
     reason = (
         f"{best.kind} is the structure of fewest parameters; no structure with more parameters lowers its "
         f"cross-validated error power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %)."
     )
     return _compare_with_two_modes(
-        Choice(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress
+        ChosenStructure(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress
     )
 
 
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
-    """A sentence on the model's error, and what it depends on."""
+    """Describe the model's error in a sentence, and which regressor explains most of it. balanced: None = without
+    one."""
     error_text = f"{100 * fit.error:.3g} % of the {fit.compared}"
     if balanced is None or fit.joint is None or balanced.untimed:
         return f"An error of {error_text} remains."
@@ -122,7 +131,8 @@ def describe_remaining_error(balanced: BalancedRecordings | None, fit: Structure
 
 
 def _compute_explained_share(columns: Sequence[FloatArray], remainders: Sequence[FloatArray]) -> float:
-    """Squared correlation of columns with the remainder, the largest over the axes."""
+    """Compute the squared correlation of columns with the residual, the largest over the axes. Arrays (n, axes)
+    each."""
     x, y = np.vstack(columns), np.vstack(remainders)
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     power_product = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
@@ -155,10 +165,10 @@ def _fit_structures(
 
 
 def _compare_with_two_modes(
-    choice: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]
-) -> Choice:
-    """The choice; a structure with two modes in its place where that leaves less, by `MODES_GAIN`, in a free simulation
-    of held-out samples."""
+    choice: ChosenStructure, recordings: Sequence[Recording], on_progress: Callable[[float], None]
+) -> ChosenStructure:
+    """Compare a chosen mass-spring with a structure of two modes, which is chosen instead where its error in a free
+    simulation of held-out samples is smaller by `MODES_GAIN`. Other choices are returned unchanged."""
     if choice.fit.kind != "mass-spring":
         return choice
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
@@ -168,15 +178,19 @@ def _compare_with_two_modes(
         modal_fit = fit_modal_structure(recordings, "two-mode", on_progress)
     except StructureRefused as refusal:
         return _append_trial(choice, TriedStructure("two-mode", None, str(refusal)))
-    fit, test = split_fit_and_test(recordings)
-    lines = [
-        segment for recording_part in test or fit if (segment := compute_segment_lines(*recording_part)) is not None
+    fit_recordings, test_recordings = split_fit_and_test(recordings)
+    segment_lines = [
+        single_segment_lines
+        for recording_part in test_recordings or fit_recordings
+        if (single_segment_lines := compute_segment_lines(*recording_part)) is not None
     ]
     band_edges_hz = [
-        float(select_bound(line.frequency_hz[line.excited])) for line in lines for select_bound in (np.min, np.max)
+        float(select_bound(single_lines.frequency_hz[single_lines.excited]))
+        for single_lines in segment_lines
+        for select_bound in (np.min, np.max)
     ]
     simulation_rms = [
-        float(compute_simulation_errors(model, lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
+        float(compute_simulation_errors(model, segment_lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
         for model in (choice.fit.model, modal_fit.model)
     ]
     comparison = (
@@ -185,12 +199,12 @@ def _compare_with_two_modes(
     )
     if simulation_rms[1] < (1 - MODES_GAIN) * simulation_rms[0]:
         trials = (*choice.tried, TriedStructure("two-mode", modal_fit.error, ""))
-        return Choice(modal_fit, trials, comparison, describe_remaining_error(None, modal_fit))
+        return ChosenStructure(modal_fit, trials, comparison, describe_remaining_error(None, modal_fit))
     return _append_trial(
         choice, TriedStructure("two-mode", modal_fit.error, "modes lower the error too little"), comparison
     )
 
 
-def _append_trial(choice: Choice, trial: TriedStructure, sentence: str = "") -> Choice:
-    """The choice with a further trial, and a sentence appended to its reason."""
-    return Choice(choice.fit, (*choice.tried, trial), f"{choice.reason} {sentence}".rstrip(), choice.remains)
+def _append_trial(choice: ChosenStructure, trial: TriedStructure, sentence: str = "") -> ChosenStructure:
+    """Append a tried structure to the choice, and a sentence to its reason."""
+    return ChosenStructure(choice.fit, (*choice.tried, trial), f"{choice.reason} {sentence}".rstrip(), choice.remains)

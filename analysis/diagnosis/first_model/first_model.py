@@ -1,4 +1,7 @@
-"""Result of fitting a starting model for a diagnosis, where the user gave none. Made by `fit_without_model`."""
+"""Result of fitting a starting model for a diagnosis, where the user gave none.
+
+Made by `fit_without_model` and `diagnose_values`, read by these and `study.workflows.diagnosis`.
+"""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,10 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstModel:
-    """A mechanical model fitted to the recordings themselves, with the force balances that were computed for it."""
+    """A mechanical model fitted to recordings, with the force balances that were computed for it."""
 
     model: MechanicalModel
-    """Fitted to the recordings; its tolerances limit how far a diagnosis re-tunes it."""
+    """Fitted to the diagnosed recordings, or to clean ones where there are any; its tolerances limit how far a
+    diagnosis re-tunes it."""
     remarks: tuple[str, ...]
     """Sentences for the user: how the model was fitted, and its limits."""
     balances: "tuple[Balance, ...] | None" = None

@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
-from analysis.diagnosis.data.recorded_conditions import has_carried_weight
+from analysis.diagnosis.data.recorded_conditions import has_payload
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 from analysis.diagnosis.first_model.model_structures import (
@@ -156,7 +156,7 @@ def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:
     """Raise NothingToDiagnose where the device carried a weight, whose mass a fitted model would include."""
-    if has_carried_weight(recordings):
+    if has_payload(recordings):
         raise NothingToDiagnose(
             (
                 "a recording was made with a weight on the handle, and a model that is fitted to it would include "

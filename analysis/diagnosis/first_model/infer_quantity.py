@@ -1,4 +1,4 @@
-"""Infers the physical quantity of responses for which none is stated: position, velocity or force.
+"""Infer the physical quantity of responses for which none is stated: position, velocity or force.
 
 From the channel's name where that is clear; force where the commands are motions; else from a force balance on the
 response y and its derivatives, f = m y'' + c y' + k y. With a position, mass makes y'' significant; with a velocity,
@@ -27,9 +27,9 @@ BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) -
 
 
 def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with the quantity of their responses, and a sentence about the assumption. Unchanged, with an
-    empty sentence, where a quantity was stated; where no force drives the device and a unit is stated; and for a
-    voltage that behaves like a position. recordings: alike in channels, units and rate."""
+    """Infer the quantity of the responses. Returns the recordings with it, and a sentence on the assumption; unchanged,
+    with an empty sentence, where a quantity was stated; where no force drives the device and a unit is stated; and for
+    a voltage that behaves like a position. recordings: alike in channels, units and rate."""
     first_recording = recordings[0]
     if set(first_recording.response.quantities) & BALANCE_QUANTITIES:
         return recordings, ""
@@ -56,19 +56,21 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 
 def _infer_from_names(recording: Recording) -> tuple[str, ...]:
-    """Quantities of the responses by the channels' names and units; empty where these determine none."""
+    """Infer the quantities of the responses from the channels' names and units; empty where these determine none."""
     from equalizer.signals.quantity_words import detect_quantity  # only where a quantity is missing
 
     response = recording.response
     quantities = [
-        inferred if unit == UNSTATED and (inferred := detect_quantity(name)) in BALANCE_QUANTITIES else quantity
+        inferred_quantity
+        if unit == UNSTATED and (inferred_quantity := detect_quantity(name)) in BALANCE_QUANTITIES
+        else quantity
         for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
     ]
     return tuple(quantities) if set(quantities) & BALANCE_QUANTITIES else ()
 
 
 def _format_names_sentence(recording: Recording, quantities: Sequence[str]) -> str:
-    """Sentence on the quantities that were taken from names, with the way to correct them."""
+    """Format a sentence on the quantities that were taken from names, with the way to correct them."""
     phrases = [
         f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
         for name, quantity in zip(recording.response.channels, quantities, strict=True)
@@ -78,8 +80,8 @@ def _format_names_sentence(recording: Recording, quantities: Sequence[str]) -> s
 
 
 def _infer_from_balance(recordings: Sequence[Recording]) -> str:
-    """Quantity of the first response by the force balance of the first command (see above); a position where the
-    balance cannot be computed."""
+    """Infer the quantity of the responses from the force balance of the first command (see the module's docstring); a
+    position where the balance cannot be computed or there is no time axis (infinite band)."""
     channel_count = len(recordings[0].response.channels)
     as_positions = [replace(_set_quantity(recording, "position"), position=None) for recording in recordings]
     try:
@@ -93,7 +95,8 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
         return "position"
 
     def compute_error_increase(columns: Sequence[int]) -> float:
-        """Increase of the cross-validated squared error without these columns, relative to the force's power."""
+        """Compute the increase of the cross-validated squared error without these columns, relative to the force's
+        power."""
         errors_without = regression.cross_validate([k for k in all_columns if k not in columns])
         return float((errors_without - regression.cross_validate(all_columns)).sum()) / force_power
 
@@ -106,5 +109,5 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
 
 
 def _set_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:
-    """The recording with this quantity of all response channels, or with one per channel."""
+    """Set the quantity of all response channels, or one per channel."""
     return replace(recording, response=replace(recording.response, quantity=quantity))

@@ -1,8 +1,8 @@
-"""Converts recordings of any form to forces and the motions that they drive, with a sentence on each change.
+"""Convert recordings of any form to forces and the motions that they drive, with a sentence on each change.
 
 Used only without a given model, because a model defines its commands and responses itself. The steps are in the order
 of `convert_to_driven_motions`; each returns the recordings unchanged, with an empty sentence, where it does not apply.
-Called by `prepare_recordings`.
+Called by `prepare_recordings` and `study.evaluation.real.diagnose_real`.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,27 +29,28 @@ FORCES = frozenset({"force", "torque"})
 DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
 """Quantities of commands that drive a motion; all other commands, such as a temperature, are conditions."""
 CONSTANT_RANGE = 1e-9
-"""Range of a signal over its largest magnitude, below which changes are rounding errors."""
+"""Range of a signal over its largest magnitude, up to which changes are rounding errors. Chosen by hand."""
 MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 """Quantities of a motion: positions and their derivatives."""
 
 Recordings = tuple[Recording, ...]
+"""Recordings of one device, alike in channels, units and rate."""
 Step = Callable[[Recordings], tuple[Recordings, str]]
 """Maps recordings to changed ones and a sentence; the sentence is empty where nothing was changed."""
 
 
 def convert_to_driven_motions(
-    recordings: Sequence[Recording], turns: bool = True
+    recordings: Sequence[Recording], may_reverse: bool = True
 ) -> tuple[Recordings, tuple[str, ...]]:
-    """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
-    commands whose positive direction is opposite to that of their motion are reversed; False where a model defines the
-    directions."""
+    """Convert the recordings, with a sentence for each change. recordings: alike in channels, units and rate.
+    may_reverse: commands whose positive direction is opposite to that of their motion are reversed; False where a model
+    defines the directions."""
     converted, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
         infer_quantities, convert_free_motion, _separate_conditions, _select_imposed_motion, _select_motions,
         _select_forces, restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
-    for step in (*steps, reverse_commands) if turns else steps:
+    for step in (*steps, reverse_commands) if may_reverse else steps:
         converted, sentence = step(converted)
         remarks.append(sentence)
     return converted, tuple(filter(None, remarks))
@@ -149,8 +150,7 @@ def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_axes(recording: Recording, kept_channels: list[int], is_paired: bool) -> Recording:
-    """The recording with the kept commands only. is_paired: also with the responses and positions of the same indices
-    only."""
+    """Select the kept commands. is_paired: select the responses and positions of the same indices as well."""
     command, position, excitation = recording.command, recording.position, recording.excitation
     has_paired_position = position is not None and len(position.channels) == len(recording.response.channels)
     return replace(
@@ -165,7 +165,7 @@ def _select_axes(recording: Recording, kept_channels: list[int], is_paired: bool
 
 
 def _inflect_verb(names: Sequence[str], singular: str) -> str:
-    """The verb in the singular for a single name, else in the plural."""
+    """Inflect a verb: singular for a single name, else plural."""
     plural = {"changes": "change", "was": "were", "drives": "drive"}
     return singular if len(names) == 1 else plural[singular]
 
@@ -194,7 +194,7 @@ def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _sum_channels(signal: Signal, gains: FloatArray, main_command: int) -> Signal:
-    """The sum of the channels times their gains, under the name and unit of the main channel."""
+    """Sum the channels times their gains, under the name and unit of the main channel."""
     return replace(signal.select_channels([main_command]), samples=signal.samples @ gains[:, None])
 
 
@@ -203,20 +203,20 @@ def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
     commands in a regression of the acceleration on commands, velocity, position and dry friction; without a time axis,
     of the position on commands and friction."""
     motions = compute_motions(observe_parts(recordings, 1))
-    regressor_rows, targets = [], []
+    regressor_rows, motion_targets = [], []
     for motion in motions:
         friction = smooth_sign(motion.velocity, LEAST_WIDTH_SHARE * max(float(motion.velocity.std()), 1e-300))
         columns = [motion.force, motion.velocity, motion.position, friction]
         if not np.isfinite(motion.band_hz):
-            columns, target = [motion.force, friction], motion.position
+            columns, motion_target = [motion.force, friction], motion.position
         else:
-            target = motion.acceleration
-        valid = motion.mask_valid_samples(motion.fit)
-        regressor_rows.append(motion.decimate(np.hstack(columns))[valid])
-        targets.append(motion.decimate(target)[valid])
+            motion_target = motion.acceleration
+        valid_mask = motion.mask_valid_samples(motion.fit)
+        regressor_rows.append(motion.decimate(np.hstack(columns))[valid_mask])
+        motion_targets.append(motion.decimate(motion_target)[valid_mask])
     # The means are subtracted, and components of the size of rounding ignored: of two commands with a constant sum, the
     # sum would otherwise appear to drive the motion.
-    x, y = (stacked - stacked.mean(axis=0) for stacked in (np.vstack(regressor_rows), np.vstack(targets)[:, 0]))
+    x, y = (stacked - stacked.mean(axis=0) for stacked in (np.vstack(regressor_rows), np.vstack(motion_targets)[:, 0]))
     column_stds = np.maximum(x.std(axis=0), 1e-300)
     scaled_gains = np.linalg.lstsq(x / column_stds, y, rcond=DEPENDENT_SIGNALS)[0][: motions[0].force.shape[1]]
     main_command = int(np.argmax(np.abs(scaled_gains)))
@@ -225,20 +225,22 @@ def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
 
 
 def _find_lowest_derivative_channels(signal: Signal) -> list[int]:
-    """Indices of the motions with the lowest derivative, such as the positions among positions and velocities."""
+    """Find the indices of the motions with the lowest derivative, such as the positions among positions and
+    velocities."""
+    # 9, above any derivative, for channels that are no motion.
     orders = [DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTIONS else 9 for quantity in signal.quantities]
     return [k for k, order in enumerate(orders) if order == min(orders)]
 
 
 def _select_excitation(excitation: Signal | None, command: Signal, kept_channels: Sequence[int]) -> Signal | None:
-    """The excitations of the kept commands; None where there is no excitation, or none for each command."""
+    """Select the excitations of the kept commands; None where there is no excitation, or none for each command."""
     if excitation is None or len(excitation.channels) != len(command.channels):
         return None
     return excitation.select_channels(kept_channels)
 
 
 def _append_channels(condition: Signal | None, command: Signal, indices: Sequence[int]) -> Signal:
-    """The conditions with these channels of the command appended."""
+    """Append these channels of the command to the conditions (None = none yet)."""
     added = command.select_channels(indices)
     if condition is None:
         return added

@@ -1,4 +1,4 @@
-"""Subtracts from the commands the linear forces of a balance that a model with one body per command cannot describe.
+"""Subtract from the commands the linear forces of a balance that a model with one body per command cannot describe.
 
 These are forces of motions other than the driven ones, of modes, and of a delayed command, with the weights of the
 force balance. The reduced command drives one measured motion each, so that nonlinear laws are fitted and drawn as for
@@ -31,7 +31,7 @@ def is_reduction_needed(balances: Sequence[Balance]) -> bool:
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
-    """The recordings with reduced commands and the driven motions as response, without position and excitation.
+    """Reduce the commands of recordings; the driven motions become the response, position and excitation are dropped.
     recordings: those of the balances, in the same order."""
     reduced_recordings, first_part = [], 0
     for recording in recordings:
@@ -44,7 +44,7 @@ def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balanc
 def _reduce_recording(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> Recording:
-    """A reduced recording. parts: start and stop of each, in samples. first_part: index of its first part among all
+    """Reduce one recording. parts: start and stop of each, in samples. first_part: index of its first part among all
     motions."""
     command = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
@@ -69,8 +69,8 @@ def _reduce_recording(
 
 
 def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
-    """(n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness. The named
-    laws are part of the regression, but not of this force."""
+    """Compute (n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness.
+    The named laws are part of the regression, but not of this force."""
     regression, motion_count = balance.search.regression, len(motion.channels)
     linear_laws = [judged_law.law_index for judged_law in balance.laws if judged_law.law.linear]
     weights = regression.fit_weights(
@@ -91,7 +91,7 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
 def _extract_driven_motions(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> tuple[Signal, bool]:
-    """The driven motions, and whether they are integrals of measured accelerations."""
+    """Extract the driven motions, and whether they are integrals of measured accelerations."""
     regression = balances[0].search.regression
     measured_motion = find_motion_signal(recording)
     assert measured_motion is not None

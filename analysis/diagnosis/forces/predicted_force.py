@@ -14,7 +14,7 @@ from typing import Self, TypeVar, cast
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
+from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
 from analysis.diagnosis.forces.inverse_dynamics import (
     BandMotion,
     RequiredForce,
@@ -122,7 +122,7 @@ class PredictedForce:
         smaller actuator gain would otherwise reduce every error."""
         record, motion = self.records[record_index], self.motions[record_index]
         rate_hz = record.recording.sample_rate_hz
-        model = add_carried_weight(model, record.recording)
+        model = add_payload(model, record.recording)
         structure = build_bodies(
             model, [effect for effect in effects if isinstance(effect.effect.action, Structure)]
         ).structure
@@ -183,7 +183,7 @@ class PredictedForce:
         """The evidence from which effects estimate starting values: motion, residual and force of a record."""
         record, balance = self.records[record_index], self._balance_forces(model, effects, record_index)
         return Evidence(
-            model=add_carried_weight(model, record.recording),
+            model=add_payload(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
             command=record.command,
             axis_position=balance.required.axis_position,

@@ -1,6 +1,6 @@
 """Nonlinear distortion by kind (odd, even, varying), from the repeated periods and the silent lines of a periodic
-excitation: one figure per channel, input, level and band. `Distortions.remarks` names the kinds that the recording
-cannot show.
+excitation: one value per channel, input, level and band. `Distortions.remarks` names the kinds that the recording
+cannot show. Called by `examine_fits`.
 
 Theory. A linear, time-invariant device responds to a multisine on its driven lines only. Where all driven lines are odd
 multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and differences of an
@@ -50,7 +50,7 @@ noise."""
 
 
 class _Cell(NamedTuple):
-    """What a figure of distortion is about: the first five fields of a `Distortion`."""
+    """Output, input, level and band of a value of distortion: the first five fields of a `Distortion`."""
 
     output: str
     quantity: str
@@ -72,6 +72,7 @@ class Distortion:
     amplitude: float
     """Level of the segment's excitation, in the command's unit."""
     band_hz: Band
+    """Lower and upper end, Hz."""
     whole_band: bool
     """True: the whole driven band; False: one octave of it."""
     kind: Kind
@@ -97,8 +98,8 @@ class Distortions:
 
 
 def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
-    """Distortion of each channel of response and position, per input, level and band (the whole driven band and each
-    octave of it).
+    """Find the distortion of each channel of response and position, per input, level and band (the whole driven band
+    and each octave of it).
 
     floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so.
     """
@@ -107,27 +108,29 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
     settled_periods = find_settled_periods(recording)
     excitation = select_instrument_signal(recording)
     hold_samples = compute_hold_samples(excitation)
-    lines = [
+    detection_lines = [
         find_detection_lines(compute_period_spectra(excitation, period).mean(axis=0), hold_samples)
         for period in settled_periods
     ]
-    periods = [
-        (period, detection) for period, detection in zip(settled_periods, lines, strict=True) if detection is not None
+    evaluated_periods = [
+        (period, detection)
+        for period, detection in zip(settled_periods, detection_lines, strict=True)
+        if detection is not None
     ]
-    if not periods:
+    if not evaluated_periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
     signals = [(recording.response, floor.response)]
     if recording.position is not None and floor.position is not None:
         signals.append((recording.position, floor.position))
     cells: list[Distortion] = []
     for signal, noise in signals:
-        for spectrum in compute_segment_spectra(recording, signal, noise, floor.frequency_hz, periods):
+        for spectrum in compute_segment_spectra(recording, signal, noise, floor.frequency_hz, evaluated_periods):
             cells += _compute_cells(spectrum, signal)
-    return Distortions(tuple(cells), tuple(_list_untestable_remarks(periods)))
+    return Distortions(tuple(cells), tuple(_list_untestable_remarks(evaluated_periods)))
 
 
 def _list_untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
-    """Sentences on the kinds of distortion that this excitation cannot show, and why."""
+    """List sentences on the kinds of distortion that this excitation cannot show, and why."""
     remarks = []
     if all(period.count < 2 for period, _ in periods):
         remarks.append("No period was repeated: variation from period to period cannot be measured.")
@@ -148,24 +151,24 @@ def _list_untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) 
 
 
 def _compute_cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
-    """The distortions of all channels and bands of one segment."""
-    lowest, highest = (float(line) for line in spectrum.frequency_hz[spectrum.lines.driven][[0, -1]])
+    """Compute the distortions of all channels and bands of one segment."""
+    lowest_hz, highest_hz = (float(line) for line in spectrum.frequency_hz[spectrum.lines.driven][[0, -1]])
     cells = []
-    octaves = list_octaves(lowest, highest)
+    octaves = list_octaves(lowest_hz, highest_hz)
     for band in dict.fromkeys(((octaves[0][0], octaves[-1][1]), *octaves)):
         in_band = select_lines_in_band(spectrum.frequency_hz, band)
         if (in_band & spectrum.lines.driven).any():
             for index, name in enumerate(signal.channels):
                 cell = _Cell(name, signal.quantities[index], spectrum.input, spectrum.amplitude, band)
-                cells += _compute_kinds(spectrum, index, in_band, cell, band == (octaves[0][0], octaves[-1][1]))
+                cells += _compute_distortions(spectrum, index, in_band, cell, band == (octaves[0][0], octaves[-1][1]))
     return cells
 
 
-def _compute_kinds(
+def _compute_distortions(
     spectrum: SegmentSpectrum, channel: int, in_band: Mask, cell: _Cell, whole_band: bool
 ) -> list[Distortion]:
-    """All kinds of distortion in one cell. in_band: (lines,), the lines of its band. whole_band: the whole driven
-    band."""
+    """Compute all kinds of distortion in one cell. in_band: (lines,), the lines of its band. whole_band: whether that
+    is the whole driven band."""
     power, noise_power = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[in_band & spectrum.lines.driven])))
     excess_by_kind: list[tuple[Kind, tuple[float, float, float], float, int]] = []
@@ -200,20 +203,21 @@ def _compute_kinds(
 
 
 def _list_detection_masks(spectrum: SegmentSpectrum, in_band: Mask) -> list[tuple[Kind, Mask, int]]:
-    """Kinds of distortion with their lines in the band, and the number of lines of the band that each kind reaches."""
+    """List the kinds of distortion with their lines in the band, and the number of lines of the band that each kind
+    reaches."""
     line_numbers = np.arange(1, len(in_band) + 1)
     is_multiple = in_band & (line_numbers % spectrum.lines.step == 0)
     is_odd = line_numbers // spectrum.lines.step % 2 == 1
-    kinds: list[tuple[Kind, Mask, int]] = [
+    kind_masks: list[tuple[Kind, Mask, int]] = [
         ("odd", np.asarray(in_band & spectrum.lines.odd), int((is_multiple & is_odd).sum())),
         ("even", np.asarray(in_band & spectrum.lines.even), int((is_multiple & ~is_odd).sum())),
         ("either", np.asarray(in_band & spectrum.lines.either), int(is_multiple.sum())),
     ]
-    return [kind for kind in kinds if kind[1].any()]
+    return [kind for kind in kind_masks if kind[1].any()]
 
 
 def _compute_rms(power: float) -> float:
-    """Rms from a sum of squared magnitudes of a one-sided spectrum of complex amplitudes divided by the number of
-    samples: a sine of peak A has the magnitude A/2, and A²/2 = 2 (A/2)². Negative sums, which noise alone gives, count
-    as 0."""
+    """Compute the rms from a sum of squared magnitudes of a one-sided spectrum of complex amplitudes divided by the
+    number of samples: a sine of peak A has the magnitude A/2, and A²/2 = 2 (A/2)². Negative sums, which noise alone
+    gives, count as 0."""
     return float(np.sqrt(2 * max(power, 0.0)))

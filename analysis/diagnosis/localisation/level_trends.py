@@ -19,7 +19,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class LevelTrend:
-    """Distortion of one kind in an output, for an input and a band, and its change with the level of excitation."""
+    """Distortion of one kind in an output, for an input and a band (Hz), and its change with the level of excitation.
+    Names, band and kind are as in `Distortion`."""
 
     output: str
     quantity: str
@@ -31,8 +32,8 @@ class LevelTrend:
     p_value: float
     """p-value of no distortion: the smallest over the levels times their number (Bonferroni)."""
     db_per_doubling: float | None
-    """Slope of the relative distortion with the level; None where it is not significant at any level, or with one level
-    only."""
+    """Slope of the relative distortion with the level, dB per doubling; None where it is not known, see
+    `_estimate_slope`."""
     from_nothing: bool
     """Whether it is not significant at the lowest level, but at another: the slope is then a lower bound."""
 
@@ -43,7 +44,7 @@ class LevelTrend:
 
     @property
     def level_dependence(self) -> str:
-        """ "falls", "rises", "rises from nothing", "stays", or "" where the trend is unknown."""
+        """Name of the trend: "falls", "rises", "rises from nothing", "stays", or "" where it is unknown."""
         if not self.present or self.db_per_doubling is None:
             return ""
         if abs(self.db_per_doubling) < STEADY_DB:
@@ -54,18 +55,21 @@ class LevelTrend:
 
 
 def compute_level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
-    """Trends of all outputs, inputs, bands and kinds. cells: distortions at all levels."""
+    """Compute the trends of all outputs, inputs, bands and kinds. cells: distortions at all levels."""
     groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
     for cell in cells:
         # Realisations differ slightly in the band that they drive.
         band = _WHOLE_BAND if cell.whole_band else cell.band_hz
-        key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
-        groups.setdefault(key, []).append(cell)
-    return tuple(_compute_trend(key, sorted(group, key=lambda cell: cell.amplitude)) for key, group in groups.items())
+        group_key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
+        groups.setdefault(group_key, []).append(cell)
+    return tuple(
+        _compute_trend(group_key, sorted(group, key=lambda cell: cell.amplitude)) for group_key, group in groups.items()
+    )
 
 
-def _compute_trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
-    """The trend of one group. cells: its distortions, by rising level."""
+def _compute_trend(group_key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
+    """Compute the trend of one group. group_key: output, quantity, input, band, whether it is the whole band, kind;
+    cells: its distortions, by rising level."""
     distortion_rms = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
     signal_rms = np.array([cell.signal_rms for cell in cells])
     levels = np.array([cell.amplitude for cell in cells])
@@ -73,18 +77,20 @@ def _compute_trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
     is_significant = np.array([cell.p_value < DISTORTION_P for cell in cells])
     slope = _estimate_slope(levels, relative_db, np.array([cell.lines for cell in cells]), is_significant)
-    if key[4]:
+    if group_key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
-        key = (*key[:3], band, *key[4:])
-    return LevelTrend(*key, p_value, slope, bool(is_significant.any() and not is_significant[0]))
+        group_key = (*group_key[:3], band, *group_key[4:])
+    return LevelTrend(*group_key, p_value, slope, bool(is_significant.any() and not is_significant[0]))
 
 
 def _estimate_slope(
     levels: FloatArray, relative_db: FloatArray, line_counts: FloatArray, is_significant: Mask
 ) -> float | None:
-    """Slope in dB per doubling of the level; None where it is not known. Where the distortion is not significant at a
-    level, the detection limit takes its place, and bounds the slope: from below at the lowest level, from above at the
-    highest. A bound that does not show a trend is not used: the slope is then that of the significant levels."""
+    """Estimate the slope in dB per doubling of the level; None where nothing is significant, a
+    level is not above 0, or fewer than two levels can be compared. Where the distortion is not
+    significant at a level, the detection limit takes its place, and bounds the slope: from below at the lowest level,
+    from above at the highest. A bound that does not show a trend is not used: the slope is then that of the significant
+    levels."""
     if not is_significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
     bounded_slope = _regress_slope(np.log2(levels), relative_db, line_counts)
@@ -102,8 +108,8 @@ def _estimate_slope(
 
 
 def _regress_slope(doublings: FloatArray, relative_db: FloatArray, line_counts: FloatArray) -> float:
-    """dB per doubling of the level: linear regression, weighted by the number of lines. doublings: log2 of the
-    levels."""
+    """Regress the slope in dB per doubling of the level: linear regression, weighted by the number of lines. doublings:
+    log2 of the levels."""
     centred = doublings - np.average(doublings, weights=line_counts)
     return float(np.sum(line_counts * centred * relative_db)) / float(np.sum(line_counts * centred**2))
 
@@ -111,4 +117,4 @@ def _regress_slope(doublings: FloatArray, relative_db: FloatArray, line_counts: 
 _LEAST_AMPLITUDE = 1e-300
 """Lower limit of an amplitude, so that its logarithm is finite."""
 _WHOLE_BAND: Band = (0.0, np.inf)
-"""The whole band (Hz)."""
+"""Band (Hz) that stands for the whole driven band in a group's key."""

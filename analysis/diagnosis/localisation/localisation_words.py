@@ -1,6 +1,6 @@
 """Sentences for the user about the localisation of a mismatch: where it enters, and the states that it depends on.
 
-Called by the report (`diagnosis_report`) and by `answer_of_findings`; the numbers come from `entry_point` and
+Called by the report (`diagnosis_report`) and by `make_real_answer`; the numbers come from `entry_point` and
 `state_regions`.
 """
 
@@ -14,14 +14,16 @@ from analysis.diagnosis.unit_wording import format_share
 from analysis.wording import conjoin, format_p_text
 
 _FORCE_SOURCES = "the drive, the mechanism and a hand all act there, and these channels do not distinguish them"
+"""Possible sources of a force along one axis."""
 _COMMON_FORCE_SOURCES = (
     "drives, the mechanism and a hand act in this way, and so does an error of timing, which shifts all channels "
     "equally"
 )
+"""Possible sources of a force along several axes."""
 
 
 def write_localisation_sentences(localisation: Localisation) -> tuple[str, ...]:
-    """Sentences about the residual of the re-tuned model: where it enters, and the states that it depends on."""
+    """Write sentences about the residual of the re-tuned model: where it enters, and the states that it depends on."""
     sentences = (
         write_entry_sentence(localisation.entry),
         write_states_sentence(localisation.states.get("retuned", ())),
@@ -30,7 +32,7 @@ def write_localisation_sentences(localisation: Localisation) -> tuple[str, ...]:
 
 
 def write_entry_sentence(entry: EntryPoint | None) -> str:
-    """Sentence on the place where the mismatch enters; empty with too few lines of enough power."""
+    """Write a sentence on the place where the mismatch enters; empty with too few lines of enough power."""
     if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
     best_entry = entry.ranking[0]
@@ -53,7 +55,7 @@ def write_entry_sentence(entry: EntryPoint | None) -> str:
 
 
 def write_states_sentence(states: Sequence[StateMismatch]) -> str:
-    """Sentence on the states that the mismatch depends on; empty where there are none."""
+    """Write a sentence on the states that the mismatch depends on; empty where there are none."""
     if not states:
         return ""
     state_phrases = [
@@ -65,31 +67,34 @@ def write_states_sentence(states: Sequence[StateMismatch]) -> str:
 
 
 def _describe_rival_entries(entry: EntryPoint) -> str:
-    """Clauses on entries that the data cannot distinguish from the best, and on the next best entry; may be empty."""
+    """Describe, in clauses, the entries that the data cannot distinguish from the best, and the next best entry; may be
+    empty."""
     best_entry, distinguishable = (
         entry.ranking[0],
         [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].equivalents],
     )
-    equivalents = f"; {conjoin(best_entry.equivalents)} would have the same effect" if best_entry.equivalents else ""
+    equivalents_text = (
+        f"; {conjoin(best_entry.equivalents)} would have the same effect" if best_entry.equivalents else ""
+    )
     # Entries along several axes contain those along each, and errors of several channels contain each channel's.
     rivals = [rival for rival in distinguishable if not (rival.axis is None and rival.place == best_entry.place)]
     if not rivals:
-        return equivalents
+        return equivalents_text
     next_entry = rivals[0]
     p_text = format_p_text(next_entry.p_value)
     if next_entry.p_value > ENTRY_AS_GOOD_P:
         return (
-            f"{equivalents}; {next_entry.name} would explain it about equally well ({_format_share(next_entry)}, "
+            f"{equivalents_text}; {next_entry.name} would explain it about equally well ({_format_share(next_entry)}, "
             f"{p_text})"
         )
     return (
-        f"{equivalents}; the next best entry is {next_entry.name} with {_format_share(next_entry)} "
+        f"{equivalents_text}; the next best entry is {next_entry.name} with {_format_share(next_entry)} "
         f"({p_text} for its being equally good)"
     )
 
 
 def _write_sensor_rule_sentence(entry: EntryPoint) -> str:
-    """Sentence on the comparison of position and response (`SensorRule`); empty where it is undecided."""
+    """Write a sentence on the comparison of position and response (`SensorRule`); empty where it is undecided."""
     if entry.rule is None or entry.rule.verdict == "undecided":
         return ""
     if entry.rule.verdict == "motion":
@@ -104,5 +109,5 @@ def _write_sensor_rule_sentence(entry: EntryPoint) -> str:
 
 
 def _format_share(score: EntryScore) -> str:
-    """Share of the mismatch that the entry explains, as text; a negative share as 0."""
+    """Format the share of the mismatch that the entry explains; a negative share as 0."""
     return format_share(max(score.share, 0.0))

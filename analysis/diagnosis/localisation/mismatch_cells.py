@@ -1,4 +1,4 @@
-"""Tests a prediction against a recording, per cell: channel x driving input x octave x level of the excitation.
+"""Test a prediction against a recording, per cell: channel x driving input x octave x level of the excitation.
 
 The power of the residual is compared with that of the noise plus an equivalence margin (noncentral F test), which
 includes the mismatch of clean recordings, if there are any. p-values are adjusted hierarchically (Benjamini and
@@ -35,7 +35,9 @@ class Margin:
     """Equivalence margin: a share of the signal in a cell and the share of clean recordings, squares added."""
 
     share: float = MODEL_FLOOR
+    """Share of the signal, rms, that no model predicts."""
     learned: ModelErrorFloor = field(default_factory=ModelErrorFloor)
+    """Relative model errors on clean recordings."""
 
     def compute_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
         """Return the margin of a cell, as a share of its signal."""
@@ -52,6 +54,7 @@ class MismatchCell:
     input: str
     """Driven inputs, joined by "+"."""
     band_hz: Band
+    """Lower and upper end of the octave, Hz."""
     amplitude: float
     """Level of the excitation, in the command's unit."""
     rms: float
@@ -67,6 +70,7 @@ class MismatchCell:
     adjusted_p_value: float
     """p-value adjusted for the number of cells, within channel and band."""
     seconds: float
+    """Evaluated time, s."""
     lines: float = 1.0
     """Number of independent lines."""
     freedom: float = 1.0
@@ -141,6 +145,8 @@ def _make_observations(
 def _compute_cell(
     group: Sequence[ResidualLines], channel: int, output: str, observation: Observation, margin: Margin
 ) -> MismatchCell:
+    """Compute and test the cell of one channel. group: its lines in all parts of the recording, of one input, band and
+    level; powers are averaged over them by duration, the ratio to the noise by number of lines."""
     first_lines = group[0]
     quantity = observation.quantities[channel]
     margin_share = margin.compute_share(output, quantity, first_lines.input, first_lines.band_hz)
@@ -222,21 +228,21 @@ def _adjust_families(
     for member in members:
         groups.setdefault(families[int(member)][depth], []).append(int(member))
     subfamilies = [np.array(group) for group in groups.values()]
-    simes = np.array([_adjust_benjamini_hochberg(p_values[group]).min() for group in subfamilies])
-    family_p_values = factor * _adjust_benjamini_hochberg(simes)
-    found_count = int(np.sum(family_p_values <= level))
+    simes_p_values = np.array([_adjust_benjamini_hochberg(p_values[group]).min() for group in subfamilies])
+    family_p_values = factor * _adjust_benjamini_hochberg(simes_p_values)
+    significant_count = int(np.sum(family_p_values <= level))
     for group, p_value in zip(subfamilies, family_p_values, strict=True):
         adjusted[group] = np.maximum(adjusted[group], p_value)
         if p_value <= level:
             _adjust_families(
-                p_values, families, group, (depth + 1, factor * len(subfamilies) / found_count, level), adjusted
+                p_values, families, group, (depth + 1, factor * len(subfamilies) / significant_count, level), adjusted
             )
         else:
             adjusted[group] = np.maximum(adjusted[group], p_values[group])
 
 
 def _adjust_benjamini_hochberg(p_values: FloatArray) -> FloatArray:
-    """(tests,): p-values adjusted by Benjamini and Hochberg (1995); their minimum is the p-value of Simes (1986)."""
+    """Adjust p-values (tests,) by Benjamini and Hochberg (1995); their minimum is the p-value of Simes (1986)."""
     order = np.argsort(p_values)[::-1]
     adjusted = np.empty(len(p_values))
     scaled = p_values[order] * len(p_values) / np.arange(len(p_values), 0, -1)

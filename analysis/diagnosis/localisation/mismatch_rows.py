@@ -1,4 +1,4 @@
-"""Converts significant mismatch cells and regions of state to rows of the diagnosis document (`Mismatch`).
+"""Convert significant mismatch cells and regions of state to rows of the diagnosis document (`Mismatch`).
 
 Cells are those of `mismatch_cells`, regions those of `state_regions`. Rows with the largest missing power come first.
 Called by `assemble_findings`.
@@ -14,12 +14,13 @@ from analysis.diagnosis.localisation.state_regions import StateRegion
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 MOST_ROWS = 40
-"""Most rows of the table of mismatches."""
+"""Largest number of rows of the table of mismatches. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class StateMismatch:
-    """A region of state in which a mismatch is large, with the mismatch's channel, inputs and band."""
+    """A region of state in which a mismatch is large, with the mismatch's output channel, driving inputs and band
+    (Hz)."""
 
     output: str
     input: str
@@ -36,11 +37,9 @@ def list_mismatch_rows(
     little meaning by itself."""
     significant_states = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
     significant_cells = [cell for cell in cells if cell.significant]
-    channel_signals = _compute_channel_signals(cells)
+    channel_rms = _compute_channel_rms(cells)
     significant_states.sort(key=lambda state: (-state.region.share, state.region.p_value))
-    significant_cells.sort(
-        key=lambda cell: (-cell.rms / channel_signals[_identify_channel(cell)], cell.adjusted_p_value)
-    )
+    significant_cells.sort(key=lambda cell: (-cell.rms / channel_rms[_identify_channel(cell)], cell.adjusted_p_value))
     return (*map(_make_state_row, significant_states), *map(_make_cell_row, significant_cells))[:limit]
 
 
@@ -49,7 +48,7 @@ def _identify_channel(cell: MismatchCell) -> tuple[str, str]:
     return cell.output, cell.quantity
 
 
-def _compute_channel_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
+def _compute_channel_rms(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
     """Compute the rms of each channel's response over all bands, in the segment (input and level) with the largest."""
     powers: dict[tuple[str, str], dict[tuple[str, float], float]] = {}
     for cell in cells:

@@ -2,7 +2,7 @@
 is found (`entry_point`).
 
 Channels are those of the response, then of the position. A spectrum is that of the mean period (rfft / n, see
-`compute_line_spectra`), on the lines from the first to the last that the excitation drives.
+`compute_line_spectra`), on the lines from the first to the last that the excitation drives. Called by `localisation`.
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,10 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOW_S = 2.0
-"""Length (s) of a window of a recording that has no period."""
+"""Length (s) of a window of a recording that has no period. Chosen by hand."""
 _LEAST_AMPLITUDE_SHARE = 0.1
-"""Least amplitude of a channel in the model error, relative to the strongest channel of the same signal."""
+"""Least amplitude of a channel in the model error, relative to the strongest channel of the same signal.
+Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,9 +49,9 @@ def compute_residual_spectra(
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
     """Compute the spectrum of each segment's mean period, or of windows of `_WINDOW_S` where nothing is periodic. None
-    without either, without known noise, or where no line is driven. used: (n,), usable samples. model_error: relative
-    to the response; counts as noise, or residuals of the re-tuned model on other axes would appear as a second
-    force."""
+    without either, without known noise, or where no line is driven. used: (n,), usable samples; None = all. Segments
+    whose period differs from that of the first are left out. model_error: relative to the response (default chosen by
+    hand); counts as noise, or residuals of the re-tuned model on other axes would appear as a second force."""
     residuals = [recording.response.samples - prediction.response]
     channel_noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
@@ -70,10 +71,10 @@ def compute_residual_spectra(
         [compute_period_spectra(select_instrument_signal(recording), segment).mean(axis=0) for segment in segments]
     )
     total_excitation = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
-    driven = find_detection_lines(total_excitation, compute_hold_samples(select_instrument_signal(recording)))
-    if driven is None:
+    detection_lines = find_detection_lines(total_excitation, compute_hold_samples(select_instrument_signal(recording)))
+    if detection_lines is None:
         return None
-    first_line, last_line = np.flatnonzero(driven.driven)[[0, -1]]
+    first_line, last_line = np.flatnonzero(detection_lines.driven)[[0, -1]]
     driven_lines = slice(int(first_line), int(last_line) + 1)
     spectra = np.stack([compute_period_spectra(residual, segment).mean(axis=0)[driven_lines] for segment in segments])
     driven_hz = lines_hz[driven_lines]
@@ -86,29 +87,29 @@ def compute_residual_spectra(
     return ResidualSpectra(driven_hz, spectra, noise, residuals[0].shape[1])
 
 
-def _select_usable_periods(periods: Periods, usable: Mask) -> Periods:
-    """The periods whose samples are all usable; `starts` may then be empty."""
-    starts = tuple(start for start in periods.starts if usable[start : start + periods.length].all())
+def _select_usable_periods(periods: Periods, is_usable: Mask) -> Periods:
+    """Select the periods whose samples are all usable; `starts` may then be empty."""
+    starts = tuple(start for start in periods.starts if is_usable[start : start + periods.length].all())
     return Periods(periods.index, periods.segment, starts, periods.settled)
 
 
-def _cut_windows(recording: Recording, usable: Mask) -> list[Periods]:
+def _cut_windows(recording: Recording, is_usable: Mask) -> list[Periods]:
     """Cut windows of `_WINDOW_S` from a recording without periods, each as a single period; segments of rest are left
     out."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
     windows = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         for start in range(segment.start, segment.stop - length + 1, length):
-            if segment.kind != "rest" and usable[start : start + length].all():
+            if segment.kind != "rest" and is_usable[start : start + length].all():
                 window = Segment(start, start + length, segment.kind, segment.amplitude, length, segment.role)
                 windows.append(Periods(index, window, (start,), True))
     return windows
 
 
-def _compute_response_power(recording: Recording, periods: Periods, with_position: bool) -> FloatArray:
-    """(lines, channels): squared magnitude of the mean period of response (and position); a weak channel counts with
-    the amplitude `_LEAST_AMPLITUDE_SHARE` of the strongest channel of its signal."""
-    signals = [recording.response, *([recording.position] if with_position and recording.position is not None else [])]
+def _compute_response_power(recording: Recording, periods: Periods, has_position: bool) -> FloatArray:
+    """Compute (lines, channels): squared magnitude of the mean period of response (and position); a weak channel counts
+    with the amplitude `_LEAST_AMPLITUDE_SHARE` of the strongest channel of its signal."""
+    signals = [recording.response, *([recording.position] if has_position and recording.position is not None else [])]
     channel_powers = []
     for signal in signals:
         power = np.abs(compute_period_spectra(signal.samples, periods).mean(axis=0)) ** 2
@@ -119,8 +120,8 @@ def _compute_response_power(recording: Recording, periods: Periods, with_positio
 def _compute_noise_power(
     channel_noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods
 ) -> FloatArray:
-    """(lines, channels): expected power of the noise in the mean period. Averaging over `periods.count` periods does
-    not lower the rounding errors, which repeat with the motion."""
+    """Compute (lines, channels): expected power of the noise in the mean period. Averaging over `periods.count` periods
+    does not lower the rounding errors, which repeat with the motion."""
     noise_powers = []
     for noise in channel_noises:
         density = np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1)

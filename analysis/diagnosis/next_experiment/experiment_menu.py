@@ -1,8 +1,9 @@
-"""Menu of experiments that a laboratory could record next to discriminate rival effects, as commands to simulate.
+"""List the experiments that a laboratory could record next to discriminate rival effects, as commands to simulate.
 
 Sweeps at several levels, slow sinusoids, a longer sweep, pushes and releases, and a sweep with added mass:
 `propose_experiment` predicts by simulation how well each discriminates the rivals. Nothing exceeds the level already
-recorded. Commands are in the model's unit (N, N m, or that of the current).
+recorded. Commands are in the model's unit (N, N m, or that of the current). Also called by
+`study.evaluation.bank.follow_up`.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,8 @@ from equalizer.signals.excitation import apply_fades, make_log_sweep, make_sine
 from equalizer.signals.signal import FloatArray
 
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
-"""Lowest frequency of sweeps: in Hz, or as a share of their usual upper end; the lower of the two."""
+"""Lowest frequency of sweeps: in Hz, or as a share of their usual upper end; the lower of the two. The numbers of this
+module are chosen by hand."""
 SWEEP_CYCLES, LONG_FACTOR = 8.0, 5.0
 """Length of an experiment in cycles of the sweep's lowest frequency, and the factor on it for the long sweep."""
 USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
@@ -54,18 +56,18 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
     slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)
     length_s = SWEEP_CYCLES / slowest_hz
     fade_samples = int(_FADE_SHARE * length_s * sample_rate_hz)
-    slow_hz = 4.0 / length_s
+    sinusoid_hz = 4.0 / length_s  # four cycles per experiment
     added_mass = ADDED_MASS_SHARE * _compute_driven_mass(model)
 
     def drive_axis(waveform: FloatArray) -> FloatArray:
         return np.outer(apply_fades(waveform, fade_samples, fade_samples), np.arange(model.inputs) == axis)
 
-    def make_sweep(peak: float, to_hz: float = usual_hz, length_factor: float = 1.0) -> FloatArray:
+    def make_sweep(peak: float, highest_hz: float = usual_hz, length_factor: float = 1.0) -> FloatArray:
         samples = int(length_factor * length_s * sample_rate_hz)
-        return drive_axis(make_log_sweep(slowest_hz, to_hz, peak, samples, sample_rate_hz))
+        return drive_axis(make_log_sweep(slowest_hz, highest_hz, peak, samples, sample_rate_hz))
 
     def make_sinusoid(peak: float) -> FloatArray:
-        return drive_axis(make_sine(slow_hz, peak, int(length_s * sample_rate_hz), sample_rate_hz))
+        return drive_axis(make_sine(sinusoid_hz, peak, int(length_s * sample_rate_hz), sample_rate_hz))
 
     sweep, wide_sweep = (f"a sweep from {slowest_hz:.3g} to {upper_hz:.3g} Hz" for upper_hz in (usual_hz, fastest_hz))
     levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
@@ -73,27 +75,28 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
         Experiment(f"{sweep} at {level / divisor:.3g}, {words}", make_sweep(level / divisor), "sweep")
         for divisor, words in levels.items()
     )
-    stiff = _is_stiff(model, axis, slowest_hz)
-    static = _list_static_experiments(sweep, level, make_sweep(level / 2), fade_samples) if stiff else ()
-    slow, long_s = f"a slow sinusoid of {slow_hz:.3g} Hz", LONG_FACTOR * length_s
-    hardly_moving = f"{slow} at {level / 10:.3g}, so small that the device hardly moves"
-    long_sweep = f"{wide_sweep} at {level:.3g} that lasts {long_s:.3g} s"
-    weight_words = _describe_added_mass(model, added_mass)
+    is_stiff = _is_stiff(model, axis, slowest_hz)
+    static_experiments = _list_static_experiments(sweep, level, make_sweep(level / 2), fade_samples) if is_stiff else ()
+    sinusoid_words, long_s = f"a slow sinusoid of {sinusoid_hz:.3g} Hz", LONG_FACTOR * length_s
+    small_sinusoid_words = f"{sinusoid_words} at {level / 10:.3g}, so small that the device hardly moves"
+    long_sweep_words = f"{wide_sweep} at {level:.3g} that lasts {long_s:.3g} s"
+    mass_words = _describe_added_mass(model, added_mass)
     return (
         *sweeps,
         Experiment(f"{wide_sweep} at {level:.3g}", make_sweep(level, fastest_hz), "sweep"),
-        Experiment(f"{slow} at {level:.3g}", make_sinusoid(level), "slow"),
-        Experiment(hardly_moving, make_sinusoid(level / 10), "slow"),
-        Experiment(long_sweep, make_sweep(level, fastest_hz, LONG_FACTOR), "sweep", minutes=1.5),
-        *static,
-        Experiment(f"{sweep} at {level:.3g} with {weight_words}", make_sweep(level), "sweep", added_mass, minutes=3.0),
+        Experiment(f"{sinusoid_words} at {level:.3g}", make_sinusoid(level), "slow"),
+        Experiment(small_sinusoid_words, make_sinusoid(level / 10), "slow"),
+        Experiment(long_sweep_words, make_sweep(level, fastest_hz, LONG_FACTOR), "sweep", minutes=1.5),
+        *static_experiments,
+        Experiment(f"{sweep} at {level:.3g} with {mass_words}", make_sweep(level), "sweep", added_mass, minutes=3.0),
     )
 
 
 def _is_stiff(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
     """Whether a constant force deflects the axis at most twice as far as a sinusoid of the sweep's lowest frequency:
     an axis without stiffness, or with little, would be driven away. From the static compliance b' K^-1 b and the
-    dynamic one b' (M s^2 + D s + K)^-1 b, with b the axis."""
+    dynamic one b' (M s^2 + D s + K)^-1 b, with b the axis; False where a matrix is singular or the static compliance is
+    not positive."""
     input_vector = compute_driven_axes(model)[:, axis]
     s = 2j * np.pi * slowest_hz
     try:
@@ -129,8 +132,8 @@ def _list_static_experiments(
 
 
 def _make_release_command(level: float, samples: int) -> FloatArray:
-    """(n,), in the command's unit: ramps up to the level, in either direction in turn, each followed by zero force for
-    as long: the device then decays freely."""
+    """Make (n,), in the command's unit: ramps up to the level, in either direction in turn, each followed by zero force
+    for as long, in which the device decays freely. n is at most `samples`."""
     ramp_samples = samples // (2 * RELEASE_COUNT)
     ramp = np.append(np.linspace(0.0, level, ramp_samples), np.zeros(ramp_samples))
     signs = [1.0 if index % 2 == 0 else -1.0 for index in range(RELEASE_COUNT)]

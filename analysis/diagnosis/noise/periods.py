@@ -1,6 +1,7 @@
 """Complete, settled periods of a recording's periodic segments, and their spectra.
 
-Used for the noise estimate from repeated periods (`repeat_noise`) and for spectra of the residual (`localisation`).
+Called for the noise estimate from repeated periods (`noise_floor`, `repeat_noise`), for spectra of the residual
+(`localisation`), for clusters of residuals (`standard_errors`) and by `analysis.look.repeats`.
 """
 
 from dataclasses import dataclass
@@ -13,9 +14,9 @@ from equalizer.signals.spectral_density import compute_line_spectra
 
 _TRANSIENT_RATIO = 2.0
 """Largest energy ratio, first third over last third, of a period's difference from the segment's last period; above it
-the difference still decays, so that the period contains the transient."""
+the difference still decays, so that the period contains the transient. Chosen by hand."""
 _SHORTEST_PERIOD = 8
-"""Shortest period that is used, in samples: a shorter one has too few spectral lines."""
+"""Shortest period that is used, in samples: a shorter one has too few spectral lines. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +27,7 @@ class Periods:
     """Index of the segment in the recording."""
     segment: Segment
     starts: tuple[int, ...]
-    """First samples of the complete, settled periods; at least one."""
+    """First samples of the complete, settled periods; at least one as made by `find_settled_periods`."""
     settled: bool
     """False if only the segment's first period is usable, which contains the transient."""
 
@@ -41,7 +42,8 @@ class Periods:
         return len(self.starts)
 
     def compute_line_frequencies(self, sample_rate_hz: float) -> FloatArray:
-        """(lines,): frequencies of the lines of `compute_period_spectra`, without zero and half the rate."""
+        """Compute (lines,), Hz: frequencies of the lines of `compute_period_spectra`, without zero and half the
+        rate."""
         lines: FloatArray = np.arange(1.0, (self.length + 1) // 2) * (sample_rate_hz / self.length)
         return lines
 
@@ -77,7 +79,7 @@ def compute_period_spectra(samples: FloatArray, periods: Periods) -> ComplexArra
 
 
 def compute_mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
-    """(lines, channels): spectrum of the mean period."""
+    """Compute (lines, channels): spectrum of the mean period, rfft / length."""
     return np.asarray(compute_line_spectra(stack_periods(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
@@ -91,11 +93,11 @@ def _is_complete(recording: Recording, start: int, length: int) -> bool:
 def _drop_transients(recording: Recording, starts: list[int], length: int) -> list[int]:
     """Return the starts of the periods after the transient: leading periods are dropped, except for the last two, while
     their difference from the last period decays within a period (`_TRANSIENT_RATIO`)."""
-    samples, third = recording.response.samples, length // 3
+    samples, third_length = recording.response.samples, length // 3
     while len(starts) > 2:
         difference = samples[starts[0] : starts[0] + length] - samples[starts[-1] : starts[-1] + length]
         energy = np.sum((difference - difference.mean(axis=0)) ** 2, axis=1)
-        if energy[:third].sum() <= _TRANSIENT_RATIO * energy[-third:].sum():
+        if energy[:third_length].sum() <= _TRANSIENT_RATIO * energy[-third_length:].sum():
             break
         starts = starts[1:]
     return starts

@@ -21,11 +21,12 @@ from equalizer.signals.signal import FloatArray, find_runs
 from equalizer.signals.spectral_density import hann
 
 _LEAST_WINDOW_SAMPLES = 8
-"""Least number of samples of a window at rest: recordings at less than 30 Hz have no window."""
+"""Least number of samples of a window at rest: recordings at less than 30 Hz have no window. The constants of this
+module are chosen by hand, except for those of the third differences."""
 _WINDOW_S = 0.25
 """Length of a window at rest (s)."""
 _UNDRIVEN_SHARE = 1e-4
-"""Share of the strongest smoothed power of the command below which nothing is driven."""
+"""Share of the strongest smoothed power of the excitation, at or below which nothing is driven."""
 _LEAKAGE_RATIO = 1.3
 """Ratio to the highest driven line above which leakage of the windows is negligible."""
 _LEAST_LINES = 16
@@ -67,8 +68,8 @@ def estimate_rest_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
     """Estimate the noise at rest: density (lines, channels) at `frequency_hz`, and its degrees of freedom. None without
-    a rest of a quarter of a second, or where a reading is constant at rest, because an encoder's steps then hide its
-    noise."""
+    a rest of a quarter of a second (or with fewer than `_LEAST_WINDOW_SAMPLES` samples in it), or where a reading is
+    constant at rest, because an encoder's steps then hide its noise."""
     window_samples = round(_WINDOW_S * recording.sample_rate_hz)
     if window_samples < _LEAST_WINDOW_SAMPLES:
         return None
@@ -88,30 +89,36 @@ def estimate_quiet_band_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
     """Estimate a white density (lines, channels) with the power of the median line above the driven band, and its
-    degrees of freedom; None without such a band. The median excludes the lines of harmonics."""
-    instrument = select_instrument_signal(recording)
-    start, stop = _find_longest_run(np.hstack([samples, instrument]))
-    samples, command = samples[start:stop], instrument[start:stop]
+    degrees of freedom; None without such a band of at least `_LEAST_LINES` lines, or with a constant excitation. The
+    median excludes the lines of harmonics."""
+    excitation = select_instrument_signal(recording)
+    start, stop = _find_longest_run(np.hstack([samples, excitation]))
+    samples, excitation_run = samples[start:stop], excitation[start:stop]
     if len(samples) < 2 * _LEAST_LINES:
         return None
     n = len(samples)
     # A Hann window has a mean square of 3/8.
-    window = np.sqrt(8 / 3) * hann(n)
+    hann_window = np.sqrt(8 / 3) * hann(n)
     lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
-    command_power = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
-    smoothed_power = smooth_over_lines(command_power.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
+    excitation_power = (
+        np.abs(np.fft.rfft((excitation_run - excitation_run.mean(axis=0)) * hann_window[:, None], axis=0)[1 : n // 2])
+        ** 2
+    )
+    # Smoothed over at least 9 lines, or a number of lines of 1/500 of the samples: chosen by hand.
+    smoothed_power = smooth_over_lines(excitation_power.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
     if smoothed_power.max() == 0:
         return None
     highest_driven_hz = float(lines_hz[np.flatnonzero(smoothed_power > _UNDRIVEN_SHARE * smoothed_power.max())[-1]])
     quiet_lines = np.flatnonzero(lines_hz > _LEAKAGE_RATIO * highest_driven_hz)
     if len(quiet_lines) < _LEAST_LINES:
         return None
-    power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
+    power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * hann_window[:, None], axis=0)[1 : n // 2]) ** 2 / n
     # The power of a line is exponentially distributed, with a median of ln 2 times its mean.
     noise_density = np.median(power[quiet_lines], axis=0) / np.log(2)
     return np.tile(noise_density, (len(frequency_hz), 1)), float(len(quiet_lines))
 
 
 def _find_longest_run(samples: FloatArray) -> tuple[int, int]:
-    """Start and stop of the longest stretch without a gap: edges of a filled gap would add power at all frequencies."""
+    """Find start and stop of the longest stretch without a gap: edges of a filled gap would add power at all
+    frequencies."""
     return max(find_runs(np.asarray(np.isfinite(samples).all(axis=1))), key=lambda run: run[1] - run[0], default=(0, 0))

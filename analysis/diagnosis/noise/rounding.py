@@ -6,7 +6,8 @@ The part of it that repeats is a saw tooth blurred by the noise; with the power 
     repeating = sum over k >= 1 of exp(-4 pi² k² v) / (2 pi² k²),        between repeats = v + 1/12 - repeating
 
 (Widrow and Kollar, Quantization Noise, 2008). `undo_rounding` solves this for v, and so finds the total noise; called
-by `repeat_noise`. The checks of recordings and the choice of the error measure use `find_rounding_step` alone.
+by `repeat_noise`. The checks of recordings (`analysis.look`), `find_segments` and the choice of the error measure use
+`find_rounding_step` alone. Tolerances are chosen by hand.
 """
 
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ class RoundedNoise:
     """Variances of one channel, in its unit squared."""
 
     total: float
+    """Total noise, rounding included."""
     repeating: float
     """Part of the total that is the same in each repeat."""
 
@@ -35,20 +37,23 @@ class RoundedNoise:
 def find_rounding_step(samples: FloatArray) -> float:
     """Find the step of which all values of a channel are multiples, apart from an offset. 0 where there is none, for
     fewer than three values, and where the distinct values number half of the samples or more. samples: (n,), in any
-    unit."""
+    unit; the step has the same unit. Deviations from multiples of up to a tenth of a step are tolerated."""
     finite_samples = samples[np.isfinite(samples)][:_MAX_EXAMINED_SAMPLES]
-    values = np.unique(finite_samples)
-    if len(values) < 3:
+    distinct_values = np.unique(finite_samples)
+    if len(distinct_values) < 3:
         return 0.0
-    gaps = np.diff(values)
-    # Values that should be equal differ by rounding in storage.
+    gaps = np.diff(distinct_values)
+    # Values that should be equal differ by rounding in storage: far less than the usual gap.
     gaps = gaps[gaps > 1e-3 * np.median(gaps)]
+    # Gaps of one step: up to 1.5 times the smallest one, as two steps are twice as large.
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
-    step_numbers = np.round((values - values[0]) / step)
-    tolerance = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(values).max()))))
-    is_regular = bool(np.max(np.abs(values - values[0] - step * step_numbers)) < 0.1 * step + tolerance)
+    step_numbers = np.round((distinct_values - distinct_values[0]) / step)
+    tolerance = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(distinct_values).max()))))
+    is_regular = bool(
+        np.max(np.abs(distinct_values - distinct_values[0] - step * step_numbers)) < 0.1 * step + tolerance
+    )
     # A fine-grained float also has a smallest gap, but a rounded channel returns to each of its values.
-    return step if is_regular and len(values) < 0.5 * len(finite_samples) else 0.0
+    return step if is_regular and len(distinct_values) < 0.5 * len(finite_samples) else 0.0
 
 
 def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
@@ -78,8 +83,8 @@ def _solve_variance_before_rounding(between_repeats: float) -> float:
 
 
 def _compute_repeating_variance(variance: float) -> float:
-    """Variance of the repeating part for steps of 1, see above. variance: v. Without noise, the sum of all further
-    terms is added."""
+    """Compute the variance of the repeating part for steps of 1 (module docstring). variance: v. Without noise, the sum
+    of all further terms is added."""
     blurred = np.exp(-4 * np.pi**2 * _FOURIER_TERMS**2 * variance) / _FOURIER_TERMS**2
-    remainder = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _FOURIER_TERMS**2))
-    return float((np.sum(blurred) + remainder) / (2 * np.pi**2))
+    omitted_terms = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _FOURIER_TERMS**2))
+    return float((np.sum(blurred) + omitted_terms) / (2 * np.pi**2))

@@ -1,1 +1,1 @@
-"""The plain values of a diagnosis of a real recording: `answer_of_findings` makes a `real_answer`."""
+"""The plain values of a diagnosis of a real recording: `make_real_answer` makes a `real_answer`."""

@@ -1,5 +1,5 @@
 """Document of the diagnosis of one real recording, format `hapteq-real-answer`, version 1: the values of a row of the
-table of real recordings, and of its section in the report. Made by `answer_of_findings`, read by `real_report` and
+table of real recordings, and of its section in the report. Made by `make_real_answer`, read by `real_report` and
 `real_summary`; field names are those of the file."""
 
 import json

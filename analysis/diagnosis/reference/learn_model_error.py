@@ -33,8 +33,9 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 LEARNING_STEP = "learning from the clean recordings"
+"""Name of the step for the progress callback."""
 LEARNED_AT = 0.02
-"""Progress (share of the whole diagnosis) at the end of learning."""
+"""Progress (share of the whole diagnosis) at the end of learning. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +46,7 @@ class _RetunedFit:
     tuning: Tuning
     retuned: FittedCandidate
     cells: tuple[MismatchCell, ...]
-    channels: FloatArray
+    channel_shares: FloatArray
     """(c,): rms of the residual above the noise over the rms of the signal."""
 
     @property
@@ -68,6 +69,7 @@ class LearnedError:
 
     floor: ModelErrorFloor
     whitening: WhiteningFilter
+    """Filter that makes the residuals white; see the module docstring."""
     share: FloatArray
     """(c,): rms of the whitened residual over the signal's; see `_compute_signal_level`."""
     references: ReferenceRecordings
@@ -90,11 +92,11 @@ def learn_model_error(
     fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):
         progress(LEARNING_STEP, LEARNED_AT * number / len(clean))
-        chosen = make_measure((recording,), model, (*diagnosed, *clean))
-        require_same_measure(chosen.measure.name, measure_name)
-        fits.append(_learn_from_recording(chosen, model, recording, map_))
+        measure_choice = make_measure((recording,), model, (*diagnosed, *clean))
+        require_same_measure(measure_choice.measure.name, measure_name)
+        fits.append(_learn_from_recording(measure_choice, model, recording, map_))
     floor = learn_floor([fit.cells for fit in fits])
-    largest_shares = np.max([fit.channels for fit in fits], axis=0)
+    largest_shares = np.max([fit.channel_shares for fit in fits], axis=0)
     floor = replace(floor, error=measure_name, recordings=len(clean), channels=tuple(largest_shares.tolist()))
     return _learn_spectrum(floor, fits, map_)
 
@@ -143,8 +145,8 @@ def _learn_spectrum(floor: ModelErrorFloor, fits: Sequence[_RetunedFit], map_: M
 
 
 def _compute_signal_level(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
-    """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum and
-    drift nor a bad model increases it."""
+    """Compute (c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither
+    hum and drift nor a bad model increases it."""
     measured = [record.measured for record in measure.records]
     predicted = [samples - residual * measure.unit for samples, residual in zip(measured, residuals, strict=True)]
     channel_levels = [np.nanstd(np.vstack(signals), axis=0) for signals in (measured, predicted)]
@@ -152,24 +154,24 @@ def _compute_signal_level(measure: ErrorMeasure, residuals: Sequence[FloatArray]
 
 
 def _compute_rms(residuals: Sequence[FloatArray]) -> FloatArray:
-    """(c,): rms over the samples of all records; NaN is left out. residuals: (n, c) each."""
+    """Compute (c,): rms over the samples of all records; NaN is left out. residuals: (n, c) each."""
     return np.asarray(np.sqrt(np.nanmean(np.vstack(residuals) ** 2, axis=0)))
 
 
 def _learn_from_recording(
-    chosen: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper
+    measure_choice: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper
 ) -> _RetunedFit:
     """Re-tune the model to one clean recording, and compute its mismatch cells and residual shares."""
-    full_measure, tuning = chosen.measure, make_tuning(model, recording.command.channels)
+    full_measure, tuning = measure_choice.measure, make_tuning(model, recording.command.channels)
     context = SearchContext(full_measure.shorten(), full_measure, tuning, map_)
     retuned = context.with_test_score(context.score_fit(retune_alone(context)))
-    cells = compute_cells(full_measure, retuned.fitted, chosen.floors)
+    cells = compute_cells(full_measure, retuned.fitted, measure_choice.floors)
     return _RetunedFit(full_measure, tuning, retuned, cells, _compute_channel_shares(full_measure, retuned))
 
 
 def _compute_channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:
-    """(c,): rms of the residual above the noise over the rms of the signal, the largest over the samples to fit, to
-    choose and to test by: sqrt(score² - 1) noise / signal, where the score is rms residual over rms noise."""
+    """Compute (c,): rms of the residual above the noise over the rms of the signal, the largest over the samples to
+    fit, to choose and to test by: sqrt(score² - 1) noise / signal, where the score is rms residual over rms noise."""
     score = retuned.score
     worst_score = np.nanmax(np.maximum([score.fit, score.choose, score.test], 1.0), axis=0)
     return np.asarray(
@@ -183,5 +185,5 @@ def add_learned_noise(measure: ErrorMeasure, floor: ModelErrorFloor) -> ErrorMea
 
 
 def _compute_signal_rms(measure: ErrorMeasure) -> FloatArray:
-    """(c,): standard deviation of the measured signal, in the channel's unit."""
+    """Compute (c,): standard deviation of the measured signal, in the channel's unit."""
     return np.asarray(np.nanstd(np.vstack([record.measured for record in measure.records]), axis=0))

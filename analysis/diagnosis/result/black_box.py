@@ -1,8 +1,8 @@
 """A black-box correction as a reference for the named effects: where it predicts better, an effect is still missing.
 
-A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term, each time the
-one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per
-channel as the named effects have parameters. Called by `examine_fits`.
+A polynomial of the commands and of the re-tuned model's prediction is added to each channel of its prediction, term by
+term, each time the one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as
+many terms per channel as the named effects have parameters. Called by `examine_fits`.
 """
 
 from collections.abc import Sequence
@@ -18,10 +18,12 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 SELECTION_SAMPLES = 20_000
-"""Most samples for the selection of terms, evenly spaced among the fit samples; the final fit uses all."""
+"""Most samples for the selection of terms, evenly spaced among the fit samples; the final fit uses all.
+Limits the computing time; chosen by hand."""
 _LEAST_RMS = 1e-6
-"""Least rms of a term on the samples for the selection; over all samples it is about 1."""
+"""Least rms of a term on the samples for the selection; over all samples it is about 1. Chosen by hand."""
 _TINY = np.finfo(np.float64).tiny
+"""Lower limit of a divisor, so that a signal of zeros gives zeros."""
 
 
 def fit_black_box(
@@ -68,8 +70,8 @@ def fit_black_box(
 
 
 def _compute_term_rms(term_values: FloatArray) -> FloatArray:
-    """(terms,): rms; infinite for terms that vanish where they are fitted, such as products of commands that are never
-    played together, so that they are not used elsewhere."""
+    """Compute (terms,): rms; infinite for terms that vanish where they are fitted, such as products of commands that
+    are never played together, so that they are not used elsewhere."""
     rms = np.sqrt(np.mean(term_values**2, axis=0))
     return np.where(rms > _LEAST_RMS, rms, np.inf)
 
@@ -86,8 +88,8 @@ def _clip_to_fitted_range(regressors: list[FloatArray], fit_masks: list[Mask]) -
 
 
 def _make_regressors(command: FloatArray, predicted: FloatArray) -> FloatArray:
-    """(n, 2 signals): commands and predictions of the previous sample, and their changes since; each with an rms of
-    1."""
+    """Make (n, 2 signals): commands and predictions of the previous sample, and their changes since; each with an rms
+    of 1, or 0 where it vanishes."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
     previous_signals = np.vstack([signals[:1], signals[:-1]])
@@ -102,7 +104,7 @@ def _count_terms(regressors: FloatArray) -> int:
 
 
 def _compute_terms(regressors: FloatArray, term_numbers: Sequence[int]) -> FloatArray:
-    """(n, terms): the terms of these numbers. regressors: (n, 2 signals). With s a regressor, number = power (2
+    """Compute (n, terms): the terms of these numbers. regressors: (n, 2 signals). With s a regressor, number = power (2
     signals) + index: s, s², s |s| and s³ for powers 0 to 3; then the products of two signals."""
     width = regressors.shape[1]
     products = list(combinations(range(width // 2), 2))
@@ -121,17 +123,19 @@ def _compute_terms(regressors: FloatArray, term_numbers: Sequence[int]) -> Float
 def _select_terms(candidate_terms: FloatArray, target: FloatArray, term_count: int) -> list[int]:
     """Select terms by forward selection: each time the one most correlated with the residual of the least-squares fit.
     candidate_terms: (n, terms); target: (n,). Returns indices, in the order of selection."""
-    selected: list[int] = []
+    selected_terms: list[int] = []
     residual = target
-    power = np.sum(candidate_terms**2, axis=0)
+    term_power = np.sum(candidate_terms**2, axis=0)
     for _ in range(term_count):
-        gain = (candidate_terms.T @ residual) ** 2 / np.maximum(power, _TINY)
-        gain[selected] = -1.0
-        selected.append(int(np.argmax(gain)))
+        error_reduction = (candidate_terms.T @ residual) ** 2 / np.maximum(term_power, _TINY)
+        error_reduction[selected_terms] = -1.0
+        selected_terms.append(int(np.argmax(error_reduction)))
         residual = (
-            target - candidate_terms[:, selected] @ np.linalg.lstsq(candidate_terms[:, selected], target, rcond=None)[0]
+            target
+            - candidate_terms[:, selected_terms]
+            @ np.linalg.lstsq(candidate_terms[:, selected_terms], target, rcond=None)[0]
         )
-    return selected
+    return selected_terms
 
 
 def _normalise_error(measure: ErrorMeasure, errors: FloatArray) -> float:

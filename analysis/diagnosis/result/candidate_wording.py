@@ -2,7 +2,7 @@
 
 A class contains a named effect and the effects that explain the held-out data equally well; where all of them belong to
 a family of `_LAW_FAMILIES`, the family's name replaces the list. Called by `wording`, `candidates`, `diagnosis_tables`,
-`real_answer.answer_of_findings` and `view_diagnosis`.
+`real_answer.make_real_answer` and `view_diagnosis`.
 """
 
 from collections.abc import Sequence

@@ -17,32 +17,33 @@ ROUNDING_TOLERANCE = 1e-9
 """Relative difference of two errors of the same data that is due to rounding."""
 
 
-def describe_black_box(box: BlackBox | None, named: bool) -> str:
-    """Compare the held-out errors of a black box and of the physics in a sentence; empty without a black box. named:
-    whether effects were named; else the physics is the re-tuned model."""
-    if box is None:
+def describe_black_box(black_box: BlackBox | None, is_effect_named: bool) -> str:
+    """Compare the held-out errors of a black box and of the physics in a sentence; empty without a black box.
+    is_effect_named: whether effects were named; else the physics is the re-tuned model."""
+    if black_box is None:
         return ""
-    physics_name = "the physics" if named else "the re-tuned model"
+    physics_name = "the physics" if is_effect_named else "the re-tuned model"
     fit_text = (
-        f"A black box ({box.kind}, {box.coefficient_count} parameters), fitted to the same samples, has an error of"
+        f"A black box ({black_box.kind}, {black_box.coefficient_count} parameters), fitted to the same samples, has "
+        "an error of"
     )
     errors_text = (
-        f"{format_error_of_signal(box.test_error)} on the held-out data; {physics_name} has "
-        f"{format_error(box.physics_error)}"
+        f"{format_error_of_signal(black_box.test_error)} on the held-out data; {physics_name} has "
+        f"{format_error(black_box.physics_error)}"
     )
-    if is_black_box_better(box):
+    if is_black_box_better(black_box):
         return (
             f"{fit_text} {errors_text}. The black box predicts better: the data contain structure that no named effect "
             "explains."
         )
-    if box.physics_error * SAME_TO_READERS < box.test_error:
+    if black_box.physics_error * SAME_TO_READERS < black_box.test_error:
         return f"{fit_text} {errors_text}. {capitalise(physics_name)} predicts better."
     return f"{fit_text} {errors_text}: the black box does not predict better."
 
 
-def is_black_box_better(box: BlackBox) -> bool:
+def is_black_box_better(black_box: BlackBox) -> bool:
     """Whether the held-out error of the black box is smaller by more than the factor `SAME_TO_READERS`."""
-    return box.test_error * SAME_TO_READERS < box.physics_error
+    return black_box.test_error * SAME_TO_READERS < black_box.physics_error
 
 
 def describe_ceiling(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
@@ -89,7 +90,7 @@ unknown, so that errors are not stated in units of it."""
 
 
 def format_ratio(ratio: float) -> str:
-    """Format a ratio in words, such as "1.04 times"."""
+    """Format a ratio in words: "1.04 times", from 10 on with three significant digits."""
     return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
 
 

@@ -18,7 +18,7 @@ from analysis.diagnosis.localisation.localisation import Localisation, find_entr
 from analysis.diagnosis.localisation.mismatch_maps import MismatchMaps
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.black_box import fit_black_box
-from analysis.diagnosis.result.curves.signature_curves import Names, compute_signature
+from analysis.diagnosis.result.curves.signature_curves import CurveNames, compute_signature
 from analysis.diagnosis.result.error_table import compute_fit_errors
 from analysis.diagnosis.result.findings import BlackBox, Signature
 from analysis.diagnosis.result.named_effects import make_labels
@@ -104,7 +104,7 @@ def _compute_signatures(context: SearchContext, explanation: Explanation) -> tup
     record_index = _find_main_record(measure)
     recording = measure.records[record_index].recording
     labels, signatures = make_labels(recording, tuning.model), []
-    curve_names = Names(
+    curve_names = CurveNames(
         tuple(shorten_axis_name(name, labels.inputs) for name in labels.inputs),
         labels.outputs,
         labels.response_unit,

@@ -1,4 +1,5 @@
-"""Sentences of the report for a diagnosis of backlash with impacts, which compares band powers instead of samples.
+"""Format sentences of the report for a diagnosis of backlash with impacts, which compares band powers instead of
+samples.
 
 Errors are rms natural logarithms of the ratio of predicted to measured amplitude (`errors.band_power`), so that
 exp(error) is the typical factor between them. Called by `wording`; the remark by `search_by_simulation`.
@@ -19,18 +20,22 @@ IMPACTS_COMPARED = (
 
 
 def format_impact_answer(diagnosis: Diagnosis, effect_words: str) -> str:
-    """First sentences of the report: the named effects, and the factors between predicted and measured amplitudes
-    without them, with them, and by chance alone, from held-out errors where there are any, else from those of the fit.
-    effect_words: the named effects, in words."""
+    """Format the first sentences of the report: the named effects, and the factors between predicted and measured
+    amplitudes without them, with them, and by chance alone, from held-out errors where there are any, else from those
+    of the fit; without all three errors, a statement that they are not known. effect_words: the named effects, in
+    words."""
     errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
-    remainder = "" if diagnosis.verdict == "explained" else ", but that is not all"
+    verdict_text = "" if diagnosis.verdict == "explained" else ", but that is not all"
     log_ratios = [errors.retuned, errors.after, errors.noise]
     factors = [f"{math.exp(ratio):.3g}" for ratio in log_ratios if ratio is not None]
-    text = "the error of the predicted amplitudes is not known"
+    factors_text = "the error of the predicted amplitudes is not known"
     if len(factors) == len(log_ratios):
         factor_without, factor_with, factor_by_chance = factors
-        text = (
+        factors_text = (
             f"their strength can: in half octaves, the predicted amplitudes are wrong by a factor of {factor_without} "
             f"without this effect and of {factor_with} with it; chance alone gives a factor of {factor_by_chance}"
         )
-    return f"Missing in the model: {effect_words}{remainder}. Its impacts cannot be predicted one by one; {text}."
+    return (
+        f"Missing in the model: {effect_words}{verdict_text}. Its impacts cannot be predicted one by one; "
+        f"{factors_text}."
+    )

@@ -22,17 +22,21 @@ from equalizer.signals.recording import Recording
 def list_unconfirmed_candidates(
     unconfirmed: Sequence[Unconfirmed], black_box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
-    """The unconfirmed effects as candidates of the document: of each hypothesis, the claim with index
-    `Unconfirmed.claim`.
+    """List the unconfirmed effects as candidates of the document: of each hypothesis, the claim with index
+    `Unconfirmed.claim` (a negative one counts from the end).
 
     black_box: the fitted model without physics, for comparison; None where there is none. `share_of_black_box` of a
-    candidate is its gain relative to that of the black box or, where candidates gain more, to their largest gain.
-    """
+    candidate is its gain relative to that of the black box or, where candidates gain more, to their largest gain. Both
+    are at most 1."""
     if not unconfirmed:
         return ()
     labels, largest_gain = (
         make_labels(recording, model),
-        max(max(unconfirmed_effect.gain for unconfirmed_effect in unconfirmed), _compute_gain(black_box), 1e-300),
+        max(
+            max(unconfirmed_effect.gain for unconfirmed_effect in unconfirmed),
+            _compute_black_box_gain(black_box),
+            1e-300,
+        ),
     )
     candidates = []
     for unconfirmed_effect in unconfirmed:
@@ -55,9 +59,10 @@ def list_unconfirmed_candidates(
     return tuple(candidates)
 
 
-def _compute_gain(black_box: BlackBox | None) -> float:
-    """Held-out gain of the black box over the model with the named effects: 1 - (black box error / model error)², with
-    the model error `BlackBox.physics_error`; 0 without a black box."""
+def _compute_black_box_gain(black_box: BlackBox | None) -> float:
+    """Compute the held-out gain of the black box over the model with the named effects: 1 - (black box error / model
+    error)², with the model error `BlackBox.physics_error`; 0 without a black box or where the model error is not
+    positive."""
     return (
         0.0
         if black_box is None or not black_box.physics_error > 0
@@ -68,13 +73,13 @@ def _compute_gain(black_box: BlackBox | None) -> float:
 def add_held_out_gains(
     effects: Sequence[NamedEffect], measure: ErrorMeasure, fits: Sequence[FittedCandidate]
 ) -> tuple[NamedEffect, ...]:
-    """The effects with their held-out gains and 95 % intervals. effects: in the order in which the search added them.
-    fits: the fit without effects, then the fit after each added effect."""
-    with_gain = []
+    """Add the held-out gains with 95 % intervals to the effects, None where they are not known. effects: in the order
+    in which the search added them. fits: the fit without effects, then the fit after each added effect."""
+    effects_with_gain = []
     for index, effect in enumerate(effects):
         gain = estimate_held_out_gain(measure, fits[index], fits[index + 1])
         estimate = (
             None if gain is None else Estimate(gain.gain, "1", (min(gain.low, gain.gain), max(gain.high, gain.gain)))
         )
-        with_gain.append(replace(effect, held_out_gain=estimate))
-    return tuple(with_gain)
+        effects_with_gain.append(replace(effect, held_out_gain=estimate))
+    return tuple(effects_with_gain)

@@ -1,5 +1,5 @@
-"""Sentences that doubt a unit or a sign: a channel differs from the model's prediction by a constant factor only, or
-the command is not a force.
+"""Write sentences that doubt a unit or a sign: a channel differs from the model's prediction by a constant factor only,
+or the command is not a force.
 
 A wrong unit or reversed wiring is more likely than a device with such a response. Thresholds: `UNIT_FACTOR` on the
 ratio of amplitudes, `UNIT_CORRELATION` on the correlation coefficient. Called by `assemble_findings` and
@@ -17,7 +17,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 
 def describe_unit_doubts(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
     """Describe, in a sentence each, the channels whose measurement differs from the given model's prediction by a
-    factor of `UNIT_FACTOR` or more either way, or by its sign, while both correlate well."""
+    factor of `UNIT_FACTOR` or more either way, or by its sign, while both correlate well; the factor is that of the
+    first recording that shows it."""
     factors: dict[str, float] = {}
     for series in time_series:
         for channel, name in enumerate(series.channels):
@@ -36,12 +37,17 @@ def _compute_factor(series: TimeSeries, channel: int) -> float | None:
     correlation; None where the correlation is below `UNIT_CORRELATION` in magnitude, a signal is constant, or no sample
     is finite."""
     measured, predicted = series.measured[:, channel], series.before[:, channel]
-    is_known = np.isfinite(measured) & np.isfinite(predicted)
-    if not is_known.any():
+    is_finite = np.isfinite(measured) & np.isfinite(predicted)
+    if not is_finite.any():
         return None
-    measured_part, predicted_part = (signal[is_known] - np.mean(signal[is_known]) for signal in (measured, predicted))
-    norms = float(np.sqrt(measured_part @ measured_part)), float(np.sqrt(predicted_part @ predicted_part))
-    covariance = float(measured_part @ predicted_part)
+    measured_deviation, predicted_deviation = (
+        signal[is_finite] - np.mean(signal[is_finite]) for signal in (measured, predicted)
+    )
+    norms = (
+        float(np.sqrt(measured_deviation @ measured_deviation)),
+        float(np.sqrt(predicted_deviation @ predicted_deviation)),
+    )
+    covariance = float(measured_deviation @ predicted_deviation)
     if min(norms) == 0 or not np.isfinite(norms).all() or abs(covariance) < UNIT_CORRELATION * norms[0] * norms[1]:
         return None
     return float(np.copysign(norms[0] / norms[1], covariance))

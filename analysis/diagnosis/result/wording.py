@@ -1,7 +1,7 @@
 """Sentences that state a diagnosis, the same in the report, in the terminal and on the screen.
 
 `write_summary_lines` returns all of them in order, the verdict first; errors are relative to the signal, on held-out
-data. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis` and `answer_of_findings`.
+data. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis` and `make_real_answer`.
 """
 
 from collections.abc import Mapping, Sequence

@@ -138,7 +138,10 @@ class SearchContext:
 
     def _open_samples(self, opened_masks: Sequence[Mask]) -> "SearchContext":
         """Return a copy of the context in which the masked held-out samples are used to fit and to choose by."""
-        records = (record.unseal(mask) for record, mask in zip(self.full_measure.records, opened_masks, strict=True))
+        records = (
+            record.release_test_samples(mask)
+            for record, mask in zip(self.full_measure.records, opened_masks, strict=True)
+        )
         full_measure = self.full_measure.with_records(tuple(records))
         return replace(self, measure=full_measure.shorten(), full_measure=full_measure, has_opened_samples=True)
 
@@ -146,7 +149,7 @@ class SearchContext:
         """Return a copy of the context that also fits to the samples to choose by, for laws that a force balance has
         already selected."""
         measure, full_measure = (
-            original.with_records(tuple(record.fit_to_all() for record in original.records))
+            original.with_records(tuple(record.join_fit_and_choose() for record in original.records))
             for original in (self.measure, self.full_measure)
         )
         return replace(self, measure=measure, full_measure=full_measure)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Diagnosis
 
 NAMED_PROBABILITY = 0.5
-"""Smallest probability of an effect that counts as named."""
+"""Smallest probability of an effect that counts as named. Chosen by hand."""
 MAGNITUDE_TOLERANCE = 0.02
 """Largest difference between the magnitudes of a parameter in the answers to a recording and to its mirror image,
-relative to the former."""
+relative to the former. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,9 @@ class ControlOutcome:
 
     name: str
     claim: str
+    """Key of `CLAIMS`."""
     held: bool
+    """Whether the claim is true of the answers."""
     said: tuple[str, ...]
     """Each answer in words."""
 
@@ -66,7 +68,8 @@ def _are_answers_equal_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
 
 
 def _are_axes_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether two answers have the same verdict and effects, and each effect is on another axis in the second."""
+    """Whether two answers have the same verdict and effects, and each effect is on another axis in the second; False
+    where an effect has no axis."""
     if not _are_answers_equal_but_axes(answers):
         return False
     first_axes, second_axes = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
@@ -88,12 +91,13 @@ def _have_opposite_signs(answers: Sequence[Diagnosis | None]) -> bool:
 
 
 def _list_verdict_and_effects(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
-    """The verdict, then each effect with its axis, or with None if `with_axes` is False; answers are compared by it."""
+    """List the verdict, then each effect with its axis, or with None if `with_axes` is False; answers are compared by
+    it."""
     return diagnosis.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in diagnosis.effects)
 
 
 def _format_answer(diagnosis: Diagnosis | None) -> str:
-    """Verdict and effects in words, as "explained: coulomb_friction of x"."""
+    """Format verdict and effects, as "explained: coulomb_friction of x"."""
     if diagnosis is None:
         return "no answer"
     effects_text = ", ".join(

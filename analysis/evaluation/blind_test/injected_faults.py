@@ -2,7 +2,8 @@
 answers.
 
 `study.evaluation.real.inject_real` injects the faults and reads the outcomes; `injected_section` shows the shares in
-the report, `real_summary` in the terminal."""
+the report, `real_summary` in the terminal.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -117,16 +118,18 @@ def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> Injecte
 def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[IntervalEstimate, ...]:
     """Compute the shares of correct and wrong answers, with Wilson's 95 % intervals, for cases without a fault, with
     detectable and with undetectable faults."""
-    faults = [outcome for outcome in outcomes if outcome.detectable]
+    detectable = [outcome for outcome in outcomes if outcome.detectable]
     undetectable = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
     faultless = [outcome for outcome in outcomes if not outcome.effects]
     return (
         compute_share("nothing injected, nothing named", faultless, lambda case: case.is_correct),
-        compute_share("detectable faults named, or in the class", faults, lambda case: case.is_correct),
+        compute_share("detectable faults named, or in the class", detectable, lambda case: case.is_correct),
         compute_share(
-            "detectable faults, another name at the right place", faults, _make_class_test("other name, right place")
+            "detectable faults, another name at the right place",
+            detectable,
+            _make_class_test("other name, right place"),
         ),
-        compute_share("detectable faults, a wrong fault named", faults, _make_class_test("wrong")),
+        compute_share("detectable faults, a wrong fault named", detectable, _make_class_test("wrong")),
         compute_share("too weak to ask for, named all the same", undetectable, lambda case: case.is_correct),
         compute_share("too weak to ask for, a wrong fault named", undetectable, _make_class_test("wrong")),
     )

@@ -1,4 +1,5 @@
-"""Comparison with figure 3 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices.
+"""Compare simulated ellipses with figure 3 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic
+Devices.
 
 The figure shows acceleration ellipses under a sinusoidal force along one test direction. Coupling is the ratio of
 off-axis to along-axis amplitude at the driven frequency (`PhasorEllipse.off_axis_ratio`), here of the simulated device.
@@ -28,17 +29,17 @@ _DIFFERS = (
 
 
 def make_ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
-    """Compare the measured ellipses with the published figure 3. results: an ellipse per frequency; a finding whose
-    frequencies are absent is left out."""
+    """Compare the ellipses, measured on the simulated device, with the published figure 3. results: an ellipse per
+    frequency; a finding whose frequencies are absent is left out."""
     coupling = {
         result.frequency_hz: result.phasor.off_axis_ratio
         for result in results
         if result.phasor.off_axis_ratio is not None
     }
     findings = (
-        *(_find_coupling(result) for result in results),
-        _find_low_frequency_coupling(coupling),
-        _find_high_frequency_coupling(coupling),
+        *(_describe_coupling(result) for result in results),
+        _compare_low_frequency_coupling(coupling),
+        _compare_high_frequency_coupling(coupling),
     )
     return FigureFindings(
         figure=3,
@@ -52,8 +53,8 @@ def make_ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFinding
     )
 
 
-def _find_coupling(result: EllipsoidResult) -> Finding:
-    """Coupling and shape of the ellipse at one frequency, not compared, because the paper prints no number."""
+def _describe_coupling(result: EllipsoidResult) -> Finding:
+    """Describe coupling and shape of the ellipse at one frequency, not compared, because the paper prints no number."""
     ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
     ratio_text = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
     return Finding(
@@ -66,26 +67,27 @@ def _find_coupling(result: EllipsoidResult) -> Finding:
     )
 
 
-def _find_low_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
-    """Whether coupling is nearly the same at 5, 10 and 15 Hz; None for fewer than two of these frequencies. coupling:
-    by frequency in Hz."""
-    low_frequency_coupling = [coupling[f] for f in (5.0, 10.0, 15.0) if f in coupling]
+def _compare_low_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
+    """Test whether coupling is nearly the same at 5, 10 and 15 Hz; None for fewer than two of these frequencies.
+    coupling: by frequency in Hz."""
+    low_frequency_coupling = [coupling[frequency_hz] for frequency_hz in (5.0, 10.0, 15.0) if frequency_hz in coupling]
     if len(low_frequency_coupling) < 2:
         return None
-    spread = max(low_frequency_coupling) / min(low_frequency_coupling)
+    largest_ratio = max(low_frequency_coupling) / min(low_frequency_coupling)
     return Finding(
         what="Coupling at 5, 10 and 15 Hz",
         published="nearly identical",
-        here=f"largest over smallest {spread:.2f}",
-        value=spread,
+        here=f"largest over smallest {largest_ratio:.2f}",
+        value=largest_ratio,
         unit="1",
-        as_published=spread <= MAX_COUPLING_RATIO,
+        as_published=largest_ratio <= MAX_COUPLING_RATIO,
         rule=f"largest over smallest at most {MAX_COUPLING_RATIO:g}",
     )
 
 
-def _find_high_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
-    """Whether coupling at 35 Hz is less than at 25 Hz; None where either is missing. coupling: by frequency in Hz."""
+def _compare_high_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
+    """Test whether coupling at 35 Hz is less than at 25 Hz; None where either is missing. coupling: by frequency in
+    Hz."""
     if not {25.0, 35.0} <= coupling.keys():
         return None
     ratio = coupling[35.0] / coupling[25.0]

@@ -1,7 +1,8 @@
 """Data class of a device's frequency response over its whole range, with its resonances and coupling onset.
 
 Made by `study.evaluation.reproduction.reproduce_paper` from swept-sine recordings, for the comparison with figures 4
-and 1 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices (`response_findings`).
+and 1 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices (`response_findings`), and
+drawn by `reproduction_pictures`.
 """
 
 from dataclasses import dataclass
@@ -18,5 +19,6 @@ class MeasuredDevice:
     response: FrequencyResponse
     """Transfer functions from each force (N) to each acceleration (m/s²)."""
     resonances: tuple[Resonance, ...]
+    """Resonances of the response, with frequencies in Hz (see `Resonance`)."""
     onset: CouplingOnset
     """Onset of coupling: the frequency (Hz) above which a force along one axis also moves others."""

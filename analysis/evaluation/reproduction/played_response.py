@@ -1,7 +1,8 @@
 """Frequency response of a device from target to delivered acceleration, for the reproduction of the published figure 5.
 
 T(f) is the ratio of the spectra of one steady period, line by line; column i belongs to a target along axis i. T is the
-identity matrix for a perfect equalizer. `study.evaluation.reproduction` measures it.
+identity matrix for a perfect equalizer. `study.evaluation.reproduction` measures it (`reproduce_playback`,
+`reproduce_baselines`); `equalized_findings` and `played_responses` compare and draw it.
 `equalizer.tracking.feedforward.quality` defines flatness, coupling and axis error.
 """
 
@@ -18,6 +19,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.quality import measure_quality
 
 SignalKind = Literal["sweep", "multisine"]
+"""Target signal: a logarithmic sweep or a multisine."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,48 +46,49 @@ class PlayedResponse:
 
 
 def make_target_wave(
-    signal_kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
+    signal_kind: SignalKind, band_hz: tuple[float, float], period_samples: int, sample_rate_hz: float, seed: int
 ) -> FloatArray:
-    """Make one period (period,) of the target signal, with a peak of 1 and without power outside the band. period:
-    samples. signal_kind: logarithmic sweep or multisine. seed: of the multisine's phases; a sweep has none."""
-    low, high = band_hz
+    """Make one period (period_samples,) of the target signal, with a peak of 1 and without power outside the band.
+    seed: of the multisine's phases; a sweep has none."""
+    low_hz, high_hz = band_hz
     if signal_kind == "multisine":
-        lines = list_lines_between(low, high, period, sample_rate_hz, odd_only=False)
-        return make_multisines(lines, period, 1.0, 1, 1, seed)[0][:, 0]
-    # Slightly wider than the band, so that the ends of the band lie inside the sweep, not at its jump back.
-    spectrum = np.fft.rfft(make_log_sweep(0.9 * low, 1.06 * high, 1.0, period, sample_rate_hz))
-    spectrum[~mask_lines_in_band(band_hz, period, sample_rate_hz)] = 0
-    wave = np.fft.irfft(spectrum, period)
+        lines = list_lines_between(low_hz, high_hz, period_samples, sample_rate_hz, odd_only=False)
+        return make_multisines(lines, period_samples, 1.0, 1, 1, seed)[0][:, 0]
+    # Slightly wider than the band (factors chosen by hand), so that its ends lie inside the sweep, not at its jump.
+    spectrum = np.fft.rfft(make_log_sweep(0.9 * low_hz, 1.06 * high_hz, 1.0, period_samples, sample_rate_hz))
+    spectrum[~mask_lines_in_band(band_hz, period_samples, sample_rate_hz)] = 0
+    wave = np.fft.irfft(spectrum, period_samples)
     normalised: FloatArray = wave / np.abs(wave).max()
     return normalised
 
 
 def mask_lines_in_band(
-    band_hz: tuple[float, float], period: int, sample_rate_hz: float
+    band_hz: tuple[float, float], period_samples: int, sample_rate_hz: float
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(period // 2 + 1,): mask of the lines of the real FFT of a period (samples) that lie within the band, ends
+    """Make the mask (period_samples // 2 + 1,) of the lines of a period's real FFT that lie within the band, ends
     included."""
-    frequency_hz = np.fft.rfftfreq(period, 1 / sample_rate_hz)
+    frequency_hz = np.fft.rfftfreq(period_samples, 1 / sample_rate_hz)
     return np.asarray((frequency_hz >= band_hz[0] - 1e-9) & (frequency_hz <= band_hz[1] + 1e-9))
 
 
 def estimate_response(
     target: FloatArray, delivered: Sequence[FloatArray], band_hz: tuple[float, float], sample_rate_hz: float
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies in Hz (lines,) and response (lines, axes, axes), delivered over target. target: (axes, period), the
-    signal of each axis, played one axis at a time. delivered: for each of these, one steady period (period, axes)."""
-    period = target.shape[1]
-    in_band = mask_lines_in_band(band_hz, period, sample_rate_hz)
+    """Estimate frequencies in Hz (lines,) and response (lines, axes, axes), delivered over target. target: (axes,
+    period_samples), the signal of each axis, played one axis at a time. delivered: for each of these, one steady period
+    (period_samples, axes)."""
+    period_samples = target.shape[1]
+    in_band = mask_lines_in_band(band_hz, period_samples, sample_rate_hz)
     columns = [
-        np.fft.rfft(period_samples, axis=0)[in_band] / np.fft.rfft(wave)[in_band][:, None]
-        for wave, period_samples in zip(target, delivered, strict=True)
+        np.fft.rfft(delivered_period, axis=0)[in_band] / np.fft.rfft(wave)[in_band][:, None]
+        for wave, delivered_period in zip(target, delivered, strict=True)
     ]
-    frequency_hz = np.asarray(np.fft.rfftfreq(period, 1 / sample_rate_hz)[in_band], dtype=np.float64)
+    frequency_hz = np.asarray(np.fft.rfftfreq(period_samples, 1 / sample_rate_hz)[in_band], dtype=np.float64)
     return frequency_hz, np.stack(columns, axis=2)
 
 
 def normalise_gain(response: ComplexArray) -> ComplexArray:
-    """The response divided by the geometric mean of its diagonal gains over all lines and axes, an error that a static
+    """Divide the response by the geometric mean of its diagonal gains over all lines and axes, an error that a static
     gain would correct."""
     diagonal = np.abs(np.einsum("lii->li", response))
     normalised: ComplexArray = response / np.exp(np.log(diagonal).mean())
@@ -93,11 +96,12 @@ def normalise_gain(response: ComplexArray) -> ComplexArray:
 
 
 def compute_coupling_db(response: ComplexArray) -> FloatArray:
-    """(lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst target axis i; at least -240 dB."""
+    """Compute (lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst target axis i; at least -240 dB,
+    so that the logarithm of no coupling is finite."""
     diagonal = np.abs(np.einsum("lii->li", response))
     off_diagonal = np.abs(response) * (1 - np.eye(response.shape[1]))
-    ratio: FloatArray = 20 * np.log10(np.maximum((off_diagonal.max(axis=1) / diagonal).max(axis=1), 1e-12))
-    return ratio
+    coupling_db: FloatArray = 20 * np.log10(np.maximum((off_diagonal.max(axis=1) / diagonal).max(axis=1), 1e-12))
+    return coupling_db
 
 
 def make_played_row(playback: PlayedResponse) -> PlayedRow:

@@ -17,12 +17,14 @@ from analysis.wording import format_signed
 SIGNIFICANT_P = 0.05
 """Level of significance of the published analysis."""
 MAX_MEAN_DIFFERENCE = 0.25
-"""Largest difference of two means, as a share of the larger mean, that counts as "fairly similar"."""
+"""Largest difference of two means, as a share of the larger mean, that counts as "fairly similar". Chosen by
+hand."""
 
 LIMIT_RULE = (
     "the lowest tested frequency at which the group mean lies significantly above that of the lowest frequency and at "
     "least one threshold is cut by the cap"
 )
+"""Rule of `find_direction_limit`, in words for the report."""
 
 _DIFFERENCES = (
     "No person took part: the participants are simulated, and how their thresholds rise with frequency was set "
@@ -33,6 +35,7 @@ _DIFFERENCES = (
     "As in the paper, thresholds that the cap cut off enter means as plain numbers, and means near the cap are too "
     "low.",
 )
+"""Differences from the publication, for the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +46,18 @@ class _Means:
 
     def compute_mean(self, frequency_hz: float) -> float | None:
         """Compute the group mean of the thresholds in N; None where no run was completed."""
-        values = [
-            value for value in self.analysis.table.group_by_frequency().get(format_frequency(frequency_hz), ()) if value
+        thresholds_n = [
+            threshold_n
+            for threshold_n in self.analysis.table.group_by_frequency().get(format_frequency(frequency_hz), ())
+            if threshold_n
         ]
-        return mean(values) if values else None
+        return mean(thresholds_n) if thresholds_n else None
 
     def find_pair(self, first_hz: float, second_hz: float) -> PairDifference | None:
         """Find the difference of the means at two frequencies, second minus first; None where they were not
         compared."""
         names = (format_frequency(first_hz), format_frequency(second_hz))
-        return next((p for p in self.analysis.comparisons.pairs if (p.first, p.second) == names), None)
+        return next((pair for pair in self.analysis.comparisons.pairs if (pair.first, pair.second) == names), None)
 
     def count_censored(self, frequency_hz: float) -> int:
         """Count the thresholds that the cap censored at this frequency."""
@@ -66,9 +71,9 @@ class _Means:
 def find_direction_limit(analysis: StudyAnalysis) -> float | None:
     """Find the limit of direction perception (Hz) by `LIMIT_RULE`; None where no tested frequency fulfils it."""
     means = _Means(analysis)
-    lowest, *higher_hz = analysis.table.frequencies_hz
+    lowest_hz, *higher_hz = analysis.table.frequencies_hz
     for frequency_hz in higher_hz:
-        pair = means.find_pair(lowest, frequency_hz)
+        pair = means.find_pair(lowest_hz, frequency_hz)
         if pair is not None and pair.difference > 0 and pair.p < SIGNIFICANT_P and means.count_censored(frequency_hz):
             return frequency_hz
     return None
@@ -78,9 +83,9 @@ def make_study_findings(analysis: StudyAnalysis) -> FigureFindings:
     """Make the findings on the published figure 2: means, differences and censoring of the thresholds over
     frequency."""
     means = _Means(analysis)
-    tested = analysis.table.frequencies_hz
+    tested_hz = analysis.table.frequencies_hz
     findings = [
-        *(_find_mean_threshold(means, frequency_hz) for frequency_hz in tested),
+        *(_find_mean_threshold(means, frequency_hz) for frequency_hz in tested_hz),
         _find_rise(means, 5.0, 15.0, "apparently up, not significant with ten participants", significant=False),
         _find_rise(means, 15.0, 25.0, "apparently up, not significant", significant=False),
         _find_rise(means, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", significant=True),
@@ -103,15 +108,17 @@ def make_study_findings(analysis: StudyAnalysis) -> FigureFindings:
 
 def _find_mean_threshold(means: _Means, frequency_hz: float) -> Finding:
     """Find the mean threshold (N) at one frequency, compared with nothing, because the paper prints no number."""
-    value, censored = means.compute_mean(frequency_hz), means.count_censored(frequency_hz)
+    mean_threshold_n, censored_count = means.compute_mean(frequency_hz), means.count_censored(frequency_hz)
     censored_text = (
-        f", {censored} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if censored else ""
+        f", {censored_count} of {len(means.analysis.table.subjects)} thresholds cut by the cap"
+        if censored_count
+        else ""
     )
     return Finding(
         what=f"Mean threshold at {frequency_hz:g} Hz",
         published="",
-        here="no completed run" if value is None else f"{value:.2f} N{censored_text}",
-        value=value,
+        here="no completed run" if mean_threshold_n is None else f"{mean_threshold_n:.2f} N{censored_text}",
+        value=mean_threshold_n,
         unit="N",
         as_published=None,
     )
@@ -127,7 +134,7 @@ def _find_rise(means: _Means, low_hz: float, high_hz: float, published: str, sig
     )
     if pair is None or low_mean_n is None or high_mean_n is None:
         return None
-    rises = pair.difference > 0
+    is_rising = pair.difference > 0
     rule = f"up, and {'significant' if significant else 'not significant'} at 5 %, in all pairs at once"
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
@@ -135,7 +142,7 @@ def _find_rise(means: _Means, low_hz: float, high_hz: float, published: str, sig
         here=f"{format_signed(pair.difference)} N, p {_format_p(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
-        as_published=rises and (pair.p < SIGNIFICANT_P) == significant,
+        as_published=is_rising and (pair.p < SIGNIFICANT_P) == significant,
         rule=rule,
     )
 
@@ -144,14 +151,14 @@ def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
     """Find whether the cap censors some thresholds at 35 Hz, but not all; None where 35 Hz was not tested."""
     if 35.0 not in analysis.table.frequencies_hz:
         return None
-    censored, participants = means.count_censored(35.0), len(analysis.table.subjects)
+    censored_count, participant_count = means.count_censored(35.0), len(analysis.table.subjects)
     return Finding(
         what="Cut by the cap at 35 Hz",
         published="several participants, while others converge",
-        here=f"{censored} of {participants}",
-        value=float(censored),
+        here=f"{censored_count} of {participant_count}",
+        value=float(censored_count),
         unit="1",
-        as_published=0 < censored < participants,
+        as_published=0 < censored_count < participant_count,
         rule="some, but not all",
     )
 
@@ -161,14 +168,14 @@ def _find_similarity(means: _Means) -> Finding | None:
     mean_35_hz_n, mean_45_hz_n = means.compute_mean(35.0), means.compute_mean(45.0)
     if mean_35_hz_n is None or mean_45_hz_n is None:
         return None
-    difference = abs(mean_35_hz_n - mean_45_hz_n) / max(mean_35_hz_n, mean_45_hz_n)
+    relative_difference = abs(mean_35_hz_n - mean_45_hz_n) / max(mean_35_hz_n, mean_45_hz_n)
     return Finding(
         what="35 and 45 Hz",
         published="fairly similar",
-        here=f"the means differ by {100 * difference:.0f} % of the larger",
-        value=difference,
+        here=f"the means differ by {100 * relative_difference:.0f} % of the larger",
+        value=relative_difference,
         unit="1",
-        as_published=difference < MAX_MEAN_DIFFERENCE,
+        as_published=relative_difference < MAX_MEAN_DIFFERENCE,
         rule=f"less than {MAX_MEAN_DIFFERENCE:.0%} apart",
     )
 

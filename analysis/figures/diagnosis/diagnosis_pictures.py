@@ -1,4 +1,6 @@
-"""All figures of one diagnosis, in the order of the report; called by `write_diagnosis`.
+"""Draw all figures of one diagnosis, in the order of the report; called by `write_diagnosis` (`list_drawings`).
+
+`draw_diagnosis_pictures` is `analysis.diagnosis_pictures` of the Python interface.
 
 Each figure is drawn as an independent unit of work, so that one whose drawing crashes can be left out (`Guard`).
 """
@@ -11,14 +13,14 @@ from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectr
 from analysis.diagnosis.search.guard import Guard, WorkPart
 from analysis.figures.diagnosis.held_out import held_out_picture
 from analysis.figures.diagnosis.mismatch_map import make_mismatch_map_picture, rank_driving_inputs
-from analysis.figures.diagnosis.remainder import make_remainder_picture
+from analysis.figures.diagnosis.residual_spectra import make_residual_spectra_picture
 from analysis.figures.diagnosis.rivals import make_rivals_pictures
 from analysis.figures.diagnosis.signature import make_signature_pictures
 from analysis.figures.diagnosis.state_maps import make_state_map_pictures
 from analysis.figures.picture import Picture, convert_to_sample_units
 
 
-def diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
+def draw_diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
     """Draw the figures for which there are data. guard: notes crashes and leaves the figure out; without it, or while
     it is off, exceptions propagate."""
     picture_lists = (guard or Guard()).run_parts(map, list_drawings(findings))
@@ -28,12 +30,14 @@ def diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> tuple[
 def list_drawings(findings: Findings) -> list[WorkPart]:
     """List the drawings as independent units of work; each returns its pictures, none where there are no data."""
     # Where a motion is imposed and the force is measured, levels are those of the motion, and have no force unit.
-    imposed = any(unit.startswith("N") for series in findings.time_series for unit in series.units)
-    unit = "" if imposed else findings.given.system.force
+    is_motion_imposed = any(
+        level_unit.startswith("N") for series in findings.time_series for level_unit in series.units
+    )
+    level_unit = "" if is_motion_imposed else findings.given.system.force
     held_out_data = findings.time_series, findings.noise_rms, findings.channel_errors
 
     def draw_map(number: int) -> Sequence[Picture]:
-        return [make_mismatch_map_picture(findings.maps, number, unit)]
+        return [make_mismatch_map_picture(findings.maps, number, level_unit)]
 
     drawings: list[tuple[str, Callable[[], Sequence[Picture]]]] = [
         *(("the mismatch map", partial(draw_map, number)) for number in range(len(rank_driving_inputs(findings.maps)))),
@@ -44,7 +48,7 @@ def list_drawings(findings: Findings) -> list[WorkPart]:
             "the figure of held-out errors",
             lambda: [held_out_picture(*held_out_data)] if held_out_data[0] or held_out_data[2] else [],
         ),
-        ("the spectrum of the residual", lambda: _make_remainder_pictures(findings)),
+        ("the spectrum of the residual", lambda: _make_residual_spectra_pictures(findings)),
     ]
     return [
         WorkPart(name, "its drawing", partial(_draw_with_time_labels, draw, findings.is_timed), ())
@@ -57,7 +61,7 @@ def _draw_with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool
     return draw() if is_timed else [convert_to_sample_units(picture) for picture in draw()]
 
 
-def _make_remainder_pictures(findings: Findings) -> list[Picture]:
+def _make_residual_spectra_pictures(findings: Findings) -> list[Picture]:
     """Make the picture of the residual spectra; none where no samples were held out."""
     spectra = compute_remainder_spectra(findings.time_series, findings.floor)
-    return [make_remainder_picture(spectra)] if spectra else []
+    return [make_residual_spectra_picture(spectra)] if spectra else []

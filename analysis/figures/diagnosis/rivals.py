@@ -24,14 +24,16 @@ from equalizer.effects.placing import find_place
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
-"""Largest number of explanations that are drawn in a figure."""
+"""Largest number of explanations that are drawn in a figure. Chosen by hand."""
 _TRAINING_NOTE = (
     "Errors on the data that were used for fitting and model selection; rivals are not evaluated on held-out data."
 )
 _TRAINING_AND_TEST_NOTE = (
     "Filled: data that were used for fitting and model selection; open: held-out data, which were used for neither."
 )
+"""Sentences of a caption, without and with held-out errors."""
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")
+"""Words for the rounds; further rounds are not drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,7 @@ class TriedExplanation:
     """Effect and axis, in words."""
     training_error: float
     """Error on the data that were fitted to and chosen by."""
-    test: float
+    test_error: float
     """Error on held-out data; NaN where not computed."""
 
 
@@ -50,11 +52,11 @@ def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) ->
     """List the best fit of each hypothesis of a round, at most `MOST_RIVALS`: first the round's choice, which may have
     a larger error than a less simple one; then the others, the smallest error first. axes: displayed names of the
     axes."""
-    best: dict[object, TriedExplanation] = {}
+    best_by_hypothesis: dict[object, TriedExplanation] = {}
     for candidate in round_:
         words = ", ".join(_describe_claim(claim, axes) for claim in candidate.fitted.hypothesis.claims[-1:])
-        best.setdefault(candidate.fitted.hypothesis.key, _make_explanation(words, candidate.score))
-    chosen, alternatives = list(best.values())[:1], list(best.values())[1:]
+        best_by_hypothesis.setdefault(candidate.fitted.hypothesis.key, _make_explanation(words, candidate.score))
+    chosen, alternatives = list(best_by_hypothesis.values())[:1], list(best_by_hypothesis.values())[1:]
     return (*chosen, *sorted(alternatives, key=lambda rival: rival.training_error))[:MOST_RIVALS]
 
 
@@ -77,7 +79,7 @@ def make_rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple
                     "in addition to the effects found before. "
                     + (
                         _TRAINING_AND_TEST_NOTE
-                        if any(np.isfinite(rival.test) for rival in explanations)
+                        if any(np.isfinite(rival.test_error) for rival in explanations)
                         else _TRAINING_NOTE
                     )
                     + " Dashed: the re-tuned model alone.",
@@ -100,12 +102,12 @@ def draw_rivals(
     figure = create_figure(8.8, 1.05 + 0.3 * len(explanations))
     axes = figure.add_subplot()
     style_axes(axes)
-    for row, tried in enumerate(explanations):
+    for row, trial in enumerate(explanations):
         colour = COMPLETED_STAGE.colour if row == 0 and is_accepted else GREY
-        axes.plot([tried.training_error, tried.test], [row, row], color=colour, linewidth=1.2, zorder=2)
-        axes.plot(tried.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
-        if np.isfinite(tried.test):
-            axes.plot(tried.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
+        axes.plot([trial.training_error, trial.test_error], [row, row], color=colour, linewidth=1.2, zorder=2)
+        axes.plot(trial.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
+        if np.isfinite(trial.test_error):
+            axes.plot(trial.test_error, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
     axes.axvline(
         retuned.training_error,
         color=RETUNED_STAGE.colour,
@@ -124,7 +126,7 @@ def draw_rivals(
     drawn_errors = np.array(
         [
             *(rival.training_error for rival in explanations),
-            *(rival.test for rival in explanations),
+            *(rival.test_error for rival in explanations),
             retuned.training_error,
         ]
     )
@@ -144,12 +146,13 @@ def _draw_label(axes: Axes, position: float, label: str, side: Literal["left", "
 
 def _describe_rival(rival: TriedExplanation) -> str:
     """Describe an explanation and its errors, for screen readers."""
-    held_out_text = f", held-out {rival.test:.3g}" if np.isfinite(rival.test) else ""
+    held_out_text = f", held-out {rival.test_error:.3g}" if np.isfinite(rival.test_error) else ""
     return f"{rival.words}: {rival.training_error:.3g}{held_out_text}."
 
 
 def _scale_axis(axes: Axes, values: FloatArray) -> None:
-    """Set the abscissa to the range of the errors; logarithmic if that exceeds 4."""
+    """Set the abscissa to the range of the errors with a margin of 10 to 15 %, at least 0.9 to 1.5; logarithmic if its
+    upper end exceeds 4 (chosen by hand)."""
     low, high = min(0.9, 0.9 * float(values.min(initial=1.0))), 1.15 * float(values.max(initial=1.0))
     axes.set_xscale("log" if high > 4 else "linear")
     axes.set_xlim(low, max(high, 1.5))
@@ -173,5 +176,6 @@ def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
 
 
 def _compute_geometric_mean(values: FloatArray) -> float:
-    """Compute the geometric mean of errors; values below 1e-6 count as 1e-6, NaN gives NaN."""
+    """Compute the geometric mean of errors; values below 1e-6 count as 1e-6, so that the logarithm of 0 is finite; NaN
+    gives NaN."""
     return float(np.exp(np.mean(np.log(np.maximum(values, 1e-6)))))

@@ -1,7 +1,8 @@
 """Measured coverage of each confidence interval near the force cap, as sentences for reports and as a table.
 
 Coverage is the share of simulated studies whose 95 % interval contains the true value. `measured_coverage` has the
-counts; a report shows the sentence with the interval it belongs to, docs/statistics.md has the table.
+counts; a report shows the sentence with the interval it belongs to, docs/statistics.md has the table. Called by
+`two_analyses`.
 """
 
 from collections.abc import Sequence
@@ -10,9 +11,9 @@ from dataclasses import dataclass
 from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.wording import format_number, format_signed
 
-THRESHOLDS_BY_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
+MEDIAN_TEXTS = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
 """Reported frequencies (Hz) of the simulated studies, and the true median threshold at each; at 5 Hz it is 0.35 N."""
-TITLES = {
+INTERVAL_TITLES = {
     "model": "difference to 5 Hz by the model of all answers, dB",
     "means": "difference to 5 Hz by reversal means, paired, dB",
     "tobit": "difference to 5 Hz by reversal means, Tobit, dB",
@@ -21,8 +22,8 @@ TITLES = {
     "single": "single threshold by likelihood, one participant alone",
     "one-way": "type-1 error of the one-way analysis at equal medians of 2.2 N",
 }
-"""Key of each analysis, and the text for its interval."""
-BELOW_CAP_ONLY = ("run", "single")
+"""Text for the interval of each analysis, by its key."""
+ANALYSES_BELOW_CAP = ("run", "single")
 """Analyses that give an estimate only where it is below the cap. Near the cap their mean error is due to this
 selection, so sentences leave it out."""
 
@@ -33,7 +34,7 @@ class MeasuredCoverage:
     staircase and a cap of 3 N."""
 
     analysis: str
-    """A key of `TITLES`."""
+    """A key of `INTERVAL_TITLES`."""
     frequency_hz: float
     """0 where all frequencies are tested together."""
     bias_db: float | None
@@ -52,36 +53,36 @@ class MeasuredCoverage:
 
 
 def format_coverage_table(rows: Sequence[MeasuredCoverage]) -> list[str]:
-    """Format the table in Markdown, one line per row, ordered as `TITLES`."""
+    """Format the table in Markdown, one line per row, ordered as `INTERVAL_TITLES`."""
     lines = [
         "| interval | median threshold | bias of the estimates (dB) | contains the true value |",
         "|---|---|---|---|",
     ]
-    for name, title in TITLES.items():
+    for analysis, title in INTERVAL_TITLES.items():
         for row in rows:
-            if row.analysis == name:
+            if row.analysis == analysis:
                 bias = "" if row.bias_db is None else format_signed(row.bias_db)
-                lines.append(f"| {title} | {THRESHOLDS_BY_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
+                lines.append(f"| {title} | {MEDIAN_TEXTS.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
     return lines
 
 
 def describe_coverage(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
-    """Describe the coverage and bias of one analysis (a key of `TITLES`) at each median threshold; empty
-    where nothing was measured."""
+    """Describe the coverage and bias of one analysis (a key of `INTERVAL_TITLES`) at each median threshold; empty
+    where no row has the analysis."""
     texts = []
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:
-            has_bias = row.bias_db is not None and analysis not in BELOW_CAP_ONLY
+            has_bias = row.bias_db is not None and analysis not in ANALYSES_BELOW_CAP
             bias = f" (bias {format_signed(row.bias_db or 0.0, 1)} dB)" if has_bias else ""
             texts.append(
-                f"{format_number(100 * row.covered / row.intervals, 0)} % at {THRESHOLDS_BY_HZ[row.frequency_hz]}{bias}"
+                f"{format_number(100 * row.covered / row.intervals, 0)} % at {MEDIAN_TEXTS[row.frequency_hz]}{bias}"
             )
         elif row.analysis == analysis:
-            return f"{_SENTENCE_START}: the {TITLES[analysis]} is {row.percent}, nominally 5 %."
+            return f"{_OPENING}: the {INTERVAL_TITLES[analysis]} is {row.percent}, nominally 5 %."
     if not texts:
         return ""
-    return f"{_SENTENCE_START}: the 95 % interval ({TITLES[analysis]}) contains the true value in {'; '.join(texts)}."
+    return f"{_OPENING}: the 95 % interval ({INTERVAL_TITLES[analysis]}) contains the true value in {'; '.join(texts)}."
 
 
-_SENTENCE_START = "Measured near the cap in simulated studies with the published staircase"
+_OPENING = "Measured near the cap in simulated studies with the published staircase"
 """Beginning of every sentence."""

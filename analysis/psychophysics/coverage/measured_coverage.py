@@ -1,9 +1,9 @@
-"""Measured coverage near the force cap: how many intervals of a study report hold the true value.
+"""Measured coverage near the force cap: how many intervals of a report contain the true value.
 
-Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.TITLES`),
-frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None where the analysis gives no size in
-dB), intervals of 95 % that held the truth (one-way: studies in which a difference was found that was not there), and
-all intervals.
+Reports print these counts beside each interval (`coverage_words`). Each row: analysis
+(`coverage_words.INTERVAL_TITLES`), frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None
+where the analysis gives no size in dB), 95 % intervals that contain the true value (one-way: studies with a significant
+difference although there is none), and all intervals.
 
 Counted in simulated studies of ten people with known thresholds under the published staircase and cap, and written by
 `make coverage` (tests/references/coverage_of_analyses.py), never by hand; docs/statistics.md has the same table.
@@ -11,7 +11,7 @@ Counted in simulated studies of ten people with known thresholds under the publi
 
 from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage
 
-MEASURED = (
+MEASURED_COVERAGES = (
     MeasuredCoverage("means", 25.0, -0.5, 366, 400),
     MeasuredCoverage("means", 35.0, -3.3, 75, 400),
     MeasuredCoverage("means", 45.0, -5.07, 6, 400),

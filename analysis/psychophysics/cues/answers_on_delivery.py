@@ -31,9 +31,10 @@ from equalizer.signals.signal import FloatArray
 LOGITS_PER_D = 1.702
 """A logistic curve over this times z is a normal one within 0.01 (D. C. Haley, Stanford technical report 15, 1952)."""
 CUE_ONLY_SLOPE = LOGITS_PER_D / TYPICAL_NOISE_DB
-"""Slope in logits per dB of a participant with the usual internal noise who goes by the cue alone."""
+"""Slope in logits per dB of a participant with the internal noise `TYPICAL_NOISE_DB` who judges by the cue alone."""
 MOST_NEWTON_STEPS, LEAST_LIKELIHOOD_GAIN = 50, 1e-8
-"""Largest number of Newton steps of the logistic regression, and gain in log-likelihood at which it has converged."""
+"""Largest number of Newton steps of the logistic regression, and gain in log-likelihood below which it has converged.
+Chosen."""
 LEAST_RESIDUAL_SD_DB = 1e-6
 """Standard deviation of a residual below which it is rounding."""
 
@@ -45,7 +46,9 @@ class AnswersOnDelivery:
     frequency_hz: float
     cue: Cue
     trials: int
+    """Number of trials with a residual."""
     residual_sd_db: float
+    """Standard deviation of the residuals; 0 without trials."""
     slope: float | None
     """g, in logits per dB: positive where more of the cue goes with answers of the first direction. None where the
     delivery did not vary within a direction, or the answers fix no slope."""
@@ -53,6 +56,7 @@ class AnswersOnDelivery:
     upper: float | None
     """Limits of the 95 % Wald interval of the slope, logits per dB."""
     p: float | None
+    """Two-sided p-value of the Wald test of g = 0."""
 
     @property
     def is_conclusive(self) -> bool:
@@ -78,7 +82,7 @@ def _regress_answers_on_cue(
     trial_count = int(has_residual.sum())
     if trial_count == 0:
         return AnswersOnDelivery(trials.frequency_hz, cue, 0, 0.0, None, None, None, None)
-    residual_db, person, side, answer = (
+    residual_db, person_index, side_sign, answer_sign = (
         residual_db[has_residual],
         trials.person[has_residual],
         trials.side[has_residual],
@@ -88,17 +92,17 @@ def _regress_answers_on_cue(
     slope = standard_error = None
     if residual_sd_db > LEAST_RESIDUAL_SD_DB:
         centred_level_db = trials.nominal_db[has_residual] - _compute_group_means(
-            trials.nominal_db[has_residual], person
+            trials.nominal_db[has_residual], person_index
         )
-        person_indicators = (person[:, None] == np.unique(person)).astype(np.float64)
+        person_indicators = (person_index[:, None] == np.unique(person_index)).astype(np.float64)
         strength_terms = _make_strength_terms(trials, strength_db, has_residual)
         side_terms = np.column_stack(
             [np.ones(trial_count), centred_level_db, residual_db / residual_sd_db, strength_terms]
         )
         design = np.column_stack(
-            [person_indicators, side[:, None] * side_terms, strength_terms, residual_db / residual_sd_db]
+            [person_indicators, side_sign[:, None] * side_terms, strength_terms, residual_db / residual_sd_db]
         )
-        slope, standard_error = _fit_logistic_slope(design, answer > 0)
+        slope, standard_error = _fit_logistic_slope(design, answer_sign > 0)
     if slope is None or standard_error is None:
         return AnswersOnDelivery(trials.frequency_hz, cue, trial_count, residual_sd_db, None, None, None, None)
     half_width = float(norm.ppf(0.975)) * standard_error
@@ -128,7 +132,7 @@ def _make_strength_terms(
 
 def _compute_residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Compute the residuals (n,) in dB, and a mask (n,) of where they exist: not for a trial without the value, nor for
-    a participant with too few values."""
+    a participant for whom `fit_same_level_difference` gives None."""
     residual_db, has_residual = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
     for person in range(len(trials.subjects)):
         is_of_person = (trials.person == person) & np.isfinite(values_db)
@@ -150,16 +154,17 @@ def _compute_group_means(values: FloatArray, group: NDArray[np.intp]) -> FloatAr
 def _fit_logistic_slope(
     design: FloatArray, answered_first: NDArray[np.bool_]
 ) -> tuple[float, float] | tuple[None, None]:
-    """Fit a logistic regression; returns its last coefficient and standard error, None where they are not determined or
-    the search does not converge. design: (n, p); answered_first: (n,).
+    """Fit a logistic regression; return its last coefficient and its standard error, None where they are not determined
+    (condition number above 1e12) or the search does not converge. design: (n, p); answered_first: (n,).
 
-    Newton's method with step halving; the log-likelihood is concave.
+    Newton's method, each step halved up to ten times until the log-likelihood, which is concave, does not fall.
     """
     beta = np.zeros(design.shape[1])
     log_likelihood = _compute_log_likelihood(design, answered_first, beta)
     for _ in range(MOST_NEWTON_STEPS):
         probability = expit(design @ beta)
         information = design.T @ (design * (probability * (1.0 - probability))[:, None])
+        # Near-singular information: the answers are separated, or a regressor is a combination of others.
         if np.linalg.cond(information) > 1e12:
             return None, None
         step = np.linalg.solve(information, design.T @ (answered_first - probability))
@@ -179,5 +184,6 @@ def _fit_logistic_slope(
 
 
 def _compute_log_likelihood(design: FloatArray, answered_first: NDArray[np.bool_], beta: FloatArray) -> float:
+    """Compute the Bernoulli log-likelihood of the coefficients beta (p,). design: (n, p); answered_first: (n,)."""
     logit = design @ beta
     return float((answered_first * logit - np.logaddexp(0.0, logit)).sum())

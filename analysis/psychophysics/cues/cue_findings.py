@@ -97,7 +97,8 @@ def _make_finding(
         largest_db=max((sensitivity.difference_db for sensitivity in sensitivities), key=abs),
         spread_db=median([sensitivity.spread_db for sensitivity in sensitivities]),
         abilities=tuple(
-            median([sensitivity.d_prime(noise_db) for sensitivity in sensitivities]) for noise_db in INTERNAL_NOISE_DB
+            median([sensitivity.compute_d_prime(noise_db) for sensitivity in sensitivities])
+            for noise_db in INTERNAL_NOISE_DB
         ),
         observed_d_prime=_average_d_prime(group),
         noticed_by=tuple(sensitivity.subject for sensitivity in sensitivities if sensitivity.is_noticeable),

@@ -9,8 +9,8 @@ At d' = 1 the difference is one just noticeable difference (JND) of that partici
 Phi(1/2) = 69 % of the answers right.
 
 With friction, the delivered stimulus depends on the level in a way that a participant can learn. Difference and spread
-are therefore those at the same level: a parabola of the level (dB) is fitted with them. `cue_findings` collects the
-results.
+are therefore those at the same level: a parabola of the level (dB) is fitted with them. Called by `cue_findings`;
+`answers_on_delivery` uses the residuals of the fit.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapter 1.
 """
@@ -25,8 +25,8 @@ from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials
 from equalizer.signals.signal import FloatArray
 
 INTERNAL_NOISE_DB = (0.5, 1.0, 2.0)
-"""Internal noise (dB) of participants with a high, a typical and a low sensitivity to intensity: difference limens of
-vibration are near 1 dB."""
+"""Internal noise (dB) of participants with a high, a typical and a low sensitivity to intensity: chosen around 1 dB,
+near the difference limens of vibration."""
 TYPICAL_NOISE_DB = 1.0
 """Internal noise of a typical participant: standard deviation of the perceived level, dB."""
 JND_D_PRIME = 1.0
@@ -43,6 +43,7 @@ class CueSensitivity:
     frequency_hz: float
     cue: Cue
     trials: int
+    """Number of trials with a value of the cue."""
     difference_db: float
     """Direction of side +1 minus that of side -1 (`DeliveredTrials.side`), at the same level."""
     lower_db: float
@@ -51,8 +52,8 @@ class CueSensitivity:
     spread_db: float
     """Standard deviation over trials of one direction at the same level."""
 
-    def d_prime(self, noise_db: float) -> float:
-        """d' of a participant with this internal noise who uses this cue alone."""
+    def compute_d_prime(self, noise_db: float) -> float:
+        """Compute d' of a participant with this internal noise who uses this cue alone."""
         return abs(self.difference_db) / math.hypot(noise_db, self.spread_db)
 
     @property
@@ -71,8 +72,10 @@ def estimate_cue_sensitivities(trials: DeliveredTrials) -> tuple[CueSensitivity,
     sensitivities = []
     for cue, values_db in trials.values_db.items():
         for person, subject in enumerate(trials.subjects):
-            of_person = (trials.person == person) & np.isfinite(values_db)
-            fit = fit_same_level_difference(values_db[of_person], trials.nominal_db[of_person], trials.side[of_person])
+            is_of_person = (trials.person == person) & np.isfinite(values_db)
+            fit = fit_same_level_difference(
+                values_db[is_of_person], trials.nominal_db[is_of_person], trials.side[is_of_person]
+            )
             if fit is None:
                 continue
             half_width_db = float(student.ppf(0.5 + CONFIDENCE / 2, fit.df)) * fit.error_db

@@ -6,8 +6,8 @@ the level of the staircase L in N:
     intensity 20 log10(a / L)      spectrum 20 log10(1 + h / a)      coupling 20 log10(1 + c / a)
 
 Spectrum and coupling are the contributions of h and c to the amplitude if they were in phase with it, an upper bound.
-In dB all three can be compared with the same internal noise of a participant. Used by the
-other modules of `cues` and by `power.felt_delivery`.
+In dB all three can be compared with the same internal noise of a participant. Called by the
+other modules of `cues`, by `study_analysis` (gaps) and by `power.felt_delivery`.
 """
 
 import math
@@ -61,7 +61,9 @@ class CueGap:
     frequency_hz: float
     cue: Cue
     missing: int
+    """Number of trials without a measurement of the cue."""
     trials: int
+    """Number of trials with a measured acceleration."""
 
 
 def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
@@ -97,7 +99,8 @@ def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, .
 
 
 def find_cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
-    """Count the missing measurements by frequency (ascending) and cue; empty where nothing is missing."""
+    """Find the cues without a measurement in some trials, and count these, by frequency (ascending) and cue; empty
+    where none is missing."""
     gaps = []
     for group in select_delivered_trials(trials):
         trial_count = len(group.person)
@@ -120,21 +123,21 @@ def _find_swapped_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
     all_angles_deg = {
         angle_deg for session_angles in angles_by_session.values() for angle_deg in session_angles.values()
     }
-    larger_deg = max(all_angles_deg) if len(all_angles_deg) == 2 else None
+    larger_angle_deg = max(all_angles_deg) if len(all_angles_deg) == 2 else None
     return frozenset(
         session_key
         for session_key, session_angles in angles_by_session.items()
-        if _is_swapped(session_angles, larger_deg)
+        if _is_swapped(session_angles, larger_angle_deg)
     )
 
 
-def _is_swapped(session_angles: dict[int, float], larger_deg: float | None) -> bool:
-    """Whether label 1 is the larger angle. session_angles: angles of a session by label; larger_deg: larger angle of
-    the study's two directions, None where their number is not two."""
+def _is_swapped(session_angles: dict[int, float], larger_angle_deg: float | None) -> bool:
+    """Whether label 1 is the larger angle. session_angles: angles of a session by label; larger_angle_deg: larger angle
+    of the study's two directions, None where their number is not two."""
     if len(session_angles) == 2:
         return session_angles[1] > session_angles[2]
     ((label, angle_deg),) = session_angles.items()
-    return larger_deg is not None and (label == 1) == (angle_deg == larger_deg)
+    return larger_angle_deg is not None and (label == 1) == (angle_deg == larger_angle_deg)
 
 
 def _read_cue_values(trials: list[Trial], compute_ratio: Callable[[Trial], float | None]) -> list[float]:

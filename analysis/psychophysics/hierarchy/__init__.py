@@ -1,8 +1,8 @@
 """The primary analysis: one hierarchical psychometric model of all answers of a study.
 
 `answers` (counted by cell) and `curve` (psychometric function) -> `likelihood` -> `marginal` (Laplace's method) ->
-`objective` (its maximum) -> `refine` (the maximum by `quadrature` over `nodes`) -> `fit` -> `inference` (medians,
-direction limit) and `goodness` -> `primary`, which calls all of them. `run_likelihood` fits each run alone,
+`objective` (its maximum) -> `quadrature_search` (the maximum by `quadrature` over `nodes`) -> `fit` -> `inference`
+(medians, direction limit) and `goodness` -> `primary`, which calls all of them. `run_likelihood` fits each run alone,
 `single_persons` a participant alone, `observed_shares` computes the points of figures. Begin at `primary.py`, then
 `fit.py`.
 """

@@ -1,4 +1,4 @@
-"""Psychometric functions of one-interval identification: sensitivity q(t) over the level, with two derivatives.
+"""Psychometric functions of one-interval identification: mean evidence q(t) over the level, with two derivatives.
 
 An unbiased attentive participant answers right with the probability 1/2 + F(t)/2, so the evidence for the direction
 shown has the mean q(t) with Phi(q) = 1/2 + F(t)/2 (half of d'). Three shapes of F, each over levels in dB:
@@ -11,7 +11,8 @@ t = t0 + slope ln(10)/20 (level - threshold), where t0 makes the share of right 
 that to which the staircase converges: 79.37 %.
 
 Source: F. A. Wichmann, N. J. Hill, Percept. Psychophys. 63 (2001), 1293-1313; N. A. Macmillan, C. D. Creelman,
-Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
+Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2. Called by the likelihoods of `hierarchy`, by
+`analysis.figures.psychometric` and by the simulations of `power`.
 """
 
 import math
@@ -28,11 +29,12 @@ TARGET_PROPORTION = 0.5 ** (1 / 3)
 NEPER_PER_DB = math.log(10.0) / 20.0
 """Natural logarithm of an amplitude ratio of 1 dB."""
 LARGEST_T = 30.0
-"""t beyond which no answer of an attentive participant is wrong: exp(-exp(30)) is 0 in floating point."""
+"""Largest t that is evaluated: at it no answer of an attentive participant is wrong, as exp(-exp(30)) is 0 in floating
+point."""
 
 
 class Family(StrEnum):
-    """Shape F of the psychometric curve."""
+    """Shape F of the psychometric function."""
 
     WEIBULL = "weibull"
     LOGISTIC = "logistic"
@@ -48,20 +50,28 @@ T_AT_THRESHOLD = {
 }
 """t0 of each family."""
 STARTING_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
-"""Slopes at which a search begins: a Weibull slope of 2 over newtons, and slopes about as steep at the threshold."""
+"""Slope at which a search begins, by family: a Weibull slope of 2 over newtons, and slopes about as steep at the
+threshold."""
 
 
-def compute_sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute q(t) and its first two derivatives, each in the shape of t."""
-    log_survival, h1, h2 = _compute_log_survival(np.minimum(t, LARGEST_T), family)
+def differentiate_evidence(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute q(t) and its first two derivatives by t, each in the shape of t. t above `LARGEST_T` counts as that."""
+    log_survival, log_survival_derivative, log_survival_curvature = _compute_log_survival(
+        np.minimum(t, LARGEST_T), family
+    )
     # Phi(-q) = (1 - F) / 2. With w the logarithm of that: dq/dw = -M, M the Mills ratio Phi(-q) / phi(q).
     q = -ndtri_exp(log_survival - math.log(2.0))
-    mills = math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2.0))
-    return q, -mills * h1, mills * (q * mills - 1.0) * h1**2 - mills * h2
+    mills_ratio = math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2.0))
+    return (
+        q,
+        -mills_ratio * log_survival_derivative,
+        mills_ratio * (q * mills_ratio - 1.0) * log_survival_derivative**2 - mills_ratio * log_survival_curvature,
+    )
 
 
 def compute_mean_evidence(t: FloatArray, family: Family) -> FloatArray:
-    """Compute q(t) without its derivatives, in the shape of t: a quarter of the time of `compute_sensitivity`."""
+    """Compute q(t) without its derivatives, in the shape of t: takes a quarter of the time of
+    `differentiate_evidence`."""
     t = np.minimum(t, LARGEST_T)
     match family:
         case Family.WEIBULL:
@@ -83,14 +93,14 @@ def compute_proportion_correct(evidence: FloatArray, lapse: float) -> FloatArray
 
 
 def _compute_log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute log(1 - F) and its first two derivatives by t."""
+    """Compute log(1 - F) and its first two derivatives by t, each in the shape of t."""
     match family:
         case Family.WEIBULL:
             log_survival = -np.exp(t)
             return log_survival, log_survival, log_survival
         case Family.LOGISTIC:
-            p = 1.0 / (1.0 + np.exp(-t))
-            return -np.logaddexp(0.0, t), -p, -p * (1.0 - p)
+            distribution = 1.0 / (1.0 + np.exp(-t))
+            return -np.logaddexp(0.0, t), -distribution, -distribution * (1.0 - distribution)
         case Family.GAUSS:
-            m = 1.0 / (math.sqrt(math.pi / 2) * erfcx(t / math.sqrt(2.0)))
-            return log_ndtr(-t), -m, -m * (m - t)
+            hazard = 1.0 / (math.sqrt(math.pi / 2) * erfcx(t / math.sqrt(2.0)))
+            return log_ndtr(-t), -hazard, -hazard * (hazard - t)

@@ -2,8 +2,8 @@
 
 Each of n persons has a threshold (dB) at each of k frequencies, a log-slope and a response criterion. These latent
 parameters are drawn from normal distributions, whose means and standard deviations are estimated (`marginal`, with the
-sources). The latent parameters are integrated out, first by Laplace's method (`objective`), then by adaptive
-quadrature (`refine`). Called by `primary` and by simulations of power; `inference` computes intervals from the scores
+sources). The latent parameters are integrated out, first by Laplace's method (`objective`), then by adaptive quadrature
+(`quadrature_search`). Called by `primary` and by simulations of power; `inference` computes intervals from the scores
 and the curvature of the fit.
 """
 
@@ -16,7 +16,7 @@ from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.marginal import ParameterLayout
 from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
-from analysis.psychophysics.hierarchy.refine import QuadratureSearch
+from analysis.psychophysics.hierarchy.quadrature_search import QuadratureSearch
 from equalizer.signals.signal import FloatArray
 
 
@@ -78,6 +78,6 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
         shared_errors=np.sqrt(np.diagonal(maximum.moments.covariance, axis1=1, axis2=2)[:, 1:]),
         log_likelihood=maximum.log_likelihood,
         scores=maximum.scores,
-        curvature=maximum.curvature,
+        curvature=maximum.hessian,
         converged=maximum.converged,
     )

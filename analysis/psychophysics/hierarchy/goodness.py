@@ -1,7 +1,7 @@
 """Goodness of fit of the hierarchical psychometric model: predicted against observed shares of right answers.
 
 Trials are binned by their predicted share (calibration plot); per bin, z = (observed - predicted) / standard error,
-with the binomial variance sum of n p (1 - p). Equations of p: `curve`.
+with the binomial variance sum of n p (1 - p). Equations of p: `curve`. Called by `primary`.
 """
 
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from analysis.psychophysics.hierarchy.curve import (
     NEPER_PER_DB,
     T_AT_THRESHOLD,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
 BINS = 8
-"""Number of bins with equal numbers of trials: about 400 trials each in a study of ten participants."""
+"""Number of bins with equal numbers of trials: about 400 trials each in a study of ten participants. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,9 @@ class ShareBin:
     trials: int
     """Number of trials in the bin."""
     predicted: float
+    """Mean predicted share, 0 to 1."""
     observed: float
+    """Right answers over trials, 0 to 1."""
     z: float
     """(observed - predicted) over its binomial standard error."""
 
@@ -43,36 +45,45 @@ class GoodnessOfFit:
     bins: tuple[ShareBin, ...]
 
 
-def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
-    """Shares in at most `BINS` bins of about equally many trials, in ascending order of the predicted share."""
-    share, cells = predict_shares(fit), fit.answers
-    trials = cells.right + cells.wrong
-    order = np.argsort(share, kind="stable")
-    bin_index = np.minimum((np.cumsum(trials[order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
+def compute_goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
+    """Compute the shares in at most `BINS` bins of about equally many trials, in ascending order of the predicted
+    share. All trials of a cell (one person, level and direction) are in the same bin."""
+    predicted_shares, answers = predict_shares(fit), fit.answers
+    trials = answers.right + answers.wrong
+    cell_order = np.argsort(predicted_shares, kind="stable")
+    bin_index = np.minimum((np.cumsum(trials[cell_order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
     bins = []
     for index in range(BINS):
-        in_bin = order[bin_index == index]
-        if len(in_bin):
-            n, correct, p = trials[in_bin], cells.right[in_bin], share[in_bin]
-            expected, standard_error = float(n @ p), float(np.sqrt(n @ (p * (1.0 - p))))
+        bin_cells = cell_order[bin_index == index]
+        if len(bin_cells):
+            cell_trials, cell_correct, cell_shares = (
+                trials[bin_cells],
+                answers.right[bin_cells],
+                predicted_shares[bin_cells],
+            )
+            expected_correct, standard_error = (
+                float(cell_trials @ cell_shares),
+                float(np.sqrt(cell_trials @ (cell_shares * (1.0 - cell_shares)))),
+            )
             bins.append(
                 ShareBin(
-                    int(n.sum()),
-                    expected / float(n.sum()),
-                    float(correct.sum() / n.sum()),
-                    (float(correct.sum()) - expected) / standard_error,
+                    int(cell_trials.sum()),
+                    expected_correct / float(cell_trials.sum()),
+                    float(cell_correct.sum() / cell_trials.sum()),
+                    (float(cell_correct.sum()) - expected_correct) / standard_error,
                 )
             )
     return GoodnessOfFit(tuple(bins))
 
 
 def predict_shares(fit: HierarchicalFit) -> FloatArray:
-    """(m,): probability of a right answer in each cell of `fit.answers`, with the person's own threshold, slope and
-    criterion: lapse + (1 - 2 lapse) Phi(q(t) - side criterion), t = t0 + slope ln(10)/20 (level - threshold)."""
-    cells, k = fit.answers, fit.layout.k
-    person = cells.person
-    pace = np.exp(fit.latent[person, k]) * NEPER_PER_DB
-    t = T_AT_THRESHOLD[fit.family] + pace * (cells.level_db - fit.latent[:, :k].ravel()[cells.run])
+    """Predict the probability (m,) of a right answer in each cell of `fit.answers`, with the person's own threshold,
+    slope and criterion: lapse + (1 - 2 lapse) Phi(q(t) - side criterion), t = t0 + slope ln(10)/20 (level -
+    threshold)."""
+    answers, k = fit.answers, fit.layout.k
+    person = answers.person
+    slope_per_db = np.exp(fit.latent[person, k]) * NEPER_PER_DB
+    t = T_AT_THRESHOLD[fit.family] + slope_per_db * (answers.level_db - fit.latent[:, :k].ravel()[answers.run])
     return compute_proportion_correct(
-        compute_sensitivity(t, fit.family)[0] - cells.side * fit.latent[person, k + 1], fit.lapse
+        differentiate_evidence(t, fit.family)[0] - answers.side * fit.latent[person, k + 1], fit.lapse
     )

@@ -21,7 +21,7 @@ from scipy.stats import t as student
 from analysis.psychophysics.group_contrasts import compute_mean_errors
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
-from analysis.psychophysics.hierarchy.refine import QuadratureSearch
+from analysis.psychophysics.hierarchy.quadrature_search import QuadratureSearch
 from equalizer.signals.signal import FloatArray
 
 BOUND_ROOT, BOUND_STEPS = 0.03, 8

@@ -18,7 +18,7 @@ from analysis.psychophysics.hierarchy.curve import (
     T_AT_THRESHOLD,
     Family,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from equalizer.signals.signal import FloatArray
 
@@ -110,7 +110,7 @@ class TrialLikelihood:
         """Per cell (m,): t - t0, mean of the evidence q - side c, and the first two derivatives of q by t."""
         cells, k = self.answers, self.frequencies
         tau = pace[self._person] * (cells.level_db - latent[:, :k].ravel()[cells.run])
-        q, q1, q2 = compute_sensitivity(T_AT_THRESHOLD[self.family] + tau, self.family)
+        q, q1, q2 = differentiate_evidence(T_AT_THRESHOLD[self.family] + tau, self.family)
         return tau, q - cells.side * latent[:, k + 1][self._person], q1, q2
 
     def _sum_by_run(self, rows: list[FloatArray]) -> FloatArray:

@@ -7,7 +7,7 @@ moments, first from Laplace's method, then from the last evaluation; inner nodes
 thresholds on u, b and c.
 
 Source: J. C. Naylor, A. F. M. Smith, J. R. Stat. Soc. C 31 (1982), 214-225; S. Rabe-Hesketh, A. Skrondal, A. Pickles,
-J. Econometrics 128 (2005), 301-323 (nested).
+J. Econometrics 128 (2005), 301-323 (nested). Called by `quadrature` and `quadrature_search`.
 """
 
 import math
@@ -38,13 +38,13 @@ class NodeCounts:
 
 COARSE_COUNTS, FINE_COUNTS, FIXED_COUNTS = NodeCounts(3, 5, 3, 5), NodeCounts(5, 5, 3, 7), NodeCounts(5, 7, 3, 7)
 """Numbers of nodes. With FINE, medians are within 0.03 dB of those with twice as many of each kind, also where most are
-above the cap. FIXED has more nodes, which keep their places, for fits that do not settle with FINE because a person's
+above the cap. FIXED has more nodes, at fixed positions, for searches that do not converge with FINE because a person's
 posterior has two maxima."""
 
 
 LEAST_VARIANCE_SHARE = 1e-4
 """Share of the variance of the node positions that is added to the posterior variance, which would be 0 where all
-weight is on a single node. Chosen by hand."""
+weight is on a single node. Chosen: small against the variance itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,12 +73,12 @@ class Nodes:
     """(n, q): of the outer nodes."""
     threshold: FloatArray
     """(n, q, k, r): inner nodes, dB."""
-    log_weight_inside: FloatArray
+    inner_log_weight: FloatArray
     """(n, 1, k, r): of the inner nodes, the same at every outer node."""
 
 
 @dataclass(frozen=True, slots=True)
-class Population:
+class PopulationParameters:
     """The population's parameters (those of a `ParameterLayout`), by name and in their own units."""
 
     means: FloatArray
@@ -97,23 +97,24 @@ class Population:
     """Lapse rate, the same for all people."""
 
     @staticmethod
-    def from_parameters(parameters: FloatArray, k: int) -> "Population":
-        """The population of transformed parameters (k + 6,), in which standard deviations are logarithms and the lapse
-        rate is a logit (`marginal.ParameterLayout`)."""
+    def from_parameters(parameters: FloatArray, k: int) -> "PopulationParameters":
+        """Make the population of transformed parameters (k + 6,), in which standard deviations are logarithms and the
+        lapse rate is a logit (`marginal.ParameterLayout`)."""
         shared_sd, interaction_sd, slope_sd, criterion_sd = (
             math.exp(parameters[k + offset]) for offset in (0, 1, 3, 4)
         )
         lapse = float(expit(parameters[k + 5]))
-        return Population(
+        return PopulationParameters(
             parameters[:k], shared_sd, interaction_sd, float(parameters[k + 2]), slope_sd, criterion_sd, lapse
         )
 
 
 def compute_laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
-    """Compute the posterior moments of each person by Laplace's method. mode: (n, k + 2), posterior mode; information:
-    (n, k + 2, k + 2), expected information of the answers there."""
+    """Compute the posterior moments of each person by Laplace's method. parameters: (k + 6,), of the population, as for
+    `PopulationParameters.from_parameters`. mode: (n, k + 2), posterior mode; information: (n, k + 2, k + 2), expected
+    information of the answers there."""
     k = mode.shape[1] - 2
-    population, index = Population.from_parameters(parameters, k), np.arange(k)
+    population, index = PopulationParameters.from_parameters(parameters, k), np.arange(k)
     interaction_variance, shared_variance = population.interaction_sd**2, population.shared_sd**2
     # u given all thresholds is normal: its mean is `u_weight` times the sum of their deviations from the population
     # means, its variance is `u_variance`.
@@ -143,28 +144,28 @@ def place_nodes(moments: Moments, counts: NodeCounts) -> Nodes:
         shared=moments.shared[:, None] + deviations,
         log_weight=log_weights + np.log(np.diagonal(cholesky, axis1=1, axis2=2)).sum(axis=1)[:, None],
         threshold=threshold_centre_db[..., None] + threshold_sd_db * inner_positions,
-        log_weight_inside=inner_weights + np.log(threshold_sd_db),
+        inner_log_weight=inner_weights + np.log(threshold_sd_db),
     )
 
 
-def compute_posterior_moments(nodes: Nodes, weight: FloatArray, inner_weight: FloatArray) -> Moments:
-    """Compute the posterior moments by the nodes. weight: (n, q), posterior probabilities of the outer nodes;
+def compute_posterior_moments(nodes: Nodes, outer_weight: FloatArray, inner_weight: FloatArray) -> Moments:
+    """Compute the posterior moments by the nodes. outer_weight: (n, q), posterior probabilities of the outer nodes;
     inner_weight: (n, q, k, r), those of the inner nodes at each outer node."""
-    shared = np.einsum("nq,nqa->na", weight, nodes.shared)
-    deviation = nodes.shared - shared[:, None]
-    covariance = np.einsum("nq,nqa,nqb->nab", weight, deviation, deviation)
+    shared_means = np.einsum("nq,nqa->na", outer_weight, nodes.shared)
+    outer_deviation = nodes.shared - shared_means[:, None]
+    covariance = np.einsum("nq,nqa,nqb->nab", outer_weight, outer_deviation, outer_deviation)
     covariance += LEAST_VARIANCE_SHARE * np.einsum("na,ab->nab", nodes.shared.var(axis=1), np.eye(3))
     inner_means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.threshold)
-    threshold = np.einsum("nq,nqk->nk", weight, inner_means)
+    threshold = np.einsum("nq,nqk->nk", outer_weight, inner_means)
     threshold_deviation = inner_means - threshold[:, None]
-    regression = np.einsum("nq,nqa,nqk->nka", weight, deviation, threshold_deviation) @ np.linalg.pinv(
+    regression = np.einsum("nq,nqa,nqk->nka", outer_weight, outer_deviation, threshold_deviation) @ np.linalg.pinv(
         covariance, hermitian=True
     )
-    residual = threshold_deviation - np.einsum("nka,nqa->nqk", regression, deviation)
+    residual = threshold_deviation - np.einsum("nka,nqa->nqk", regression, outer_deviation)
     inner_variance = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.threshold - inner_means[..., None]) ** 2)
-    variance = np.einsum("nq,nqk->nk", weight, inner_variance + residual**2)
+    variance = np.einsum("nq,nqk->nk", outer_weight, inner_variance + residual**2)
     variance += LEAST_VARIANCE_SHARE * nodes.threshold.var(axis=3).mean(axis=1)
-    return Moments(shared, covariance, threshold, regression, variance)
+    return Moments(shared_means, covariance, threshold, regression, variance)
 
 
 @cache
@@ -182,6 +183,6 @@ def _make_product_rule(counts: NodeCounts) -> tuple[FloatArray, FloatArray]:
         list(zip(*_make_gauss_hermite_rule(count), strict=True))
         for count in (counts.shared, counts.slope, counts.criterion)
     ]
-    nodes = list(product(*axis_rules))
-    positions = np.array([[position for position, _ in node] for node in nodes])
-    return positions, np.array([sum(weight for _, weight in node) for node in nodes])
+    product_nodes = list(product(*axis_rules))
+    positions = np.array([[position for position, _ in node] for node in product_nodes])
+    return positions, np.array([sum(weight for _, weight in node) for node in product_nodes])

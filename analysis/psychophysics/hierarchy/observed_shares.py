@@ -17,7 +17,7 @@ from analysis.psychophysics.hierarchy.curve import (
     T_AT_THRESHOLD,
     Family,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from analysis.psychophysics.hierarchy.primary import PersonEstimate
 from equalizer.signals.signal import FloatArray
@@ -98,7 +98,7 @@ def average_person_curves(
 
 def evaluate_person_curve(above_db: FloatArray, person: PersonEstimate, fit: FittedCurves) -> FloatArray:
     """Probability of a right answer, the mean over both directions. above_db: levels re the threshold, any shape."""
-    q = compute_sensitivity(T_AT_THRESHOLD[fit.family] + person.slope * NEPER_PER_DB * above_db, fit.family)[0]
+    q = differentiate_evidence(T_AT_THRESHOLD[fit.family] + person.slope * NEPER_PER_DB * above_db, fit.family)[0]
     return (
         compute_proportion_correct(q - person.criterion, fit.lapse)
         + compute_proportion_correct(q + person.criterion, fit.lapse)

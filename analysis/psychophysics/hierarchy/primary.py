@@ -14,7 +14,7 @@ from analysis.psychophysics.group_contrasts import Contrast, compute_contrasts, 
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
-from analysis.psychophysics.hierarchy.goodness import GoodnessOfFit, goodness_of_fit
+from analysis.psychophysics.hierarchy.goodness import GoodnessOfFit, compute_goodness_of_fit
 from analysis.psychophysics.hierarchy.inference import (
     DirectionLimit,
     MedianThreshold,
@@ -132,7 +132,7 @@ def compute_primary_analysis(
         person_sd_db=float(standard_deviations[0]), frequency_sd_db=float(standard_deviations[1]),
         slope=float(np.exp(parameters[k + 2])),
         slope_log_sd=float(standard_deviations[2]), criterion_sd=float(standard_deviations[3]),
-        lapse=fit.lapse, goodness=goodness_of_fit(fit),
+        lapse=fit.lapse, goodness=compute_goodness_of_fit(fit),
         converged=fit.converged and comparison.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in requested_hz if frequency_hz not in frequencies_hz),
         declared_contrast=comparison.declared,

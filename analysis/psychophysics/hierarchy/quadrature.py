@@ -23,7 +23,7 @@ from analysis.psychophysics.hierarchy.nodes import (
     Moments,
     NodeCounts,
     Nodes,
-    Population,
+    PopulationParameters,
     compute_posterior_moments,
     place_nodes,
 )
@@ -102,12 +102,12 @@ def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, 
     """Log marginal likelihoods and derivatives at the parameters (size,) of `ParameterLayout`. moments: posterior
     moments at these parameters, or at parameters close to them. counts: number of nodes."""
     k = quadrature.k
-    population = Population.from_parameters(parameters, k)
+    population = PopulationParameters.from_parameters(parameters, k)
     nodes = place_nodes(moments, counts)
     likelihood, logit_slope, logit_curvature = quadrature.compute_log_likelihoods(nodes, population.lapse)
     u, b, c = np.moveaxis(nodes.shared, 2, 0)
     e = (nodes.threshold - population.means[:, None] - u[..., None, None]) / population.interaction_sd
-    inner_integral, inner_weight = _normalise(nodes.log_weight_inside + likelihood - 0.5 * e**2)
+    inner_integral, inner_weight = _normalise(nodes.inner_log_weight + likelihood - 0.5 * e**2)
     deviations = np.stack([
         u / population.shared_sd, (b - population.slope) / population.slope_sd, c / population.criterion_sd
     ], axis=-1)  # fmt: skip
@@ -138,7 +138,7 @@ def _normalise(log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:
     return (np.log(total) + maximum)[..., 0], shares / total
 
 
-def _assemble_gradient(mean: FloatArray, deviations: FloatArray, population: Population) -> FloatArray:
+def _assemble_gradient(mean: FloatArray, deviations: FloatArray, population: PopulationParameters) -> FloatArray:
     """(n, q, size): gradient of L at the outer nodes, averaged over the inner nodes. mean: (n, q, k, 3), averages by
     mean, log SD and lapse rate; deviations: (n, q, 3), of u, b and c in standard deviations."""
     layout = ParameterLayout(mean.shape[2])
@@ -165,7 +165,7 @@ def _assemble_within_node_covariance(covariance: FloatArray) -> FloatArray:
 
 
 def _compute_mean_hessian(
-    scores: FloatArray, lapse_curvature: float, population: Population, persons: int
+    scores: FloatArray, lapse_curvature: float, population: PopulationParameters, persons: int
 ) -> FloatArray:
     """(size, size): posterior mean of the Hessian of L, summed over persons. It follows from the gradient, because the
     population densities are normal. lapse_curvature: second derivative by the logit of the lapse rate."""

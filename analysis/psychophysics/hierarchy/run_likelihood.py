@@ -27,7 +27,7 @@ from analysis.psychophysics.hierarchy.curve import (
     T_AT_THRESHOLD,
     Family,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from equalizer.signals.signal import FloatArray
 
@@ -118,7 +118,7 @@ def _compute_likelihood_on_grid(
         t = T_AT_THRESHOLD[family] + nuisance.slope * math.exp(u) * NEPER_PER_DB * (
             level_db[None, :] - grid_db[:, None]
         )
-        q = compute_sensitivity(t, family)[0]
+        q = differentiate_evidence(t, family)[0]
         for c, criterion_weight in _make_gauss_hermite_nodes(nuisance.criterion_sd):
             for lapse in nuisance.lapses:
                 p = compute_proportion_correct(q - side * (nuisance.criterion + c), lapse)

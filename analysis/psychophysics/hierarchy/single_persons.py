@@ -6,6 +6,7 @@ the mean level played with an SD of 30 dB, the logarithm of the slope around its
 of 1.5), the criterion (response bias) around 0 with an SD of 0.3 d'. Only the lapse rate is fitted, under its prior of
 `objective.Prior`; then thresholds, slopes and criteria are the maximum a posteriori. Each run also has the likelihood
 interval of `run_likelihood`, in which slope, criterion and lapse rate are averaged over the same priors.
+Called by `study_analysis`.
 """
 
 import math
@@ -36,7 +37,7 @@ LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
 parts."""
 THRESHOLD_SD_DB = 30.0
 """SD (dB) of the prior of each threshold around the mean level played: keeps a threshold finite that the answers do not
-bound."""
+bound. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +48,18 @@ class SinglePersons:
     frequencies_hz: tuple[float, ...]
     """Frequencies with answers, in ascending order."""
     confidence: float
+    """Confidence of the intervals of `runs`, 0 to 1."""
     persons: tuple[PersonEstimate, ...]
     lapse: float
-    """Most probable lapse rate, the same for all persons."""
+    """Most probable lapse rate (0 to 1), the same for all persons."""
     runs: tuple[RunLikelihood, ...]
 
 
 def fit_single_persons(
     answers: Answers, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
 ) -> SinglePersons:
-    """Most probable thresholds, slopes and criteria at the most probable lapse rate, and the likelihood interval of
-    each run. cap_n: highest level that could be played, N."""
+    """Fit the most probable thresholds, slopes and criteria at the most probable lapse rate, and the likelihood
+    interval of each run. cap_n: highest level that could be played, N."""
     answers, cap_db, prior = drop_unanswered_frequencies(answers), to_db(cap_n), Prior()
     objective = Objective(answers, family, prior)
     parameters, layout = objective.start.copy(), objective.layout
@@ -65,15 +67,19 @@ def fit_single_persons(
     # In the order of `ParameterLayout.log_sds`. The part common to all frequencies (SD 1 dB) is negligible.
     parameters[layout.log_sds] = [0.0, math.log(THRESHOLD_SD_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
-    def cost(logit_lapse: float) -> float:
+    def evaluate_cost(logit_lapse: float) -> float:
         parameters[layout.lapse] = logit_lapse
         return objective(parameters)[0]
 
-    parameters[layout.lapse] = minimize_scalar(cost, bounds=LAPSE_BOUNDS, method="bounded", options={"xatol": 1e-3}).x
+    parameters[layout.lapse] = minimize_scalar(
+        evaluate_cost, bounds=LAPSE_BOUNDS, method="bounded", options={"xatol": 1e-3}
+    ).x
     objective(parameters)  # sets `marginal.latent` to the persons' most probable values at this lapse rate
     lapse = float(expit(parameters[layout.lapse]))
     persons = estimate_persons(answers.subjects, objective.marginal.latent, cap_db)
-    lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_alpha, prior.lapse_beta))
-    nuisance = Nuisance(STARTING_SLOPE[family], 0.0, lapses, SLOPE_LOG_SD, CRITERION_SD)
+    lapse_nodes = tuple(
+        float(lapse_node) for lapse_node in beta.ppf(LAPSE_QUANTILES, prior.lapse_alpha, prior.lapse_beta)
+    )
+    nuisance = Nuisance(STARTING_SLOPE[family], 0.0, lapse_nodes, SLOPE_LOG_SD, CRITERION_SD)
     runs = compute_run_likelihoods(answers, [nuisance] * answers.persons, cap_db, family, confidence)
     return SinglePersons(family, answers.frequencies_hz, confidence, persons, lapse, runs)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, STARTING_SLOPE, T_AT_THRESHOLD, compute_sensitivity
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, STARTING_SLOPE, T_AT_THRESHOLD, differentiate_evidence
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
 from equalizer.signals.signal import FloatArray
@@ -146,7 +146,7 @@ def _is_correct(crowd: Crowd, scaled_db: float, criterion: float, draw: FloatArr
     """Whether a trial is answered right: Phi(d'/2 - c) or Phi(d'/2 + c) by direction, mixed with lapses. scaled_db:
     slope times dB above the threshold. criterion: c. draw: (3,), see `answer_trials`."""
     half_d_prime = float(
-        compute_sensitivity(np.array([T_AT_THRESHOLD[crowd.family] + NEPER_PER_DB * scaled_db]), crowd.family)[0][0]
+        differentiate_evidence(np.array([T_AT_THRESHOLD[crowd.family] + NEPER_PER_DB * scaled_db]), crowd.family)[0][0]
     )
     direction_sign = 1.0 if draw[0] < 0.5 else -1.0
     p_correct = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(half_d_prime - direction_sign * criterion)

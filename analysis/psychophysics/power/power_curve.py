@@ -32,13 +32,14 @@ class StudyVerdict:
     """Results of one simulated study for one pair of frequencies, at the 5 % level."""
 
     people: int
+    """Number of participants."""
     trials: int
     """Number of trials of all people together."""
     primary_found: bool
     """Whether the hierarchical model of all answers finds the difference, by a t test over people. False where the
     differences of all people are equal, so that no test is possible; also in `primary_covers` and `means_found`."""
     primary_covers: bool
-    """Whether the model's 95 % interval holds the true difference."""
+    """Whether the model's 95 % interval contains the true difference."""
     primary_error_db: float
     """Estimated minus true difference, by the model."""
     means_found: bool
@@ -65,8 +66,11 @@ class PowerPoint:
     analysis, means of runs, and the published procedure."""
 
     people: int
+    """Number of participants of each study."""
     studies: int
+    """Number of simulated studies."""
     trials_per_person: float
+    """Mean number of trials of a participant."""
     primary: Share
     means: Share
     published: Share
@@ -81,11 +85,11 @@ class PowerPoint:
 def judge_study(
     crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...], contrast_hz: tuple[float, ...] = ()
 ) -> StudyVerdict:
-    """Simulate a study and test it. people: two at least. rule: without a trial limit, because all runs must have a
-    threshold. seed: of all draws. contrast_hz: as for `find_judged_pair`."""
+    """Simulate a study and test it. people: number of participants, at least two. rule: without a trial limit, because
+    all runs must have a threshold. seed: entropy of all random draws. contrast_hz: as for `find_judged_pair`."""
     study = simulate_study(crowd, rule, people, seed)
     pair_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
-    first_index, second_index = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
+    first_column, second_column = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
     true_difference_db = compute_true_difference_db(crowd, contrast_hz)
     pseudo_thresholds_db = compute_pseudo_thresholds(fit_hierarchy(study.answers))
     primary_contrast, means_contrast = (
@@ -96,8 +100,8 @@ def judge_study(
     anova = compute_one_way_anova(
         {name: list(column) for name, column in zip(group_names, study.threshold_n.T, strict=True)}
     )
-    difference_n = abs(float((study.threshold_n[:, first_index] - study.threshold_n[:, second_index]).mean()))
-    margin_n = _compute_critical_range(len(group_names), anova.df_within or 1) * math.sqrt(
+    difference_n = abs(float((study.threshold_n[:, first_column] - study.threshold_n[:, second_column]).mean()))
+    critical_difference_n = _compute_critical_range(len(group_names), anova.df_within or 1) * math.sqrt(
         (anova.mean_square_within or math.inf) / people
     )
     return StudyVerdict(
@@ -106,17 +110,17 @@ def judge_study(
         primary_found=primary_contrast is not None and primary_contrast.p < 1.0 - CONFIDENCE,
         primary_covers=primary_contrast is not None
         and primary_contrast.lower_db <= true_difference_db <= primary_contrast.upper_db,
-        primary_error_db=float((pseudo_thresholds_db[:, first_index] - pseudo_thresholds_db[:, second_index]).mean())
+        primary_error_db=float((pseudo_thresholds_db[:, first_column] - pseudo_thresholds_db[:, second_column]).mean())
         - true_difference_db,
         means_found=means_contrast is not None and means_contrast.p < 1.0 - CONFIDENCE,
-        means_error_db=float((study.threshold_db[:, first_index] - study.threshold_db[:, second_index]).mean())
+        means_error_db=float((study.threshold_db[:, first_column] - study.threshold_db[:, second_column]).mean())
         - true_difference_db,
-        published_found=difference_n > margin_n,
+        published_found=difference_n > critical_difference_n,
     )
 
 
 def find_judged_pair(frequencies_hz: tuple[float, ...], contrast_hz: tuple[float, ...]) -> tuple[float, float]:
-    """Return the pair to test, first minus second: the declared contrast, or without one the highest frequency minus
+    """Choose the pair to test, first minus second: the declared contrast, or without one the highest frequency minus
     the lowest. frequencies_hz: in ascending order."""
     return (contrast_hz[0], contrast_hz[1]) if contrast_hz else (frequencies_hz[-1], frequencies_hz[0])
 
@@ -130,10 +134,10 @@ def compute_true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()
 
 
 @cache
-def _compute_critical_range(groups: int, df: int) -> float:
+def _compute_critical_range(group_count: int, df: int) -> float:
     """Compute the quantile of the studentized range for Tukey's test with groups of equal size. Cached: computing it
     takes as long as simulating a study."""
-    return float(studentized_range.ppf(CONFIDENCE, groups, df))
+    return float(studentized_range.ppf(CONFIDENCE, group_count, df))
 
 
 def summarise_power(verdicts: Sequence[StudyVerdict]) -> PowerPoint:

@@ -19,13 +19,13 @@ from equalizer.laws.kernel import NO_REFERENCE_COUNTS
 from equalizer.signals.signal import FloatArray
 
 SLIP_DEFLECTION_M = 50e-9
-"""z_max (m): deflection at which the bristle slips."""
+"""z_max (m): deflection at which the bristle slips. Chosen far below the resolution of position sensors."""
 BRISTLE_DAMPING = 0.5
-"""Damping of the bristle over sqrt(stiffness * mass), with the mass that it holds: twice the damping ratio."""
+"""Damping of the bristle over sqrt(stiffness * mass), with the mass along the axis: twice the damping ratio. Chosen."""
 MAX_PARTS = 12
 """Maximum number of parts into which a step is divided unless the bristle slips throughout."""
 TRAVEL_PER_PART = 0.3
-"""Intended travel per part, in units of z_max: sets the number of parts."""
+"""Intended travel per part, in units of z_max: sets the number of parts. Chosen."""
 SLIDING_SHARE = 1 - 1e-6
 """Share of the full deflection above which the bristle counts as sliding."""
 MAX_ITERATIONS = 12
@@ -85,11 +85,12 @@ def _solve_bristle_deflection(
 def compute_friction_force(
     forward_level: float, backward_level: float, start_z: float, memory: FloatArray, step_motion: FloatArray
 ) -> float:
-    """Mean friction force (N) over a step, with the level (N) `forward_level` where v > 0 and `backward_level` where
-    v < 0; called by the laws of all effects with dry friction but presliding hysteresis.
+    """Compute the mean friction force (N) over a step, with the level (N) `forward_level` where v > 0 and
+    `backward_level` where v < 0; called by the laws of all effects with dry friction but presliding hysteresis.
 
     start_z: deflection over z_max at the start of the step; step_motion: see `instant`. Writes the deflection at the
     end, over z_max, to `memory[0]` and the force (N) at the end to `step_motion[F_END]`.
+
     """
     level, start_v, per_newton = max(forward_level, backward_level), step_motion[V], step_motion[V_PER_N]
     if level <= 0:
@@ -114,20 +115,20 @@ def compute_friction_force(
     )
     damping = BRISTLE_DAMPING / np.sqrt(dv_per_force)
     travel = abs(v) + 0.5 * abs(free_dv - dv_per_force * start_z)
-    parts = min(MAX_PARTS, 1 + int(min(travel / TRAVEL_PER_PART, MAX_PARTS)))
-    fraction = 1.0 / parts
-    free_travel, compliance = 0.5 * free_dv * fraction**2, 0.5 * dv_per_force * fraction**2
+    part_count = min(MAX_PARTS, 1 + int(min(travel / TRAVEL_PER_PART, MAX_PARTS)))
+    step_fraction = 1.0 / part_count
+    free_travel, compliance = 0.5 * free_dv * step_fraction**2, 0.5 * dv_per_force * step_fraction**2
     z, impulse = start_z, 0.0
     sliding_z_limits = (forward_level / level, backward_level / level)
-    for _ in range(parts):
+    for _ in range(part_count):
         z, force = _solve_bristle_deflection(
-            z, v * fraction + free_travel, compliance, damping * parts, sliding_z_limits
+            z, v * step_fraction + free_travel, compliance, damping * part_count, sliding_z_limits
         )
-        v += (free_dv - dv_per_force * force) * fraction
+        v += (free_dv - dv_per_force * force) * step_fraction
         impulse += force
     z_limit = sliding_z_limits[0] if v > 0 else sliding_z_limits[1]
     memory[0], step_motion[F_END] = z, -level * (z + (damping * (v - abs(v) * z / z_limit) if z_limit > 0 else 0.0))
-    return -level * impulse * fraction
+    return -level * impulse * step_fraction
 
 
 _READ_ONLY_VECTOR = types.Array(types.float64, 1, "A", readonly=True)
@@ -136,9 +137,9 @@ _READ_ONLY_VECTOR = types.Array(types.float64, 1, "A", readonly=True)
 
 @njit(types.float64[::1](_READ_ONLY_VECTOR, types.float64), cache=True)
 def compute_bristle_deflection(position: FloatArray, slip_deflection: float) -> FloatArray:
-    """(n,): deflection over `slip_deflection`, at which the bristle slips, by Dahl's equation dz/dx = 1 - sgn(v) z
-    along a position (n,) in the unit of `slip_deflection`; from 0 at the first sample. For regressions on a measured
-    position, not for a simulation."""
+    """Compute the deflection (n,) over `slip_deflection`, at which the bristle slips, by Dahl's equation dz/dx = 1 -
+    sgn(v) z along a position (n,) in the unit of `slip_deflection`; from 0 at the first sample. For regressions on a
+    measured position, not for a simulation."""
     deflection = np.zeros(position.shape[0])
     for k in range(1, position.shape[0]):
         travel = (position[k] - position[k - 1]) / slip_deflection

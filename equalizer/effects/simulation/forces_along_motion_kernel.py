@@ -46,27 +46,27 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @njit(inline="always")
-def _write_seen_axes(
+def _write_all_axes(
     k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: FloatArray, step_motion: FloatArray
 ) -> None:
-    """Write the motion of all axes into `step_motion`. The effect of one axis's force on the others is contained in
-    their measured motion."""
-    for seen_axis in range(commands.shape[1]):
-        block, own_axis = LENGTH + BLOCK_SIZE * seen_axis, 1.0 if seen_axis == axis else 0.0
-        step_motion[block + AXIS_X], step_motion[block + AXIS_V] = motion[0][k, seen_axis], motion[1][k, seen_axis]
+    """Write motion and command of all axes at step k into `step_motion`. The effect of one axis's force on the others
+    is contained in their measured motion."""
+    for read_axis in range(commands.shape[1]):
+        block, is_own_axis = LENGTH + BLOCK_SIZE * read_axis, 1.0 if read_axis == axis else 0.0
+        step_motion[block + AXIS_X], step_motion[block + AXIS_V] = motion[0][k, read_axis], motion[1][k, read_axis]
         step_motion[block + AXIS_X_END], step_motion[block + AXIS_V_END] = (
-            motion[0][k + 1, seen_axis],
-            motion[1][k + 1, seen_axis],
+            motion[0][k + 1, read_axis],
+            motion[1][k + 1, read_axis],
         )
         step_motion[block + AXIS_X_PER_N], step_motion[block + AXIS_V_PER_N] = (
-            own_axis * per_newton[0, seen_axis],
-            own_axis * per_newton[1, seen_axis],
+            is_own_axis * per_newton[0, read_axis],
+            is_own_axis * per_newton[1, read_axis],
         )
         step_motion[block + AXIS_A], step_motion[block + AXIS_A_PER_N] = (
-            motion[2][k, seen_axis],
-            own_axis * per_newton[2, seen_axis],
+            motion[2][k, read_axis],
+            is_own_axis * per_newton[2, read_axis],
         )
-        step_motion[block + AXIS_COMMAND] = commands[k, seen_axis]
+        step_motion[block + AXIS_COMMAND] = commands[k, read_axis]
 
 
 @njit(
@@ -82,15 +82,16 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
 
     force, on entry: unbalanced force over each step (see `forces_along_motion.compute_effect_forces_along_motion`),
     from which friction at rest follows, because it does not follow from the motion. motion: positions, velocities and
-    accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law reads them. per_newton: (3, m), what 1 N over a
-    step adds to the motion. places: (items, 6) law, axis, begin and end in `parameters`, begin and end in `memory`."""
+    accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law reads them. per_newton: (3, m), position,
+    velocity and acceleration that 1 N over a step adds. places: (items, 6) law, axis, begin and end in `parameters`,
+    begin and end in `memory`. step_s: step in s. The last row of force repeats the row before it."""
     position, velocity, acceleration = motion
-    sees = commands.shape[0] > 0
-    step_motion = np.zeros(LENGTH + BLOCK_SIZE * force.shape[1] if sees else LENGTH)
+    reads_all_axes = commands.shape[0] > 0
+    step_motion = np.zeros(LENGTH + BLOCK_SIZE * force.shape[1] if reads_all_axes else LENGTH)
     step_motion[STEP_S] = step_s
     for k in range(len(position) - 1):
         step_motion[TIME_S] = k * step_s
-        unbalanced = force[k].copy()
+        unbalanced_force = force[k].copy()
         force[k] = 0.0
         for item in range(places.shape[0]):
             axis = places[item, 1]
@@ -100,18 +101,18 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
                 per_newton[1, axis],
                 per_newton[2, axis],
             )
-            step_motion[X_FREE] = position[k + 1, axis] + step_motion[X_PER_N] * unbalanced[axis]
-            step_motion[V_FREE] = velocity[k + 1, axis] + step_motion[V_PER_N] * unbalanced[axis]
-            step_motion[A_FREE] = acceleration[k, axis] + step_motion[A_PER_N] * unbalanced[axis]
+            step_motion[X_FREE] = position[k + 1, axis] + step_motion[X_PER_N] * unbalanced_force[axis]
+            step_motion[V_FREE] = velocity[k + 1, axis] + step_motion[V_PER_N] * unbalanced_force[axis]
+            step_motion[A_FREE] = acceleration[k, axis] + step_motion[A_PER_N] * unbalanced_force[axis]
             step_motion[F_END] = np.nan
-            if sees:
-                _write_seen_axes(k, axis, motion, commands, per_newton, step_motion)
+            if reads_all_axes:
+                _write_all_axes(k, axis, motion, commands, per_newton, step_motion)
                 step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_X_END] = step_motion[X_FREE]
                 step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_V_END] = step_motion[V_FREE]
                 step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_A] = step_motion[A_FREE]
             law_memory = memory[places[item, 4] : places[item, 5]]
-            # The law's force balances a part of the unbalanced force; the next law sees what remains.
+            # The law's force balances a part of the unbalanced force; the next law reads the rest.
             law_force = laws[places[item, 0]](parameters[places[item, 2] : places[item, 3]], law_memory, step_motion)
             force[k, axis] += law_force
-            unbalanced[axis] += law_force
+            unbalanced_force[axis] += law_force
     force[len(position) - 1] = force[len(position) - 2]

@@ -12,7 +12,8 @@ from equalizer.effects.simulation.logger_kernel import interpolate_samples
 from equalizer.signals.signal import FloatArray
 
 FILTER_TAPS, TABLE_PHASES = 32, 256
-"""Length of the interpolation filter in samples, and number of intervals per sample at which it is tabulated."""
+"""Length of the interpolation filter in samples, and number of intervals per sample at which it is tabulated.
+Chosen."""
 KAISER_BETA = 8.0
 """Shape parameter of the Kaiser window: errors below 2e-4 of the amplitude up to 0.42 of the sample rate (tested)."""
 
@@ -20,9 +21,9 @@ KAISER_BETA = 8.0
 def resample_response(
     response: FloatArray, step_samples: float, offset_samples: float, linear_share: float = 0.0
 ) -> FloatArray:
-    """Response (n, p) whose sample k is the given response (n, p) at the time k step_samples + offset_samples, in
-    samples; the first and the last sample are held beyond the ends. linear_share: share (0 to 1) of linear
-    interpolation; the rest is band-limited."""
+    """Resample to a response (n, p) whose sample k is the given response (n, p) at the time k step_samples +
+    offset_samples, in samples; the first and the last sample are held beyond the ends. linear_share: share (0 to 1) of
+    linear interpolation; the rest is band-limited."""
     resampled = np.empty(response.shape)
     interpolate_samples(
         np.ascontiguousarray(response, dtype=np.float64),
@@ -37,8 +38,8 @@ def resample_response(
 
 @cache
 def _tabulate_sinc_weights() -> FloatArray:
-    """(TABLE_PHASES + 1, FILTER_TAPS): windowed sinc for each fraction of a sample from 0 to 1, rows normalised to sum
-    1."""
+    """Tabulate the windowed sinc (TABLE_PHASES + 1, FILTER_TAPS) for each fraction of a sample from 0 to 1, rows
+    normalised to sum 1."""
     fraction = np.arange(TABLE_PHASES + 1) / TABLE_PHASES
     distance_samples = fraction[:, None] - np.arange(1 - FILTER_TAPS // 2, FILTER_TAPS // 2 + 1)
     window = np.i0(KAISER_BETA * np.sqrt(np.maximum(1 - (distance_samples / (FILTER_TAPS / 2)) ** 2, 0))) / np.i0(

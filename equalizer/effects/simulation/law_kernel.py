@@ -37,7 +37,7 @@ SIGNALS_PER_AXIS = 4
 """Signals per driven axis: position, velocity, acceleration, command. The time precedes those of all axes, the
 conditions follow them."""
 FORCE_TOLERANCE = 1e-7
-"""Tolerance of the implicit equation, relative to the forces of its first evaluations."""
+"""Tolerance of the implicit equation, relative to the forces of its first evaluations. Chosen."""
 MAX_ITERATIONS = 60
 """Largest number of iterations of the root search: secant steps and, every second one, bisection where the root is
 bracketed."""
@@ -49,12 +49,12 @@ def _evaluate(
 ) -> float:
     """Evaluate the law: its force (N) at the step's start or end (`phase`), if `force` (N) acted over the step.
     Accelerations are means over the step; with extrapolate = 1 they are extrapolated linearly to its end."""
-    axes, conditions, step_s = (int(parameters[AXIS_COUNT]), int(parameters[CONDITION_COUNT]), step_motion[STEP_S])
-    signal_count = 1 + SIGNALS_PER_AXIS * axes + conditions
+    m, condition_count, step_s = (int(parameters[AXIS_COUNT]), int(parameters[CONDITION_COUNT]), step_motion[STEP_S])
+    signal_count = 1 + SIGNALS_PER_AXIS * m + condition_count
     signals = memory[STACK_SIZE : STACK_SIZE + signal_count]
     time_s = step_motion[TIME_S] + (step_s if phase == END else 0.0)
     signals[0] = time_s
-    for axis in range(axes):
+    for axis in range(m):
         block, first = LENGTH + BLOCK_SIZE * axis, 1 + SIGNALS_PER_AXIS * axis
         v, v_end = (
             step_motion[block + AXIS_V],
@@ -70,28 +70,28 @@ def _evaluate(
             )
         signals[first + 3] = step_motion[block + AXIS_COMMAND]
     sample_count = int(parameters[SAMPLE_COUNT])
-    if conditions > 0:
+    if condition_count > 0:
         # Sampled at the middle of the step, which lies in the right sample even when the ends are rounded.
-        sample = max(
+        condition_sample = max(
             min(int((step_motion[TIME_S] + 0.5 * step_s) * parameters[CONDITION_RATE_HZ]), sample_count - 1), 0
         )
-        for condition in range(conditions):
-            signals[signal_count - conditions + condition] = parameters[
-                CONDITION_VALUES + sample * conditions + condition
+        for condition in range(condition_count):
+            signals[signal_count - condition_count + condition] = parameters[
+                CONDITION_VALUES + condition_sample * condition_count + condition
             ]
-    program = parameters[CONDITION_VALUES + sample_count * conditions :]
+    program = parameters[CONDITION_VALUES + sample_count * condition_count :]
     return float(
         run_program(program, signals, memory[STACK_SIZE + signal_count :], memory[:STACK_SIZE], phase, time_s, step_s)
     )
 
 
 @njit(inline="always")
-def _compute_end_weight(start: float, first_end: float, second_end: float) -> float:
+def _compute_end_weight(start_force: float, first_end: float, second_end: float) -> float:
     """Compute the weight w of the step's end: (1 + s) / 2, limited to 1/2 to 1, with the slope s = -dF_end/dF as a
-    difference quotient. first_end: force at the end if `start`, that at the start, acted; second_end: if `first_end`
+    difference quotient. first_end: force (N) at the end if `start_force` acted; second_end: that if `first_end`
     acted."""
-    change = first_end - start
-    slope = (first_end - second_end) / change if change != 0.0 else 0.0
+    force_change = first_end - start_force
+    slope = (first_end - second_end) / force_change if force_change != 0.0 else 0.0
     return min(0.5 * (1.0 + max(slope, 0.0)), 1.0)
 
 
@@ -102,18 +102,19 @@ def compute_law_force(parameters: FloatArray, memory: FloatArray, step_motion: F
 
     parameters: in the order of `AXIS_COUNT` to `CONDITION_VALUES`, then the conditions' samples and the program.
     memory: stack, signals, and the operators' memory, which is advanced to the step's end. step_motion: see `instant`;
-    F_END is written. In the code, w is the weight of the step's end, and an inertial law reads an acceleration.
+    F_END is written. w, f_start, f_end: as in the equation of the module; low, high: forces that bracket the root or
+    the last two of the secant method. An inertial law is one that reads an acceleration.
     """
     is_inertial = parameters[READS_ACCELERATION] != 0.0
-    start = low = _evaluate(parameters, memory, step_motion, START, 0.0, 0.0)
-    conditions = int(parameters[CONDITION_COUNT])
-    operator_memory = memory[STACK_SIZE + 1 + SIGNALS_PER_AXIS * int(parameters[AXIS_COUNT]) + conditions :]
+    f_start = low = _evaluate(parameters, memory, step_motion, START, 0.0, 0.0)
+    condition_count = int(parameters[CONDITION_COUNT])
+    operator_memory = memory[STACK_SIZE + 1 + SIGNALS_PER_AXIS * int(parameters[AXIS_COUNT]) + condition_count :]
     operator_memory[0] = STARTED
-    end = first_end = high = _evaluate(parameters, memory, step_motion, END, low, 0.0)
+    f_end = first_end = high = _evaluate(parameters, memory, step_motion, END, low, 0.0)
     second_end = _evaluate(parameters, memory, step_motion, END, high, 0.0)
-    w = 1.0 if is_inertial else _compute_end_weight(start, first_end, second_end)
-    low_residual, high_residual = low - (1 - w) * start - w * first_end, high - (1 - w) * start - w * second_end
-    tolerance, force = FORCE_TOLERANCE * (abs(start) + abs(first_end) + abs(second_end)), high
+    w = 1.0 if is_inertial else _compute_end_weight(f_start, first_end, second_end)
+    low_residual, high_residual = (low - (1 - w) * f_start - w * first_end, high - (1 - w) * f_start - w * second_end)
+    tolerance, force = FORCE_TOLERANCE * (abs(f_start) + abs(first_end) + abs(second_end)), high
     # Every second step bisects if the root is bracketed; the others are secant steps.
     for iteration in range(MAX_ITERATIONS):
         residual_change = high_residual - low_residual
@@ -122,8 +123,8 @@ def compute_law_force(parameters: FloatArray, memory: FloatArray, step_motion: F
             force = 0.5 * (low + high)
         else:
             force = high - high_residual * (high - low) / residual_change if residual_change != 0.0 else high
-        end = _evaluate(parameters, memory, step_motion, END, force, 0.0)
-        residual = force - (1 - w) * start - w * end
+        f_end = _evaluate(parameters, memory, step_motion, END, force, 0.0)
+        residual = force - (1 - w) * f_start - w * f_end
         if not abs(residual) > tolerance or abs(high - low) <= 1e-2 * tolerance:
             break
         if is_bracketed and (residual < 0) == (low_residual < 0):
@@ -134,10 +135,10 @@ def compute_law_force(parameters: FloatArray, memory: FloatArray, step_motion: F
             high, high_residual = force, residual
     # While sticking, the end's force lies between those of the two sliding directions: solved for, not evaluated.
     step_motion[F_END] = (
-        _evaluate(parameters, memory, step_motion, END, force, 1.0) if is_inertial else (force - (1 - w) * start) / w
+        _evaluate(parameters, memory, step_motion, END, force, 1.0) if is_inertial else (force - (1 - w) * f_start) / w
     )
     commit_step(
-        parameters[CONDITION_VALUES + int(parameters[SAMPLE_COUNT]) * conditions :],
+        parameters[CONDITION_VALUES + int(parameters[SAMPLE_COUNT]) * condition_count :],
         operator_memory,
         step_motion[TIME_S] + step_motion[STEP_S],
     )

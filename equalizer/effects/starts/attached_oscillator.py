@@ -23,11 +23,11 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import estimate_cross_density, estimate_spectral_density
 
 WINDOW_S = 2.0
-"""Window of the spectra (s): lines 0.5 Hz apart."""
+"""Window of the spectra (s): lines 0.5 Hz apart. Chosen."""
 LEAST_POWER_SHARE = 1e-4
-"""Least power of a line that is used, relative to the largest line. By hand."""
+"""Least power of a line that is used, relative to the largest line. Chosen."""
 CHANCE_SHARE = 0.02
-"""Share of the missing force's power that the best of all trials explains by chance. By hand."""
+"""Share of the missing force's power that the best of all trials explains by chance. Chosen."""
 RANK_TOLERANCE = 1e-9
 """Relative singular value, or norm, below which vectors count as linearly dependent (rounding)."""
 
@@ -35,7 +35,7 @@ RANK_TOLERANCE = 1e-9
 def with_oscillator(
     model: MechanicalModel, direction: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
-    """Return the model with an oscillator as its last coordinate; unchanged for mass 0 or below.
+    """Add an oscillator to the model as its last coordinate; the model is unchanged for a mass of 0 or below.
 
     direction: (n,), direction in the model's coordinates along which it is attached. mass (kg), damping (N s/m),
     stiffness (N/m): of the oscillator.
@@ -70,10 +70,10 @@ class MissingForceSpectra:
 def estimate_missing_force_spectra(evidence: Evidence, axis: int) -> MissingForceSpectra:
     """Estimate the Welch spectra of the acceleration of an axis and of the missing force at all axes, at the lines
     below 0.45 of the sample rate where the acceleration has more than `LEAST_POWER_SHARE` of its largest power."""
-    sample_rate_hz, used = evidence.sample_rate_hz, evidence.used[:, None]
-    acceleration = np.gradient(evidence.axis_velocity, 1 / sample_rate_hz, axis=0) * used
-    window_samples = min(int(WINDOW_S * sample_rate_hz), len(used))
-    axis_acceleration, force = acceleration[:, axis], (evidence.axis_force * used).T
+    sample_rate_hz, is_used = evidence.sample_rate_hz, evidence.used[:, None]
+    acceleration = np.gradient(evidence.axis_velocity, 1 / sample_rate_hz, axis=0) * is_used
+    window_samples = min(int(WINDOW_S * sample_rate_hz), len(is_used))
+    axis_acceleration, force = acceleration[:, axis], (evidence.axis_force * is_used).T
     frequency_hz, power = estimate_spectral_density(axis_acceleration, sample_rate_hz, window_samples)
     cross = np.array(
         [
@@ -81,8 +81,10 @@ def estimate_missing_force_spectra(evidence: Evidence, axis: int) -> MissingForc
             for axis_force in force
         ]
     ).T
-    selected = (frequency_hz > 0) & (frequency_hz < 0.45 * sample_rate_hz) & (power > LEAST_POWER_SHARE * power.max())
-    return MissingForceSpectra(frequency_hz[selected], power[selected], cross[selected])
+    is_selected = (
+        (frequency_hz > 0) & (frequency_hz < 0.45 * sample_rate_hz) & (power > LEAST_POWER_SHARE * power.max())
+    )
+    return MissingForceSpectra(frequency_hz[is_selected], power[is_selected], cross[is_selected])
 
 
 def compute_unit_reaction(
@@ -111,7 +113,7 @@ class AttachedOscillator:
 
 
 def _compute_orthonormal_basis(columns: FloatArray) -> FloatArray:
-    """Compute an orthonormal basis of the columns' span."""
+    """Compute an orthonormal basis (n, rank) of the span of columns (n, k)."""
     left_vectors, singular_values, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
     return np.asarray(left_vectors[:, singular_values > RANK_TOLERANCE * singular_values[0]])
 
@@ -133,27 +135,27 @@ def find_likely_oscillators(
     force = missing.cross / weight[:, None]
     target = np.vstack([force.real, force.imag])
     basis = _compute_orthonormal_basis(np.vstack([linear_terms.real, linear_terms.imag]))
-    unexplained = target - basis @ (basis.T @ target)
-    unexplained_power = max(float(unexplained[:, axis] @ unexplained[:, axis]), np.finfo(float).tiny)
+    unexplained_force = target - basis @ (basis.T @ target)
+    unexplained_power = max(float(unexplained_force[:, axis] @ unexplained_force[:, axis]), np.finfo(float).tiny)
     trials_hz = np.array([trial_hz for trial_hz in natural_hz if trial_hz < missing.frequency_hz[-1]])
     oscillators = []
     for damping_ratio in damping_ratios:
-        shape = compute_unit_reaction(missing.frequency_hz[:, None], trials_hz, damping_ratio) * weight[:, None]
-        shapes = np.vstack([shape.real, shape.imag])
-        # Projected orthogonally to the linear terms (Frisch-Waugh): each shape can then be fitted by itself.
-        projected = shapes - basis @ (basis.T @ shapes)
+        spectrum = compute_unit_reaction(missing.frequency_hz[:, None], trials_hz, damping_ratio) * weight[:, None]
+        spectra = np.vstack([spectrum.real, spectrum.imag])
+        # Projected orthogonally to the linear terms (Frisch-Waugh): each trial can then be fitted by itself.
+        projected = spectra - basis @ (basis.T @ spectra)
         square_norms = np.einsum("lt,lt->t", projected, projected)
-        independent = square_norms > RANK_TOLERANCE**2 * np.einsum("lt,lt->t", shapes, shapes)
-        reactions = projected[:, independent].T @ unexplained
+        is_independent = square_norms > RANK_TOLERANCE**2 * np.einsum("lt,lt->t", spectra, spectra)
+        reactions = projected[:, is_independent].T @ unexplained_force
         for frequency_hz, reaction, square_norm in zip(
-            trials_hz[independent].tolist(), reactions, square_norms[independent].tolist(), strict=True
+            trials_hz[is_independent].tolist(), reactions, square_norms[is_independent].tolist(), strict=True
         ):
             if reaction[axis] > 0:
-                explained = float(reaction[axis]) ** 2 / square_norm / unexplained_power
+                explained_share = float(reaction[axis]) ** 2 / square_norm / unexplained_power
                 by_axis = reaction / reaction[axis]
                 oscillators.append(
                     AttachedOscillator(
-                        frequency_hz, damping_ratio, float(reaction[axis]) / square_norm, explained, by_axis
+                        frequency_hz, damping_ratio, float(reaction[axis]) / square_norm, explained_share, by_axis
                     )
                 )
     return sorted(
@@ -163,7 +165,7 @@ def find_likely_oscillators(
 
 
 def subtract_oscillator(missing: MissingForceSpectra, oscillator: AttachedOscillator) -> MissingForceSpectra:
-    """Subtract the force of an oscillator from the missing force; returns the remaining spectra."""
+    """Subtract the force of an oscillator from the missing force at all axes; returns the remaining spectra."""
     unit_reaction = compute_unit_reaction(missing.frequency_hz, oscillator.natural_hz, oscillator.damping_ratio)
     axis_reaction = missing.power * oscillator.mass * unit_reaction
     return MissingForceSpectra(

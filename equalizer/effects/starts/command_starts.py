@@ -15,11 +15,11 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_EXPLAINED_SHARE = 1e-3
-"""Least share of the missing force's sum of squares that a value must explain to become a starting value."""
+"""Least share of the missing force's sum of squares that a value must explain to become a starting value. Chosen."""
 DELAYS_SAMPLES = (0, 1)
-"""Delays of the effect's force that are tried, in samples."""
+"""Delays of the effect's force against the missing force that are tried, in samples."""
 LOG_TOLERANCE = 3e-3
-"""Relative tolerance of the parameter in the golden-section search."""
+"""Relative tolerance of the parameter in the golden-section search. Chosen."""
 GOLDEN_SHARE = (5**0.5 - 1) / 2
 """Golden ratio less 1: the factor by which golden-section search shrinks its interval."""
 
@@ -41,18 +41,19 @@ def find_command_parameter(
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
     step_s = 1 / evidence.sample_rate_hz
     forces = [_compute_force_and_basis(evidence, axis, project_out_motion) for axis in axes]
-    used = np.flatnonzero(evidence.used > 0)
+    used_indices = np.flatnonzero(evidence.used > 0)
 
     def compute_misfit_sum(value: float) -> float:
         """Compute the sum over the axes of the missing force that a value leaves, at the better of the delays."""
-        total = 0.0
+        misfit_sum = 0.0
         for axis, (force, basis) in zip(axes, forces, strict=True):
             commanded = evidence.command[:, axis]
             change_of_force = change(commanded, step_s, value) - commanded
-            total += min(
-                _compute_misfit(force - np.roll(change_of_force, shift)[used], basis) for shift in DELAYS_SAMPLES
+            misfit_sum += min(
+                _compute_misfit(force - np.roll(change_of_force, shift)[used_indices], basis)
+                for shift in DELAYS_SAMPLES
             )
-        return total
+        return misfit_sum
 
     if not len(grid):
         return None
@@ -65,14 +66,14 @@ def find_command_parameter(
 
 
 def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
-    """Fit (square, reference in N) of `force_nonlinearity.square_law_force` by regression of the missing force on u and
+    """Fit (square, reference in N) of `force_nonlinearity.apply_square_law` by regression of the missing force on u and
     u |u|; None where the quadratic term explains too little, the force at the strongest command is not positive, or
     |square| exceeds 1. Coefficients are averaged over the axes of the site."""
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
-    used, linear_gains, square_gains, explained_share = np.flatnonzero(evidence.used > 0), [], [], 0.0
+    used_indices, linear_gains, square_gains, explained_share = np.flatnonzero(evidence.used > 0), [], [], 0.0
     for axis in axes:
         force, basis = _compute_force_and_basis(evidence, axis, True)
-        u = evidence.command[used, axis]
+        u = evidence.command[used_indices, axis]
         regressors = np.column_stack([u, u * np.abs(u)])
         regressors -= basis @ (basis.T @ regressors)
         force = force - basis @ (basis.T @ force)
@@ -92,8 +93,8 @@ def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
     gain_at_peak = mean_linear_gain + mean_square_gain * strongest_command
     if explained_share < LEAST_EXPLAINED_SHARE or gain_at_peak <= 0:
         return None
-    # Force and command agree at the reference. If that lies outside the range of commands, the gain is wrong as well;
-    # the peak command is then the reference.
+    # Force and command agree at the reference. If that is not positive or ten times the strongest command or more, the
+    # gain is wrong as well; the strongest command is then the reference.
     equal_command = (1 - mean_linear_gain) / mean_square_gain if mean_square_gain else 0.0
     square_share, reference = (
         (1 - mean_linear_gain, equal_command)
@@ -145,11 +146,11 @@ def make_force_level_grid(evidence: Evidence, site: int, count: int = 12) -> lis
 def _compute_force_and_basis(evidence: Evidence, axis: int, project_out_motion: bool) -> tuple[FloatArray, FloatArray]:
     """Compute the missing force (k,) where samples count, and an orthonormal basis (k, columns) of position, velocity
     and acceleration; without columns unless project_out_motion."""
-    used, velocity = evidence.used > 0, evidence.axis_velocity[:, axis]
-    force = evidence.axis_force[used, axis]
+    is_used, velocity = evidence.used > 0, evidence.axis_velocity[:, axis]
+    force = evidence.axis_force[is_used, axis]
     if not project_out_motion:
         return force, np.zeros((len(force), 0))
-    motion = np.column_stack([evidence.axis_position[:, axis], velocity, np.gradient(velocity)])[used]
+    motion = np.column_stack([evidence.axis_position[:, axis], velocity, np.gradient(velocity)])[is_used]
     return force, np.linalg.qr(motion / np.maximum(np.linalg.norm(motion, axis=0), np.finfo(float).tiny))[0]
 
 

@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray
 LATTICE_TOLERANCE = 0.02
 """Largest deviation of a value from the lattice, in steps. Rounding to single precision causes less."""
 LEAST_LATTICE_SHARE = 0.999
-"""Share of the values above which they count as lying on a lattice."""
+"""Share of the values above which they count as lying on a lattice. Chosen, as are the limits below."""
 LEAST_POINTS, LARGEST_POINT_RATIO = 3, 0.2
 """Least number of occupied lattice points, and the largest, relative to the number of samples."""
 LEAST_PEAK_RATIO = 12.0
@@ -34,12 +34,13 @@ def find_lattice_offset(values: FloatArray, step: float) -> float | None:
 
 
 def find_lattice_step(values: FloatArray) -> float | None:
-    """Find the step of the lattice that holds nearly all values (n,): the median of the smallest gaps between distinct
-    values, refined; None without a lattice."""
+    """Find the step of the lattice on which nearly all values (n,) lie: the median of the gaps between distinct values
+    below 1.5 times the smallest, refined; None without a lattice."""
     distinct_values = np.unique(values)
     if len(distinct_values) < LEAST_POINTS:
         return None
-    # In single precision several neighbouring values stand for one lattice point.
+    # In single precision several neighbouring values belong to one lattice point: gaps below 1e-5 of the mean gap do
+    # not count.
     gaps = np.diff(distinct_values)
     gaps = gaps[gaps > 1e-5 * float(np.ptp(distinct_values)) / max(len(distinct_values), 1)]
     if not len(gaps):
@@ -48,7 +49,7 @@ def find_lattice_step(values: FloatArray) -> float | None:
     lattice_points = np.unique(np.round((distinct_values - distinct_values[0]) / step))
     if not LEAST_POINTS <= len(lattice_points) <= LARGEST_POINT_RATIO * len(values):
         return None
-    # The error of the step accumulates over the range, so that it is refined over the whole range.
+    # An error of the step accumulates over the range: fit value over index, then again with the corrected indices.
     lattice_indices = np.round((distinct_values - distinct_values[0]) / step)
     for _ in range(2):
         step = float(np.polyfit(lattice_indices, distinct_values, 1)[0])
@@ -75,23 +76,25 @@ def find_step_under_noise(values: FloatArray, noise: float) -> float | None:
     values."""
     value_range = float(np.ptp(values))
     bin_count = int(value_range / (BIN_NOISE_RATIO * noise)) if noise > 0 else 0
-    # Too few bins hold no ripple; too many need too much memory.
+    # With fewer bins no ripple can be told from the distribution; more need too much memory. Chosen.
     if not 64 <= bin_count <= 4_000_000:
         return None
     counts, edges = np.histogram(values, bins=bin_count)
     bin_width = float(edges[1] - edges[0])
+    # Zero padding interpolates the spectrum eightfold, which locates the peak.
     padded_length = 8 * len(counts)
     spectrum = np.abs(np.fft.rfft(counts, padded_length)) / np.sqrt(len(values))
     ripple_frequency = np.fft.rfftfreq(padded_length, bin_width)
-    # Slow components belong to the distribution of the response; noise smooths ripples shorter than about 3 times its
-    # rms.
-    in_band = (ripple_frequency > 10 / value_range) & (ripple_frequency < 0.3 / noise)
-    if not in_band.any():
+    # Up to 10 cycles over the range belong to the distribution of the response; noise smooths ripples shorter than
+    # about 3 times its rms.
+    is_in_band = (ripple_frequency > 10 / value_range) & (ripple_frequency < 0.3 / noise)
+    if not is_in_band.any():
         return None
-    peak_line = int(np.flatnonzero(in_band)[np.argmax(spectrum[in_band])])
+    peak_line = int(np.flatnonzero(is_in_band)[np.argmax(spectrum[is_in_band])])
+    # Lines around the peak, in cycles over the range: within 20, but not within 2, which belong to the peak itself.
     is_neighbour = (
         (np.abs(ripple_frequency - ripple_frequency[peak_line]) < 20 / value_range)
-        & in_band
+        & is_in_band
         & (np.abs(ripple_frequency - ripple_frequency[peak_line]) > 2 / value_range)
     )
     if not is_neighbour.any() or spectrum[peak_line] < LEAST_PEAK_RATIO * float(np.median(spectrum[is_neighbour])):

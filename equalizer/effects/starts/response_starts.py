@@ -16,10 +16,10 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_IMPROVEMENT = 1e-3
-"""Least relative reduction of the sum of squares for a value to become a starting value."""
+"""Least relative reduction of the sum of squares for a value to become a starting value. Chosen."""
 
 REFINEMENT_STEPS = 3
-"""Gauss-Newton steps that refine a time shift."""
+"""Number of Gauss-Newton steps that refine a time shift. Chosen."""
 
 
 def list_site_channels(evidence: Evidence, site: int) -> tuple[int, ...]:
@@ -37,12 +37,12 @@ def find_response_parameter(
     grid search, refined by golden section. change: maps samples (n, channels) and a value to changed samples. grid:
     positive values in ascending order, at least one. None where no value improves the fit by `LEAST_IMPROVEMENT`."""
     channels = list(list_site_channels(evidence, site))
-    used, noise = evidence.used > 0, evidence.noise[channels]
+    is_used, noise = evidence.used > 0, evidence.noise[channels]
     measured, predicted = evidence.response[:, channels], evidence.predicted[:, channels]
 
     def compute_misfit(changed_response: FloatArray) -> float:
         """Compute the sum of squares of the residual over the noise."""
-        return float(np.sum((((measured - changed_response) / noise) ** 2)[used]))
+        return float(np.sum((((measured - changed_response) / noise) ** 2)[is_used]))
 
     best_value, misfit = minimise_on_grid(lambda value: compute_misfit(change(predicted, value)), grid)
     return best_value if misfit < (1 - LEAST_IMPROVEMENT) * compute_misfit(predicted) else None
@@ -84,13 +84,13 @@ def fit_coefficients(residual: FloatArray, basis: FloatArray, used: FloatArray) 
     return np.asarray(coefficients / column_norms, dtype=np.float64)
 
 
-def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag: int) -> float:
+def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag_samples: int) -> float:
     """Estimate the number of samples by which the measured response (n, p) lags the predicted one, from the peak of the
     normalised cross-correlation, summed over channels. At most `largest_lag` samples either way; not refined at that
     limit."""
-    largest_lag = min(largest_lag, len(measured) - 1)
-    padded_length = next_fast_len(len(measured) + largest_lag, True)
-    correlation_sum: FloatArray = np.zeros(2 * largest_lag + 1)
+    largest_lag_samples = min(largest_lag_samples, len(measured) - 1)
+    padded_length = next_fast_len(len(measured) + largest_lag_samples, True)
+    correlation_sum: FloatArray = np.zeros(2 * largest_lag_samples + 1)
     for measured_channel, predicted_channel in zip(measured.T, predicted.T, strict=True):
         norm_product = float(np.linalg.norm(predicted_channel) * np.linalg.norm(measured_channel))
         if norm_product > 0:
@@ -99,21 +99,23 @@ def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag: int) 
             )
             correlation_sum = (
                 correlation_sum
-                + np.concatenate([correlation[padded_length - largest_lag :], correlation[: largest_lag + 1]])
+                + np.concatenate(
+                    [correlation[padded_length - largest_lag_samples :], correlation[: largest_lag_samples + 1]]
+                )
                 / norm_product
             )
-    lag = int(np.argmax(correlation_sum)) - largest_lag
-    return float(lag) if abs(lag) == largest_lag else _refine_lag(measured, predicted, float(lag))
+    lag = int(np.argmax(correlation_sum)) - largest_lag_samples
+    return float(lag) if abs(lag) == largest_lag_samples else _refine_lag(measured, predicted, float(lag))
 
 
-def _refine_lag(measured: FloatArray, predicted: FloatArray, lag: float) -> float:
+def _refine_lag(measured: FloatArray, predicted: FloatArray, lag_samples: float) -> float:
     """Refine a time shift (samples) by Gauss-Newton steps to a fraction of a sample, without the bias of an
     interpolated correlation peak."""
     for _ in range(REFINEMENT_STEPS):
-        shifted = resample_response(predicted, 1.0, -lag)
+        shifted = resample_response(predicted, 1.0, -lag_samples)
         slope = np.gradient(shifted, axis=0)
         slope_power = float(np.sum(slope**2))
         if slope_power == 0:
             break
-        lag -= float(np.clip(np.sum((measured - shifted) * slope) / slope_power, -1.0, 1.0))
-    return lag
+        lag_samples -= float(np.clip(np.sum((measured - shifted) * slope) / slope_power, -1.0, 1.0))
+    return lag_samples

@@ -16,7 +16,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SLIDING_SPEED = 0.02
-"""Speed, relative to the rms velocity, below which the direction of sliding is not known. Heuristic."""
+"""Speed, relative to the rms velocity, below which the direction of sliding is not known. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,7 @@ class PartialRegression:
 
     def __init__(self, force: FloatArray, nuisances: FloatArray) -> None:
         """Project the nuisance regressors out of the force. force: (n,); nuisances: (n, k), which may be linearly
-        dependent."""
+        dependent: directions with singular values up to 1e-9 of the largest are dropped."""
         scale = np.linalg.norm(nuisances, axis=0)
         left_vectors, singular_values, _ = np.linalg.svd(
             nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False
@@ -94,7 +94,7 @@ class PartialRegression:
 
     def fit(self, *laws: FloatArray) -> LawFit:
         """Fit laws to the force by least squares, with the nuisance regressors projected out of both. laws: (n,) each,
-        evaluated with strength 1."""
+        evaluated with strength 1, one at least."""
         regressors = self._project_out(np.column_stack(laws))
         norms = np.linalg.norm(regressors, axis=0)
         regressors = regressors / np.where(norms > 0, norms, 1.0)

@@ -1,8 +1,8 @@
 """Coupling onset: the frequency from which driving one axis moves the others, by a stated rule, with its interval.
 
 Rule: the lowest frequency at which the worst coupling of the smoothed response, averaged over a twelfth of an octave,
-passes a quarter (-12 dB). A single line above is noise; a resonance like the published one near 11 Hz, which couples
-over an eighth of an octave, is what the rule is to find. The average is used rather than "stays above for n lines":
+passes a quarter (-12 dB). A single line above it is noise; a resonance like the published one near 11 Hz, which couples
+over an eighth of an octave, must be found. The average is used rather than "stays above for n lines":
 noise interrupts a run of lines, which put the onset 0.1 to 0.3 Hz too high in trials. Called by
 `study.workflows.equalizer.report_identification` and by the reproduction of the paper.
 """
@@ -18,7 +18,8 @@ from equalizer.identification.frequency_response.local_polynomial import LocalPo
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _HIGHEST_RESAMPLED_RATIO = 1.5
-"""Frequency up to which the resampled curves are computed, relative to the onset."""
+"""Frequency up to which the resampled curves are computed, relative to the onset. Chosen: a drawn onset above it counts
+as the highest frequency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +31,9 @@ class OnsetRule:
     octaves: float = 1 / 12
     """Width of the running average, in octaves."""
     neighbours: int = 8
-    """Number of lines on either side that the smoothing uses."""
+    """Number of lines on either side that the smoothing (a local polynomial of degree 2) uses. Chosen."""
     draws: int = 200
-    """Number of draws of the bootstrap."""
+    """Number of draws of the bootstrap. Chosen."""
     seed: int = 1
     """Random seed of the bootstrap."""
 
@@ -111,9 +112,9 @@ def _mark_lines_above_noise(
     """Mark the lines (lines,) at which the smoothed noise is below a quarter of the threshold; elsewhere noise alone
     may pass it. Unknown noise counts as none."""
     noise_sd = np.sqrt(np.nan_to_num(smoother.propagate_variance(lines.noise_variance)))
-    on_axis = np.maximum(np.einsum("lii->li", np.abs(smoothed_response)), np.finfo(np.float64).tiny)
-    above_noise: BoolArray = (np.linalg.norm(noise_sd, axis=1) / on_axis).max(axis=1) < rule.threshold / 4
-    return above_noise
+    on_axis_gain = np.maximum(np.einsum("lii->li", np.abs(smoothed_response)), np.finfo(np.float64).tiny)
+    is_above_noise: BoolArray = (np.linalg.norm(noise_sd, axis=1) / on_axis_gain).max(axis=1) < rule.threshold / 4
+    return is_above_noise
 
 
 def _find_onset(frequency_hz: FloatArray, coupling: FloatArray, rule: OnsetRule) -> float | None:
@@ -157,11 +158,11 @@ def _bootstrap_onsets(
     """Draw onsets (draws,), in Hz, of a parametric bootstrap: noise of the measured variance is added to the smoothed
     curve. A curve without an onset counts as its highest frequency."""
     smoother = LocalPolynomial.from_response(lines, rule.neighbours, 2)
-    part_sd = np.sqrt(lines.noise_variance / 2)
+    component_sd = np.sqrt(lines.noise_variance / 2)
     generator = np.random.default_rng(rule.seed)
     onsets_hz = []
     for _ in range(rule.draws):
-        noise = generator.standard_normal((2, *part_sd.shape)) * part_sd
+        noise = generator.standard_normal((2, *component_sd.shape)) * component_sd
         noisy_response = smoothed_response + smoother.apply(noise[0] + 1j * noise[1])
         onset_hz = _find_onset(
             lines.frequency_hz[is_above_noise], compute_worst_coupling(noisy_response[is_above_noise]), rule

@@ -28,7 +28,7 @@ class Experiment:
     """Spectra (rfft / length) of an excitation's periods, or of a single window."""
 
     length: int
-    """Samples of one period: line k (from 1 on) lies at k rate / length."""
+    """Number of samples of one period: line k (from 1 on) lies at k rate / length."""
     command: ComplexArray
     """(periods, lines, inputs)"""
     response: ComplexArray
@@ -70,13 +70,14 @@ class ExperimentSet:
 
 
 def select_instrument_signal(recording: Recording) -> FloatArray:
-    """(n, inputs): the instrument of the estimate, which is the excitation where it was recorded, else the command."""
+    """Select the instrument (n, inputs) of the estimate, which is the excitation where it was recorded, else the
+    command."""
     return (recording.command if recording.excitation is None else recording.excitation).samples
 
 
 def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
-    """Whole periods of every periodic broadband segment without the role "test". The first period counts only if there
-    is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced
+    """Collect the whole periods of every periodic broadband segment without the role "test". The first period counts
+    only if there is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced
     (`replaced_share`). Periods with missing samples and periods of less than four samples are left out."""
     experiments: list[Experiment] = []
     single_period_segments, missing_periods = 0, 0
@@ -113,8 +114,8 @@ def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentS
 
 
 def collect_window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
-    """Hann windows of window_s seconds (at least 8 samples), overlapping by half, over all driven segments without the
-    role "test" or, without segments, the whole recording. Windows with missing samples are left out."""
+    """Collect Hann windows of window_s seconds (at least 8 samples), overlapping by half, over all driven segments
+    without the role "test" or, without segments, the whole recording. Windows with missing samples are left out."""
     experiments: list[Experiment] = []
     for recording in recordings:
         length = max(8, round(window_s * recording.sample_rate_hz))
@@ -130,7 +131,7 @@ def collect_window_experiments(recordings: Sequence[Recording], window_s: float)
 
 
 def _select_driven_segments(recording: Recording) -> list[Segment]:
-    """Driven segments without the role "test"; the whole recording as one segment where none are stated."""
+    """Select the driven segments without the role "test"; the whole recording as one segment where none are stated."""
     if not recording.segments:
         return [Segment(0, len(recording), "noise")]
     return [segment for segment in recording.segments if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
@@ -148,6 +149,7 @@ def _make_experiment(recording: Recording, starts: Sequence[int], length: int, w
     1."""
 
     def compute_spectra(samples: FloatArray) -> ComplexArray:
+        """Compute the spectra (periods, lines, channels) of all periods of samples (n, channels)."""
         periods = np.stack([samples[start : start + length] for start in starts])
         return compute_line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])
 
@@ -167,6 +169,7 @@ def _add_first_period(
     of its start; period_starts: starts of the other periods."""
 
     def compute_spectra(samples: FloatArray) -> ComplexArray:
+        """Compute the spectrum (1, lines, channels) of the completed first period of samples (n, channels)."""
         period = samples[first_start : first_start + experiment.length].copy()
         period[:transient_samples] = np.mean(
             [samples[start : start + transient_samples] for start in period_starts], axis=0

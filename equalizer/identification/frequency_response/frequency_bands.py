@@ -3,7 +3,7 @@
 After figure 1 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices. Two frequencies divide
 the range: the onset of coupling, above which a force along one axis also moves others, and the limit of direction
 perception, above which people hardly perceive the direction of a vibration. Called by the reports of identification
-and of the reproduction.
+and of the reproduction of that paper, and drawn by `analysis.figures.frequency_bands`.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,16 @@ PUBLISHED_DIRECTION_LIMIT_HZ = 35.0
 
 @dataclass(frozen=True, slots=True)
 class FrequencyBand:
-    """A frequency band with the control method that suits it, and the reason (`why`) as a sentence."""
+    """A frequency band, the control method that suits it, and the reason for that method."""
 
     name: str
     """"low", "middle" or "high"."""
     low_hz: float
     high_hz: float
     method: str
-    why: str
+    """Control method, as a phrase for reports."""
+    reason: str
+    """Reason for the method, as a sentence."""
 
 
 def compute_frequency_bands(
@@ -30,9 +32,10 @@ def compute_frequency_bands(
     lowest_hz: float = 1.0,
     highest_hz: float = 500.0,
 ) -> tuple[FrequencyBand, ...]:
-    """Bands in ascending order, from lowest_hz to highest_hz. coupling_onset_hz: None = no coupling was found. There is
-    no middle band where the onset is None or not below direction_limit_hz, and no low band where it is not above
-    lowest_hz. Raises ValueError for a limit that is not between lowest_hz and highest_hz."""
+    """Bands in ascending order, from lowest_hz to highest_hz (defaults chosen). coupling_onset_hz: None = no coupling
+    was found. There is no middle band where the onset is None or not below direction_limit_hz, and no low band where
+    the onset is not above lowest_hz. Raises ValueError where direction_limit_hz is not between lowest_hz and
+    highest_hz."""
     if not lowest_hz < direction_limit_hz < highest_hz:
         raise ValueError(
             f"direction_limit_hz is {direction_limit_hz:g}; it must lie between {lowest_hz:g} and {highest_hz:g} Hz"
@@ -40,9 +43,9 @@ def compute_frequency_bands(
     onset_hz = direction_limit_hz if coupling_onset_hz is None else min(coupling_onset_hz, direction_limit_hz)
     edges_hz = (lowest_hz, max(onset_hz, lowest_hz), direction_limit_hz, highest_hz)
     return tuple(
-        FrequencyBand(name, low, high, method, why)
-        for (name, method, why), low, high in zip(_METHODS, edges_hz[:-1], edges_hz[1:], strict=True)
-        if low < high
+        FrequencyBand(name, low_hz, high_hz, method, reason)
+        for (name, method, reason), low_hz, high_hz in zip(_METHODS, edges_hz[:-1], edges_hz[1:], strict=True)
+        if low_hz < high_hz
     )
 
 

@@ -2,7 +2,8 @@
 
 Peaks are searched on averages over bins of equal width in octaves: of the largest singular value of the response matrix
 (gain), and of the Frobenius norm of its off-diagonal entries (coupling). A mode with one pole pair is then fitted to
-the lines around each peak (`single_mode`); its 95 % intervals are quantiles of refits with added noise.
+the lines around each peak (`single_mode`); its 95 % intervals are quantiles of refits with added noise. Called by the
+reports of identification and by the reproduction of the paper (`study.evaluation.reproduction`).
 """
 
 from dataclasses import dataclass, replace
@@ -21,17 +22,18 @@ GAIN, COUPLING = "gain", "coupling"
 
 @dataclass(frozen=True, slots=True)
 class ResonanceSearch:
-    """Settings of the peak search, and of the 95 % intervals: number of noise draws and random seed. Heuristic
-    values."""
+    """Settings of the peak search and of the 95 % intervals. Heuristic values."""
 
     prominence_db: float = 3.0
-    """Prominence: ratio of a peak to the higher of the minima on its two sides."""
+    """Least prominence: ratio of a peak to the higher of the minima on its two sides."""
     bin_octaves: float = 1 / 48
     """Width (octaves) of the bins that are averaged before peaks are searched."""
     reach_octaves: float = 1 / 8
     """Half-width (octaves) of the interval around a peak to which a mode is fitted."""
     draws: int = 200
+    """Number of refits with added noise, from which the intervals are computed."""
     seed: int = 1
+    """Seed of the random noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +43,10 @@ class Resonance:
     frequency_hz: float
     """Natural frequency of the fitted mode."""
     frequency_interval_hz: tuple[float, float]
-    """95 % interval, from resampled noise."""
+    """95 % interval, from refits with added noise."""
     damping_ratio: float
     damping_interval: tuple[float, float]
+    """95 % interval of the damping ratio, from the same refits."""
     width_hz: float
     """Half-power bandwidth (Hz), 2 damping_ratio frequency_hz."""
     prominence_db: float
@@ -53,14 +56,16 @@ class Resonance:
 
 @dataclass(frozen=True, slots=True)
 class _Peak:
+    """Local maximum of one curve; `curve_name` is GAIN or COUPLING."""
+
     frequency_hz: float
     prominence_db: float
-    seen_in: str
+    curve_name: str
 
 
 def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None = None) -> tuple[Resonance, ...]:
-    """Resonances between the first and the last reliable line, in ascending order of frequency. response: as estimated,
-    not smoothed.
+    """Resonances between the first and the last reliable line, in ascending order of frequency; none without a reliable
+    line. response: as estimated, not smoothed.
 
     A peak that no single mode fits is left out; of peaks with the same mode the most prominent is kept. Coupling is
     searched only where there are as many outputs as inputs.
@@ -80,8 +85,8 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
         same_mode = next((accepted for accepted in resonances if _is_same_mode(accepted, resonance)), None)
         if same_mode is None:
             resonances.append(resonance)
-        elif peak.seen_in not in same_mode.seen_in:
-            resonances[resonances.index(same_mode)] = _add_evidence(same_mode, peak.seen_in)
+        elif peak.curve_name not in same_mode.seen_in:
+            resonances[resonances.index(same_mode)] = _add_evidence(same_mode, peak.curve_name)
     return tuple(sorted(resonances, key=lambda resonance: resonance.frequency_hz))
 
 
@@ -101,46 +106,48 @@ def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
 
 
 def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
-    """Fit a mode to a peak; None where no single mode fits, or where it is not distinct from noise."""
-    factor = 2**search.reach_octaves
-    peak_lines = lines.select_band(peak.frequency_hz / factor, peak.frequency_hz * factor)
+    """Fit a mode to a peak; None where there are fewer than six lines or bins within `reach_octaves` of it, where no
+    single mode fits, or where the peak is not distinct from noise."""
+    reach_factor = 2**search.reach_octaves
+    peak_lines = lines.select_band(peak.frequency_hz / reach_factor, peak.frequency_hz * reach_factor)
     # A hundred points suffice for a single mode: more lines are averaged in bins, which saves time.
     binned = average_octave_bins(peak_lines, 2 * search.reach_octaves / 100) if len(peak_lines) >= 6 else None
     if binned is None or len(binned.frequency_hz) < 6:
         return None
     entries = binned.response.reshape(1, len(binned.frequency_hz), -1)
-    noise = np.nan_to_num(binned.noise_variance / binned.lines[:, None, None]).reshape(entries.shape)
-    natural, damping = fit_single_mode(binned.frequency_hz, entries)
-    if not np.isfinite(natural[0]):
+    noise_variance = np.nan_to_num(binned.noise_variance / binned.lines[:, None, None]).reshape(entries.shape)
+    natural_hz, damping_ratio = fit_single_mode(binned.frequency_hz, entries)
+    if not np.isfinite(natural_hz[0]):
         return None
-    parts = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
-    noisy_entries = entries + np.sqrt(noise / 2) * (parts[0] + 1j * parts[1])
-    natural_drawn, damping_drawn = fit_single_mode(binned.frequency_hz, noisy_entries)
+    normal_draws = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
+    noisy_entries = entries + np.sqrt(noise_variance / 2) * (normal_draws[0] + 1j * normal_draws[1])
+    drawn_natural_hz, drawn_damping_ratios = fit_single_mode(binned.frequency_hz, noisy_entries)
     # Where more than 5 % of the noisy refits find no mode, the peak is not distinct from noise.
-    if np.isnan(natural_drawn).mean() > 0.05:
+    if np.isnan(drawn_natural_hz).mean() > 0.05:
         return None
     return Resonance(
-        frequency_hz=float(natural[0]),
-        frequency_interval_hz=_interval(natural_drawn),
-        damping_ratio=float(damping[0]),
-        damping_interval=_interval(damping_drawn),
-        width_hz=float(2 * damping[0] * natural[0]),
+        frequency_hz=float(natural_hz[0]),
+        frequency_interval_hz=_compute_interval(drawn_natural_hz),
+        damping_ratio=float(damping_ratio[0]),
+        damping_interval=_compute_interval(drawn_damping_ratios),
+        width_hz=float(2 * damping_ratio[0] * natural_hz[0]),
         prominence_db=peak.prominence_db,
-        seen_in=(peak.seen_in,),
+        seen_in=(peak.curve_name,),
     )
 
 
-def _interval(draws: FloatArray) -> tuple[float, float]:
-    """95 % interval of draws (draws,); NaN is left out."""
+def _compute_interval(draws: FloatArray) -> tuple[float, float]:
+    """95 % interval of draws (draws,), as the 2.5 % and 97.5 % quantiles; NaN is left out."""
     low, high = np.nanquantile(draws, (0.025, 0.975))
     return float(low), float(high)
 
 
 def _is_same_mode(first: Resonance, second: Resonance) -> bool:
-    """Modes closer than a third of the wider bandwidth are the same: peaks of gain and of coupling deviate slightly
-    from a mode's frequency."""
+    """Whether two modes are closer than a third of the wider bandwidth (heuristic): peaks of gain and of coupling
+    deviate slightly from a mode's frequency."""
     return abs(first.frequency_hz - second.frequency_hz) < max(first.width_hz, second.width_hz) / 3
 
 
 def _add_evidence(resonance: Resonance, curve: str) -> Resonance:
+    """The resonance with a further curve in `seen_in`, in alphabetical order."""
     return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, curve))))

@@ -41,9 +41,9 @@ class EstimateSettings:
 
     rules: ReliabilityRules = field(default_factory=ReliabilityRules)
     noise_lines: int = 17
-    """Number of lines over which the noise variance is averaged."""
+    """Number of lines over which the noise variance is averaged; chosen."""
     window_s: float = 4.0
-    """Length of the windows (s) where no excitation is periodic: lines are 1 / window_s apart."""
+    """Length of the windows (s) where no excitation is periodic: lines are 1 / window_s apart. Chosen."""
 
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
@@ -60,11 +60,11 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
         )
     _refuse_constant_outputs(recordings)
     rate_hz = recordings[0].sample_rate_hz
-    parts = []
+    groups = []
     for frequency_hz, experiments in _group_by_lines(experiment_set.experiments, rate_hz):
         rest_density = estimate_rest_density(recordings, frequency_hz)
-        parts.append(solve_shared_lines(experiments, frequency_hz, rest_density, settings.noise_lines))
-    return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, experiment_set, settings)
+        groups.append(solve_shared_lines(experiments, frequency_hz, rest_density, settings.noise_lines))
+    return _join_groups([group for group in groups if len(group.frequency_hz)], recordings, experiment_set, settings)
 
 
 def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
@@ -112,19 +112,19 @@ def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterat
         yield shared_lines * (rate_hz / common_length), group
 
 
-def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
-    """Restrict an experiment to lines, given by their indices (lines,)."""
+def _select_lines(experiment: Experiment, line_indices: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
+    """Restrict an experiment to the lines with these indices (lines,)."""
     return Experiment(
         experiment.length,
-        experiment.command[:, lines],
-        experiment.response[:, lines],
-        experiment.instrument[:, lines],
+        experiment.command[:, line_indices],
+        experiment.response[:, line_indices],
+        experiment.instrument[:, line_indices],
         experiment.replaced_share,
     )
 
 
-def _join_parts(
-    parts: Sequence[SharedLines],
+def _join_groups(
+    groups: Sequence[SharedLines],
     recordings: Sequence[Recording],
     experiment_set: ExperimentSet,
     settings: EstimateSettings,
@@ -132,20 +132,20 @@ def _join_parts(
     """Join the groups of lines in ascending order of frequency, and judge the reliability of each line. Raises
     TransferEstimateError without any group."""
     command, response = recordings[0].command, recordings[0].response
-    if not parts:
+    if not groups:
         raise TransferEstimateError(_describe_too_few_experiments(len(command.channels), experiment_set))
-    order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
-    frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
+    order = np.argsort(np.concatenate([group.frequency_hz for group in groups]))
+    frequency_hz = np.concatenate([group.frequency_hz for group in groups])[order]
     excited = np.concatenate(
-        [find_excited_lines(part.frequency_hz, part.excitation, settings.rules.least_energy_db) for part in parts]
+        [find_excited_lines(group.frequency_hz, group.excitation, settings.rules.least_energy_db) for group in groups]
     )[order]
-    coherence = np.concatenate([part.coherence for part in parts])[order]
+    coherence = np.concatenate([group.coherence for group in groups])[order]
     spring_hz = find_spring_frequency_hz([recording.meta for recording in recordings])
     judgement = judge_lines(frequency_hz, excited, coherence, spring_hz, settings.rules)
     return FrequencyResponse(
         frequency_hz,
-        np.concatenate([part.response for part in parts])[order],
-        np.concatenate([part.noise_variance for part in parts])[order],
+        np.concatenate([group.response for group in groups])[order],
+        np.concatenate([group.noise_variance for group in groups])[order],
         coherence,
         judgement.reliable,
         recordings[0].sample_rate_hz,

@@ -106,7 +106,7 @@ def _fit_sensors_elsewhere(
     too."""
     if not any(group.transient for group in groups):
         return StructureChoice(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
-    structure = replace(best.structure, shared=True)
+    structure = replace(best.structure, shared_sensors=True)
     start = replace(best, structure=structure, unknowns=best.structure.convert_unknowns(best.unknowns, structure))
     return StructureChoice(*grow_by_stages(groups, start, band_hz, settings, on_progress))
 

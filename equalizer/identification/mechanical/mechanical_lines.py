@@ -3,7 +3,7 @@
 A periodic segment gives the mean spectrum of its periods: noise, including noise that a feedback adds to the command,
 averages out, as with the excitation as an instrument. Any other segment gives the spectrum of its whole length; the
 transient from the states at its ends is fitted with the model. Spectra are rfft / length, in the signals' units. Called
-by `mechanical_fit` and `choose_structure`.
+by `mechanical_fit`, `mechanical_free_simulation` and `choose_structure`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,29 +31,38 @@ def estimate_local_noise(command: ComplexArray, response: ComplexArray) -> Float
     Schoukens, Vandersteen, Barbé and Pintelon, 2009). It is overestimated where a resonance is narrower than the
     window.
     """
-    lines, m = command.shape
-    unknowns = 2 * m + 3
+    lines, inputs = command.shape
+    unknowns = 2 * inputs + 3
     window_lines = unknowns + _RESIDUAL_FREEDOM
     if lines < window_lines:
         return np.full(response.shape, np.nan)
+    # A window begins at every line or, of 8000 lines or more, at every k-th: fewer windows take less time.
     starts = np.arange(0, lines - window_lines + 1, max(1, lines // 4000))
-    window = starts[:, None] + np.arange(window_lines)
-    offset = np.linspace(-1.0, 1.0, window_lines)
-    window_commands = command[window]
+    window_indices = starts[:, None] + np.arange(window_lines)
+    relative_frequency = np.linspace(-1.0, 1.0, window_lines)
+    window_commands = command[window_indices]
     command_scale = np.maximum(np.abs(window_commands).max(axis=(1, 2), keepdims=True), 1e-300)
-    transient_columns = np.broadcast_to(offset[:, None] ** np.arange(3), (len(window), window_lines, 3))
+    transient_columns = np.broadcast_to(
+        relative_frequency[:, None] ** np.arange(3), (len(window_indices), window_lines, 3)
+    )
     regressors = np.concatenate(
-        [window_commands / command_scale, offset[:, None] * window_commands / command_scale, transient_columns], axis=2
+        [
+            window_commands / command_scale,
+            relative_frequency[:, None] * window_commands / command_scale,
+            transient_columns,
+        ],
+        axis=2,
     )
     basis, _ = np.linalg.qr(regressors)
-    window_responses = response[window]
+    window_responses = response[window_indices]
     explained_power = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ window_responses) ** 2, axis=1)
     noise_power = np.maximum(np.sum(np.abs(window_responses) ** 2, axis=1) - explained_power, 0.0) / (
         window_lines - unknowns
     )
-    centre = starts + window_lines // 2
+    window_centres = starts + window_lines // 2
     return np.stack(
-        [np.interp(np.arange(lines), centre, noise_power[:, output]) for output in range(noise_power.shape[1])], axis=1
+        [np.interp(np.arange(lines), window_centres, noise_power[:, output]) for output in range(noise_power.shape[1])],
+        axis=1,
     )
 
 
@@ -86,8 +95,8 @@ class SegmentLines:
 
 
 def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
-    """Spectra of a segment with their noise; None where it is not excited, or has fewer than eight samples without
-    gaps."""
+    """Spectra of a segment with their noise; None where its longest run without gaps has fewer than eight samples, or
+    where it is not excited: the spectrum without the mean is rounding error (below 1e-9 of the largest sample)."""
     starts, length = _find_whole_periods(recording, segment)
     if not starts or length < 8:
         return None
@@ -107,14 +116,15 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
         noise = estimate_local_noise(command, response)
     if transient:  # a line without power between excited lines counts as excited too
         excitation_norm = np.sqrt(smooth_over_lines(excitation_norm**2, _SMOOTHED_LINES))
-    frequency = np.arange(1, len(command) + 1) * rate_hz / length
+    frequency_hz = np.arange(1, len(command) + 1) * rate_hz / length
     excited = excitation_norm > LEAST_EXCITED_AMPLITUDE * excitation_norm.max()
-    return SegmentLines(frequency, command, response, noise, excited, transient, rate_hz, recording.hold)
+    return SegmentLines(frequency_hz, command, response, noise, excited, transient, rate_hz, recording.hold)
 
 
 def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
     """The excited lines of the band (Hz, ends included; None: all). Periodic segments with the same lines get those
-    that any of them excites; a segment with a transient keeps at most about `MOST_LINES`."""
+    that any of them excites; a segment with a transient keeps at most `MOST_LINES`. Segments without such a line
+    are left out."""
     low_hz, high_hz = band_hz or (0.0, np.inf)
     selected_segments = []
     for segment in segments:
@@ -186,8 +196,8 @@ def _iterate_driven_segments(recording: Recording) -> Iterator[Segment]:
 
 def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], int]:
     """Start samples and common length of the complete periods, without the segment's first period where there are
-    others; without a complete period, start and length of the longest run of samples without gaps. Lists no start where
-    every sample is missing."""
+    others; without a complete period, or for a period of fewer than eight samples, start and length of the longest run
+    of samples without gaps. Lists no start where every sample is missing."""
     signals = [recording.command.samples, recording.response.samples]
     if recording.excitation is not None:
         signals.append(recording.excitation.samples)
@@ -205,6 +215,6 @@ def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[in
 
 
 def _compute_spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
-    """Spectra (periods, lines, channels), one period per start."""
+    """Spectra (periods, lines, channels) of the samples without the mean of each period, one period per start."""
     periods = np.stack([samples[start : start + length] for start in starts])
     return compute_line_spectra(periods - periods.mean(axis=1, keepdims=True))

@@ -1,8 +1,8 @@
 """Weighted residuals of a mechanical model on measured lines, and their Jacobian.
 
 Residual of an output at a line:  r = w (Y - G U),  with  w = 1 / sqrt(noise variance + (floor |Y|)²),  so that E|r|² is
-about 1; for segments with a transient, less the best fit of the free response of the states at both ends. Called by
-`mechanical_fit` and the searches for modes (`mechanical_order`, `modal_order`).
+about 1; for segments with a transient, less the best fit of the free response of the states at both ends. |Y|² is
+averaged over neighbouring lines. Called by `mechanical_fit`, `mechanical_refinement` and the searches for modes.
 """
 
 from collections.abc import Callable, Sequence
@@ -70,7 +70,7 @@ def _compute_command_rms(segment_lines: SegmentLines) -> float:
 
 def _estimate_scatter(segments: Sequence[SegmentLines], command_rms: Sequence[float]) -> FloatArray:
     """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of rms
-    magnitude 1. sizes: rms magnitude of each segment's command."""
+    magnitude 1; segments are scaled to it. command_rms: rms magnitude of each segment's command."""
     m = segments[0].command.shape[1]
     excitation_scale = np.array([segment.excited / rms for segment, rms in zip(segments, command_rms, strict=True)]).T[
         :, :, None
@@ -83,16 +83,16 @@ def _estimate_scatter(segments: Sequence[SegmentLines], command_rms: Sequence[fl
     explained_power = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ response) ** 2, axis=1)
     residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained_power, 0.0)
     degrees_of_freedom = np.count_nonzero(excitation_scale[:, :, 0], axis=1) - m
-    usable = has_full_rank & (degrees_of_freedom > 0)
-    smoothed_power = smooth_over_lines(np.where(usable[:, None], residual_power, 0.0), _SMOOTHED_LINES)
+    is_usable = has_full_rank & (degrees_of_freedom > 0)
+    smoothed_power = smooth_over_lines(np.where(is_usable[:, None], residual_power, 0.0), _SMOOTHED_LINES)
     return np.asarray(
         smoothed_power
-        / np.maximum(smooth_over_lines(np.where(usable, degrees_of_freedom, 0.0)[:, None], _SMOOTHED_LINES), 1e-12)
+        / np.maximum(smooth_over_lines(np.where(is_usable, degrees_of_freedom, 0.0)[:, None], _SMOOTHED_LINES), 1e-12)
     )
 
 
 HELD_OUT_EVERY = 4
-"""One line in this many is held out for cross-validation of structures."""
+"""One line in this many is held out for cross-validation of structures. Chosen."""
 _LARGEST_TRANSIENT = 1e120
 """Amplitude of a transient's spectrum above which it is not fitted, because squares in the fit would overflow."""
 _RELATIVE_STEP = 1e-6
@@ -129,11 +129,11 @@ class LineGroup:
         thinned_group = self.select_lines(np.arange(len(self.frequency_hz)) % stride == 0)
         return replace(thinned_group, held_out=_select_held_out_lines(len(thinned_group.frequency_hz)))
 
-    def select_lines(self, chosen: BoolArray) -> "LineGroup":
+    def select_lines(self, is_chosen: BoolArray) -> "LineGroup":
         """The group on the lines where the mask `chosen` (lines,) is true."""
         return LineGroup(
-            self.frequency_hz[chosen], self.root[chosen], self.target[chosen], self.weight[chosen],
-            self.held_out[chosen], self.count[chosen], self.transient, self.rate_hz, self.hold,
+            self.frequency_hz[is_chosen], self.root[is_chosen], self.target[is_chosen], self.weight[is_chosen],
+            self.held_out[is_chosen], self.count[is_chosen], self.transient, self.rate_hz, self.hold,
         )  # fmt: skip
 
 
@@ -150,9 +150,11 @@ def build_line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[L
             segment.frequency_hz, root, target, weight, held_out, np.count_nonzero(weight, axis=1).astype(float),
             segment.transient, segment.rate_hz, segment.hold,
         )  # fmt: skip
-        matching = [i for i, existing in enumerate(groups) if not group.transient and _can_merge(group, existing)]
-        if matching:
-            groups[matching[0]] = _merge_groups(groups[matching[0]], group)
+        matching_indices = [
+            i for i, existing_group in enumerate(groups) if not group.transient and _can_merge(group, existing_group)
+        ]
+        if matching_indices:
+            groups[matching_indices[0]] = _merge_groups(groups[matching_indices[0]], group)
         else:
             groups.append(group)
     return tuple(groups)
@@ -176,17 +178,17 @@ def compute_misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list
 def compute_transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
     """Weighted spectra of the free response to each state, (lines, p, columns). form: pole-residue form of the
     model."""
-    free = compute_free_response(model, group.frequency_hz, group.rate_hz, form)
+    free_response = compute_free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
-        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
-        free = np.concatenate([free, feedthrough], axis=2)
-    return np.asarray(group.weight[:, :, None] * free)
+        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
+        free_response = np.concatenate([free_response, feedthrough], axis=2)
+    return np.asarray(group.weight[:, :, None] * free_response)
 
 
 def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
     """Real parts, then imaginary parts, of all arrays as a real vector; the sum of squares is preserved."""
-    flat = np.concatenate([part.ravel() for part in parts])
-    return np.concatenate([flat.real, flat.imag])
+    stacked = np.concatenate([part.ravel() for part in parts])
+    return np.concatenate([stacked.real, stacked.imag])
 
 
 def compute_numerical_jacobian(
@@ -198,17 +200,18 @@ def compute_numerical_jacobian(
     """Jacobian (residuals, unknowns) by forward differences, backward where a step would exceed `upper_bounds`.
     base_residuals: residuals at `unknowns`."""
     columns = np.empty((len(base_residuals), len(unknowns)))
-    for k in range(len(unknowns)):
-        step = _RELATIVE_STEP * max(1.0, abs(unknowns[k]))
-        step = -step if unknowns[k] + step > upper_bounds[k] else step
-        shifted = unknowns.copy()
-        shifted[k] += step
-        columns[:, k] = (residuals(shifted) - base_residuals) / step
+    for index in range(len(unknowns)):
+        step = _RELATIVE_STEP * max(1.0, abs(unknowns[index]))
+        step = -step if unknowns[index] + step > upper_bounds[index] else step
+        shifted_unknowns = unknowns.copy()
+        shifted_unknowns[index] += step
+        columns[:, index] = (residuals(shifted_unknowns) - base_residuals) / step
     return columns
 
 
 def _compute_line_weights(segment: SegmentLines, floor: float) -> FloatArray:
-    """(lines, p): 1 / sqrt(noise + floor² |response near the line|²), 0 at lines that are not excited."""
+    """(lines, p): 1 / sqrt(noise + floor² |response|²), with |response|² averaged over five lines; 0 at lines that are
+    not excited. Noise that is not known (NaN) counts as 0."""
     power = np.abs(segment.response) ** 2
     smoothed_power = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
@@ -246,7 +249,8 @@ def _merge_groups(group: LineGroup, added_group: LineGroup) -> LineGroup:
 
 
 def _subtract_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexArray) -> ComplexArray:
-    """Subtract the combination of basis columns, with real coefficients, that fits the lines not held out."""
+    """Subtract the combination of basis columns, with real coefficients, that fits the lines not held out. Unchanged
+    where an entry of the basis exceeds `_LARGEST_TRANSIENT`."""
     if not np.abs(basis).max(initial=0.0) < _LARGEST_TRANSIENT:
         return misfit  # the search may try an unstable model, whose free response overflows
     is_fitted = ~group.held_out

@@ -154,7 +154,7 @@ def _compute_mode_columns(
             * np.einsum("lp,lm->lpm", response[:, :, column], axis_motion[:, row])
             for row, column in list_triangle_pairs(inputs)
         ]
-        for output in range(0 if structure.shared else inputs, outputs):
+        for output in range(0 if structure.shared_sensors else inputs, outputs):
             for axis in range(inputs):
                 change = np.zeros_like(response)
                 change[:, output] = (-(s**2) / denominator * motion.sensor)[:, None] * axis_motion[:, axis]

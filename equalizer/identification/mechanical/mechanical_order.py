@@ -226,19 +226,19 @@ def _fit_extensions(
     if structure.inputs > 1 and not limits.extend_couplings:
         return
     extensions: list[tuple[str, Structure]] = []
-    if structure.modes and not structure.shared:
-        extensions.append(("with sensors that see the modes too", replace(structure, shared=True)))
+    if structure.modes and not structure.shared_sensors:
+        extensions.append(("with sensors that see the modes too", replace(structure, shared_sensors=True)))
     if limits.fit_delay and not structure.delayed:
         extensions.append(("with a delay", replace(structure, delayed=True)))
-    if structure.inputs > 1 and not structure.turned:
-        extensions.append(("with a turned sensor", replace(structure, turned=True)))
+    if structure.inputs > 1 and not structure.rotated_sensor:
+        extensions.append(("with a turned sensor", replace(structure, rotated_sensor=True)))
     for description, extended in extensions:
         yield (
             description,
             refine_unknowns(groups, extended, structure.convert_unknowns(current.unknowns, extended), band_hz),
         )
-    for start in () if structure.shared else starts[:1]:
-        extended = replace(start.structure, shared=True)
+    for start in () if structure.shared_sensors else starts[:1]:
+        extended = replace(start.structure, shared_sensors=True)
         unknowns = start.structure.convert_unknowns(start.unknowns, extended)
         description = f"with a mode begun at {start.frequency_hz:.3g} Hz that the sensors see ({extended.modes} in all)"
         yield description, refine_unknowns(groups, extended, unknowns, band_hz)

@@ -2,7 +2,7 @@
 
 Minimises the sum over lines of |Y(f) - G(f, unknowns) U(f)|² / expected error power (output error; `LineGroup` holds
 the weighted spectra), with SciPy's bounded trust-region reflective method. Held-out lines measure the error of the
-result.
+result. Called by `mechanical_fit` and the selection of the order (`mechanical_order`, `modal_order`).
 """
 
 from collections.abc import Sequence
@@ -22,14 +22,14 @@ from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
-S = TypeVar("S", Structure, ModalStructure)
+StructureT = TypeVar("StructureT", Structure, ModalStructure)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RefinedFit(Generic[S]):
+class RefinedFit(Generic[StructureT]):
     """Unknowns refined by `refine_unknowns`, with their misfit on the fitted and on the held-out lines."""
 
-    structure: S
+    structure: StructureT
     unknowns: FloatArray
     squares: float
     """Sum of squares of the fitted lines' misfits, each in units of its expected error."""
@@ -48,29 +48,31 @@ class RefinedFit(Generic[S]):
 
 def refine_unknowns(
     groups: Sequence[LineGroup],
-    structure: S,
+    structure: StructureT,
     start: FloatArray,
     band_hz: tuple[float, float],
     max_evaluations: int = 40,
-) -> RefinedFit[S]:
+) -> RefinedFit[StructureT]:
     """Refine unknowns from a start (parameters,), which is first moved within the bounds. band_hz: fitted band, which
-    sets the bounds. max_evaluations: of the residuals, without those for the Jacobian. Raises MechanicalModelError
-    where the start is not a valid model."""
+    sets the bounds. max_evaluations: limit of the evaluations of the residuals, without those for the Jacobian (default
+    chosen). Raises MechanicalModelError where the start is not a valid model, and numpy.linalg.LinAlgError where the
+    state matrix of the start or of the result cannot be diagonalised."""
     # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
-    fitted = [group.exclude_held_out() for group in groups]
+    fitted_groups = [group.exclude_held_out() for group in groups]
     lower_bounds, upper_bounds = structure.compute_bounds(band_hz)
 
     start = np.clip(start, lower_bounds + 1e-9, upper_bounds - 1e-9)
-    start_residuals = stack_real(compute_misfits(fitted, structure.build_model(start)))
+    start_residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(start)))
 
     def compute_residuals(unknowns: FloatArray) -> FloatArray:
+        """Real residuals on the fitted lines; 1e6 each where the unknowns are not a valid model."""
         try:
-            stacked = stack_real(compute_misfits(fitted, structure.build_model(unknowns)))
+            residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
-            return np.full_like(start_residuals, 1e6)  # large, so that the step to an invalid model is rejected
-        return stacked if np.isfinite(stacked).all() else np.full_like(start_residuals, 1e6)
+            return np.full_like(start_residuals, 1e6)  # so that the step to an invalid model is rejected
+        return residuals if np.isfinite(residuals).all() else np.full_like(start_residuals, 1e6)
 
     solution = least_squares(
         compute_residuals,
@@ -85,8 +87,8 @@ def refine_unknowns(
         ftol=1e-6,
         xtol=1e-7,
     )
-    held_out_squares, count = _sum_held_out_squares(groups, structure.build_model(solution.x))
-    return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out_squares, count, solution.jac)
+    held_out_squares, held_out_count = _sum_held_out_squares(groups, structure.build_model(solution.x))
+    return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out_squares, held_out_count, solution.jac)
 
 
 def _sum_held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:

@@ -11,7 +11,8 @@ matrices. With z = e^(s T), T the sample period, and E(t) the integral of e^(p t
 For the last two, a delay multiplies by e^(-s delay). `response[k]` is taken just before `command[k]` is written, as in
 `signals.recording`.
 
-Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6.
+Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6. Called by
+`mechanical_misfit`, `modal_search` and the computation of starting values.
 """
 
 from dataclasses import dataclass
@@ -49,19 +50,21 @@ def compute_pole_form(model: MechanicalModel) -> PoleForm:
     """Pole-residue form of a model, by diagonalisation of its state matrix. Raises numpy.linalg.LinAlgError where its
     state matrix cannot be diagonalised."""
     n, m = model.coordinates, model.inputs
-    weights = np.linalg.solve(model.mass, np.concatenate([model.stiffness, model.damping, model.input], axis=1))
+    acceleration_gains = np.linalg.solve(
+        model.mass, np.concatenate([model.stiffness, model.damping, model.input], axis=1)
+    )
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:] = np.eye(n)
-    A[n:, :n], A[n:, n:] = -weights[:, :n], -weights[:, n : 2 * n]
-    B = np.concatenate([np.zeros((n, m)), weights[:, 2 * n :]])
+    A[n:, :n], A[n:, n:] = -acceleration_gains[:, :n], -acceleration_gains[:, n : 2 * n]
+    B = np.concatenate([np.zeros((n, m)), acceleration_gains[:, 2 * n :]])
     order = DERIVATIVE_OF_QUANTITY[model.quantity]
     C = model.output @ (A[n:] if order == 2 else np.eye(2 * n)[order * n : (order + 1) * n])
     direct = model.output @ B[n:] if order == 2 else np.zeros((model.outputs, m))
     if model.actuator.bandwidth_hz:
         A, B, C, direct = _append_input_lag(A, B, C, direct, 2 * np.pi * model.actuator.bandwidth_hz)
     poles, vectors = np.linalg.eig(A)
-    inverse = np.linalg.inv(vectors)
-    return PoleForm(poles.astype(complex), C @ vectors, inverse @ B, direct, inverse.astype(complex))
+    inverse_vectors = np.linalg.inv(vectors)
+    return PoleForm(poles.astype(complex), C @ vectors, inverse_vectors @ B, direct, inverse_vectors.astype(complex))
 
 
 def compute_sampled_response(
@@ -113,8 +116,8 @@ def compute_sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float
 def _append_input_lag(
     A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, lag_rate: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """State-space matrices A, B, C and D with a first-order lag in front of each input: u' = rate (command - u), rate
-    in 1/s."""
+    """State-space matrices A, B, C and D with a first-order lag in front of each input:
+    u' = lag_rate (command - u), lag_rate in 1/s."""
     n, m = B.shape
     lagged_A = np.block([[A, B], [np.zeros((m, n)), -lag_rate * np.eye(m)]])
     lagged_B = np.concatenate([np.zeros((n, m)), lag_rate * np.eye(m)])
@@ -155,8 +158,8 @@ def _integrate_exponential(poles: ComplexArray, duration_s: float) -> ComplexArr
 
 
 def _integrate_ramp(poles: ComplexArray, step_s: float) -> ComplexArray:
-    """(poles,): state after a sample period in which the command rises linearly from 0 to 1. For a small |p| T, where
-    the exact form loses digits by cancellation, a Taylor series."""
+    """(poles,): state after a sample period in which the command rises linearly from 0 to 1. For a small |p| T
+    (below 1e-4) the exact form loses digits by cancellation: a Taylor series replaces it."""
     is_small = np.abs(poles) * step_s < 1e-4
     safe_poles = np.where(is_small, 1.0, poles)
     exact = (np.expm1(safe_poles * step_s) - safe_poles * step_s) / (safe_poles**2 * step_s)

@@ -21,28 +21,29 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_EIGENVALUE = 0.05
-"""Least eigenvalue of the starting mass matrix, relative to the largest magnitude of an eigenvalue."""
+"""Least eigenvalue of the starting mass matrix, relative to the largest magnitude of an eigenvalue. Chosen."""
 _TRIAL_DELAYS = 33
-"""Number of trial delays, evenly spaced from zero."""
+"""Number of trial delays, evenly spaced from zero. Chosen."""
 _MOST_DELAY_CYCLES = 8.0
-"""Longest trial delay, in periods of the highest line."""
+"""Longest trial delay, in periods of the highest line of the first segment. Chosen."""
 
 
 def estimate_rigid_start(
     segments: Sequence[SegmentLines], structure: Structure, floor: float
 ) -> tuple[Structure, FloatArray]:
     """Structure without modes, with signs and mass scale estimated from the data, and its unknowns (parameters,). A
-    negative mass of a single axis means that its sensor is positive against the command: its sign is reversed. floor:
-    expected error of a linear model, relative to the response's magnitude."""
+    negative mass of a single axis means that its sensor is positive against the command: its sign is reversed. The
+    delay is estimated where `structure.delayed`. floor: expected error of a linear model, relative to the response's
+    magnitude."""
     m = structure.inputs
     if structure.delayed:
         delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _TRIAL_DELAYS)
-        trials = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
-        delay_s = float(delays_s[int(np.argmin([residual for _, residual in trials]))])
+        delay_solutions = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
+        delay_s = float(delays_s[int(np.argmin([residual for _, residual in delay_solutions]))])
     else:
         delay_s = structure.actuator.delay_s
-    parts = _solve_matrices(segments, structure, floor, delay_s)[0].reshape(3, -1)
-    mass, damping, stiffness = (build_symmetric_matrix(part, m) for part in parts)
+    triangles = _solve_matrices(segments, structure, floor, delay_s)[0].reshape(3, -1)
+    mass, damping, stiffness = (build_symmetric_matrix(triangle, m) for triangle in triangles)
     if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
         return estimate_rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
     eigenvalues, eigenvectors = np.linalg.eigh(mass)
@@ -76,36 +77,38 @@ def _build_regression(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
-    imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed."""
+    imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed.
+
+    The error is taken as five times `floor` (chosen), plus noise: lines with little noise then do not dominate."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     # A held force shows in the acceleration one sample later, in velocity and position half a sample later.
     hold_delay = 1.0 if order == 2 else 0.5
     blocks, targets = [], []
     transient_segments = [i for i, segment in enumerate(segments) if segment.transient]
-    for index, lines in enumerate(segments):
-        s = 2j * np.pi * lines.frequency_hz
-        z = np.exp(s / lines.rate_hz)
-        delay_samples = hold_delay if lines.hold.value == "zero-order" else 0.0
-        sensor = compute_sensor_response(structure.sensor.bandwidth_hz, z, lines.rate_hz) * z ** (-delay_samples)
-        sensor = sensor * np.exp(-s * delay_s)
-        motion = lines.response[:, :m] * np.array(structure.signs) / sensor[:, None]
-        norm = np.linalg.norm(lines.response[:, :m], axis=1)
-        noise = np.sqrt(np.nan_to_num(lines.noise[:, :m]).sum(axis=1)) / np.maximum(norm, 1e-300)
-        weight = lines.excited / (np.linalg.norm(lines.command, axis=1) * np.hypot(5 * floor, noise) + 1e-300)
+    for index, spectra in enumerate(segments):
+        s = 2j * np.pi * spectra.frequency_hz
+        z = np.exp(s / spectra.rate_hz)
+        delay_samples = hold_delay if spectra.hold.value == "zero-order" else 0.0
+        chain = compute_sensor_response(structure.sensor.bandwidth_hz, z, spectra.rate_hz) * z ** (-delay_samples)
+        chain = chain * np.exp(-s * delay_s)
+        motion = spectra.response[:, :m] * np.array(structure.signs) / chain[:, None]
+        response_norm = np.linalg.norm(spectra.response[:, :m], axis=1)
+        noise_ratio = np.sqrt(np.nan_to_num(spectra.noise[:, :m]).sum(axis=1)) / np.maximum(response_norm, 1e-300)
+        weight = spectra.excited / (np.linalg.norm(spectra.command, axis=1) * np.hypot(5 * floor, noise_ratio) + 1e-300)
         columns = [
             _compute_entry_force(motion * (s ** (power - order))[:, None], pair)
             for power in (2, 1, 0)
             for pair in list_triangle_pairs(m)
         ]
         transient_columns = np.zeros((len(s), m, 3 * m * len(transient_segments)), dtype=np.complex128)
-        if lines.transient:
+        if spectra.transient:
             # The states at the segment's ends add s, 1, 1 / s, over s^order, times unknown factors.
             for axis in range(m):
                 first = 3 * (m * transient_segments.index(index) + axis)
                 transient_columns[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
         block = np.concatenate([np.stack(columns, axis=2), transient_columns], axis=2) * weight[:, None, None]
         blocks.append(block.reshape(-1, block.shape[2]))
-        targets.append((lines.command * weight[:, None]).ravel())
+        targets.append((spectra.command * weight[:, None]).ravel())
     complex_rows, complex_targets = np.concatenate(blocks), np.concatenate(targets)
     return (
         np.concatenate([complex_rows.real, complex_rows.imag]),
@@ -144,7 +147,7 @@ def build_symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
 
 
 def _make_positive(matrix: FloatArray) -> FloatArray:
-    """The symmetric matrix with its eigenvalues raised to at least 0.001 of the largest magnitude."""
+    """The symmetric matrix with its eigenvalues raised to at least 0.001 (chosen) of the largest magnitude."""
     eigenvalues, eigenvectors = np.linalg.eigh(matrix)
     return np.asarray(
         (eigenvectors * np.maximum(eigenvalues, 1e-3 * max(np.abs(eigenvalues).max(), 1e-300))) @ eigenvectors.T

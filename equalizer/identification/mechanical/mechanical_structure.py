@@ -3,7 +3,8 @@
 M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
 (root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses are a
 linear combination of the driven axes' motions (rows of `output`) and the oscillators' (sensor shapes). An elastic joint
-may connect the driven axes to the body that carries sensors and oscillators; see `insert_joint`.
+may connect the driven axes to the body that carries sensors and oscillators; see `insert_joint`. Called by
+`mechanical_fit` and its search for a structure. Bounds of the fit are chosen.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,7 +17,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_SHARE = 0.5
-"""Fraction of the mass without oscillators that is assumed on the driven side of an elastic joint."""
+"""Fraction of the mass without oscillators that is assumed on the driven side of an elastic joint. Chosen."""
 
 
 def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
@@ -25,8 +26,7 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
     latter. stiffness: (m, m), N/m or N m/rad, positive definite. loss_s: the joint's damping over its stiffness (s).
 
     Dampers and springs to the ground stay on the driven axes, where the drives are. From force to response the total
-    mass and the joint's resonance are identifiable, but not how the mass is distributed over the two sides: half each
-    is assumed.
+    mass and the joint's resonance are identifiable, but not `DRIVEN_SHARE`, the distribution of the mass.
     """
     participation = model.mass[m:, :m]
     bare_mass = model.mass[:m, :m] - participation.T @ participation
@@ -75,19 +75,19 @@ class Structure:
     quantity: str
     mass_scale: float
     speed_scale: float
-    """rad/s"""
+    """rad/s: keeps the logarithms of frequencies near 0."""
     signs: tuple[float, ...]
     """Sign of each driven axis's own sensor: -1 where it is positive in the direction opposite to the command."""
     modes: int = 0
     grounded: bool = True
     """Whether there may be springs to the ground."""
-    turned: bool = False
+    rotated_sensor: bool = False
     """Whether the sensor's axes may be rotated against the commands' by a small angle."""
-    shared: bool = False
+    shared_sensors: bool = False
     """Whether the sensors of the driven axes also measure a share of the oscillators' motion."""
     joint: bool = False
     """Whether an elastic joint, such as cables, connects the driven axes to all other bodies."""
-    delayed: bool = False
+    delayed: bool = False  # whether the delay is fitted
     step_s: float = 1e-3
     sensor: SensorLimits = field(default_factory=SensorLimits)
     actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
@@ -100,10 +100,10 @@ class Structure:
         participations, the sensor shape. Slices of parts that the structure lacks are empty."""
         m, p = self.inputs, self.outputs
         pair_count = m * (m + 1) // 2
-        shape_entries = p if self.shared else p - m
+        shape_entries = p if self.shared_sensors else p - m
         sizes = {
             "mass": pair_count, "damping": pair_count, "stiffness": pair_count if self.grounded else 0,
-            "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.turned else 0,
+            "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.rotated_sensor else 0,
             "joint": pair_count + 1 if self.joint else 0, "delay": 1 if self.delayed else 0,
             "modes": self.modes * (2 + m + shape_entries),
         }  # fmt: skip
@@ -123,37 +123,32 @@ class Structure:
     @property
     def units(self) -> tuple[float, float, float]:
         """Units (scales) of mass, damping and stiffness."""
-        return (
-            self.mass_scale,
-            self.mass_scale * self.speed_scale,
-            self.mass_scale * self.speed_scale**2,
-        )
+        return self.mass_scale, self.mass_scale * self.speed_scale, self.mass_scale * self.speed_scale**2
 
     def convert_unknowns(self, unknowns: FloatArray, destination: "Structure") -> FloatArray:
-        """The unknowns converted to the destination structure: parts that it adds start at zero, parts that it lacks
-        are dropped."""
-        transferred = np.zeros(destination.parameters)
-        for name, part in self.slices.items():
+        """Convert the unknowns to a structure with as many modes or more: parts that it adds are 0, others dropped."""
+        converted = np.zeros(destination.parameters)
+        for name, source in self.slices.items():
             target = destination.slices[name]
             if name == "modes" and self.modes:
-                old_modes = unknowns[part].reshape(self.modes, -1)
+                old_modes = unknowns[source].reshape(self.modes, -1)
                 new_modes = np.zeros((destination.modes, (target.stop - target.start) // destination.modes))
                 head = 2 + self.inputs
                 new_modes[: self.modes, :head] = old_modes[:, :head]
                 if old_modes.shape[1] > head:
                     new_modes[: self.modes, new_modes.shape[1] - (old_modes.shape[1] - head) :] = old_modes[:, head:]
-                transferred[target] = new_modes.ravel()
-            elif name != "modes" and part.stop - part.start == target.stop - target.start:
-                transferred[target] = unknowns[part]
-        return transferred
+                converted[target] = new_modes.ravel()
+            elif name != "modes" and source.stop - source.start == target.stop - target.start:
+                converted[target] = unknowns[source]
+        return converted
 
     def build_model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """The model in relative coordinates. Raises MechanicalModelError where the mass is not positive definite."""
-        m, part = self.inputs, self.slices
-        mass, damping, stiffness = self.find_grounded_parts(unknowns)
+        m, slices = self.inputs, self.slices
+        mass, damping, stiffness = self.compute_axis_matrices(unknowns)
         frequency, ratio, participation, sensor_shapes = self.unpack_oscillators(unknowns)
-        sensor_rotation = np.diag(self.signs) @ _compute_rotation(unknowns[part["turn"]], m)
-        rows = np.concatenate([sensor_rotation, unknowns[part["rows"]].reshape(-1, m)])
+        sensor_rotation = np.diag(self.signs) @ _compute_rotation(unknowns[slices["turn"]], m)
+        rows = np.concatenate([sensor_rotation, unknowns[slices["rows"]].reshape(-1, m)])
         model = MechanicalModel(
             name=name,
             quantity=self.quantity,
@@ -168,39 +163,43 @@ class Structure:
         )
         if not self.joint:
             return model
-        joint = unknowns[part["joint"]]
+        joint = unknowns[slices["joint"]]
         lower = _unpack_log_triangle(joint[:-1], m)
         return insert_joint(model, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
-    def find_grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def compute_axis_matrices(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
-        m, part, units = self.inputs, self.slices, self.units
-        lower = _unpack_log_triangle(unknowns[part["mass"]], m)
-        stiffness = units[2] * _unpack_square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
-        return units[0] * lower @ lower.T, units[1] * _unpack_square(unknowns[part["damping"]], m), stiffness
+        m, slices, units = self.inputs, self.slices, self.units
+        lower = _unpack_log_triangle(unknowns[slices["mass"]], m)
+        stiffness = units[2] * _unpack_square(unknowns[slices["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        return units[0] * lower @ lower.T, units[1] * _unpack_square(unknowns[slices["damping"]], m), stiffness
 
     def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds of the unknowns: no negative damper or spring, modes near the band."""
-        low, high = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
-        part, diagonal = self.slices, find_diagonal_indices(self.inputs)
+        """Lower and upper bounds (parameters,): no negative damper or spring on the diagonals, modes near the band,
+        damping ratios 1e-4 to 3, the joint's damping over its stiffness 1e-4 to 1 over speed_scale."""
+        lower, upper = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
+        slices, diagonal = self.slices, find_diagonal_indices(self.inputs)
         for name in ("damping", "stiffness"):
-            if part[name].stop > part[name].start:
-                low[part[name].start + diagonal] = 0.0
-        low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_LARGEST_MASS_LOG, _LARGEST_MASS_LOG
+            if slices[name].stop > slices[name].start:
+                lower[slices[name].start + diagonal] = 0.0
+        lower[slices["mass"].start + diagonal], upper[slices["mass"].start + diagonal] = (
+            -_LARGEST_MASS_LOG,
+            _LARGEST_MASS_LOG,
+        )
         if self.joint:
-            first_index = part["joint"].start + diagonal
+            first_index = slices["joint"].start + diagonal
             joint_log = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
-            low[first_index], high[first_index] = joint_log - _LARGEST_JOINT_LOG, joint_log + _LARGEST_JOINT_LOG
-            low[part["joint"].stop - 1], high[part["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
-        low[part["turn"]], high[part["turn"]] = -_LARGEST_ROTATION_RAD, _LARGEST_ROTATION_RAD
-        low[part["delay"]], high[part["delay"]] = 0.0, _MOST_DELAY_SAMPLES
+            lower[first_index], upper[first_index] = joint_log - _LARGEST_JOINT_LOG, joint_log + _LARGEST_JOINT_LOG
+            lower[slices["joint"].stop - 1], upper[slices["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
+        lower[slices["turn"]], upper[slices["turn"]] = -_LARGEST_ROTATION_RAD, _LARGEST_ROTATION_RAD
+        lower[slices["delay"]], upper[slices["delay"]] = 0.0, _MOST_DELAY_SAMPLES
         if self.modes:
-            mode_size = (part["modes"].stop - part["modes"].start) // self.modes
-            first_index = part["modes"].start + mode_size * np.arange(self.modes)
-            low[first_index] = np.log(2 * np.pi * band_hz[0] / _LARGEST_MODE_RATIO / self.speed_scale)
-            high[first_index] = np.log(2 * np.pi * band_hz[1] * _LARGEST_MODE_RATIO / self.speed_scale)
-            low[first_index + 1], high[first_index + 1] = np.log(1e-4), np.log(3.0)
-        return low, high
+            mode_size = (slices["modes"].stop - slices["modes"].start) // self.modes
+            first_index = slices["modes"].start + mode_size * np.arange(self.modes)
+            lower[first_index] = np.log(2 * np.pi * band_hz[0] / _LARGEST_MODE_RATIO / self.speed_scale)
+            upper[first_index] = np.log(2 * np.pi * band_hz[1] * _LARGEST_MODE_RATIO / self.speed_scale)
+            lower[first_index + 1], upper[first_index + 1] = np.log(1e-4), np.log(3.0)
+        return lower, upper
 
     def unpack_delay_s(self, unknowns: FloatArray) -> float:
         """Delay of the command (s), not negative: fitted where `delayed`, else that of `actuator`."""
@@ -209,8 +208,7 @@ class Structure:
         return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)
 
     def unpack_oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Frequencies in rad/s (modes,), damping ratios (modes,), participations (modes, m), sensor shapes (modes,
-        p)."""
+        """Frequencies (modes,) in rad/s, damping ratios (modes,), participations (modes, m), shapes (modes, p)."""
         m, p = self.inputs, self.outputs
         rows = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
         root_mass = np.sqrt(self.mass_scale)
@@ -236,15 +234,15 @@ def pack_square_root(matrix: FloatArray) -> FloatArray:
 
 def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
     """Starting unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
-    mass = structure.find_grounded_parts(unknowns)[0]
+    mass = structure.compute_axis_matrices(unknowns)[0]
     m, joint_slice = structure.inputs, structure.slices["joint"]
     reduced_mass = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
-    started = unknowns.copy()
-    started[joint_slice] = 0.0
+    start = unknowns.copy()
+    start[joint_slice] = 0.0
     stiffness_root = 2 * np.pi * frequency_hz * np.sqrt(reduced_mass / structure.units[2])
-    started[joint_slice.start + find_diagonal_indices(m)] = np.log(stiffness_root)
-    started[joint_slice.stop - 1] = np.log(_JOINT_LOSS_FACTOR * structure.speed_scale / (2 * np.pi * frequency_hz))
-    return started
+    start[joint_slice.start + find_diagonal_indices(m)] = np.log(stiffness_root)
+    start[joint_slice.stop - 1] = np.log(_JOINT_LOSS_FACTOR * structure.speed_scale / (2 * np.pi * frequency_hz))
+    return start
 
 
 def remove_mode(structure: Structure, unknowns: FloatArray, mode_index: int) -> tuple[Structure, FloatArray]:
@@ -262,10 +260,12 @@ def find_diagonal_indices(m: int) -> npt.NDArray[np.intp]:
 
 @cache
 def _list_triangle_indices(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    return np.tril_indices(m)  # cached: a fit calls this some ten thousand times
+    """Rows and columns of the lower triangle, row by row. Cached: a fit calls this some ten thousand times."""
+    return np.tril_indices(m)
 
 
 def _unpack_log_triangle(unknowns: FloatArray, m: int) -> FloatArray:
+    """Cholesky factor (m, m) from its lower triangle, row by row, with the logarithms of its diagonal."""
     lower = np.zeros((m, m))
     lower[_list_triangle_indices(m)] = unknowns
     np.fill_diagonal(lower, np.exp(np.diag(lower)))
@@ -273,6 +273,7 @@ def _unpack_log_triangle(unknowns: FloatArray, m: int) -> FloatArray:
 
 
 def _unpack_square(unknowns: FloatArray, m: int) -> FloatArray:
+    """Matrix (m, m) from the lower triangle of its Cholesky factor, row by row."""
     lower = np.zeros((m, m))
     lower[_list_triangle_indices(m)] = unknowns
     return np.asarray(lower @ lower.T)

@@ -20,13 +20,13 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _GRID_FREQUENCIES = 80
-"""Number of natural frequencies on the logarithmic search grid."""
+"""Number of natural frequencies on the logarithmic search grid. Chosen."""
 _GRID_DAMPING_RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
 """Damping ratios on the search grid; above 1 the mode is overdamped. Heuristic."""
 _LOG_STEP = 1e-6
 """Step of finite differences: of logarithms, and of the delay in samples."""
 _MOST_DELAY_SAMPLES = 20.0
-"""Largest delay of the command, samples."""
+"""Largest delay of the command, samples. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,16 +73,16 @@ class ModalSearch:
         self._fitted_masks = [~group.held_out for group in groups]
 
     def add_mode(self, current: ModeEstimate | None) -> ModeEstimate:
-        """Add a mode at the grid point that explains most, then refine all modes together. current: None for the first
-        mode."""
+        """Add a mode at the grid point that explains most, then refine all modes together. The grid reaches from half
+        the lower to twice the upper end of the band. current: None for the first mode."""
         logs = np.empty(0) if current is None else current.logs
         delay_samples = self._nominal_delay_samples if current is None else current.delay_s / self._structure.step_s
         solution = self._solve(np.append(logs, delay_samples))
         low_log, high_log = np.log(2 * np.pi * np.array([self._band_hz[0] / 2, self._band_hz[1] * 2]))
         best_point = max(
-            ((self._compute_explained_by_mode(solution, np.array([log_w, np.log(ratio), delay_samples])),
-              log_w, np.log(ratio))
-            for log_w in np.linspace(low_log, high_log, _GRID_FREQUENCIES) for ratio in _GRID_DAMPING_RATIOS),
+            ((self._compute_explained_squares(solution, np.array([log_frequency, np.log(ratio), delay_samples])),
+              log_frequency, np.log(ratio))
+            for log_frequency in np.linspace(low_log, high_log, _GRID_FREQUENCIES) for ratio in _GRID_DAMPING_RATIOS),
         )  # fmt: skip
         modes = len(logs) // 2
         return self._refine(
@@ -91,7 +91,8 @@ class ModalSearch:
 
     def _refine(self, start: FloatArray) -> ModeEstimate:
         """Bounded least squares over the unknowns: logs of w (rad/s), logs of damping ratios, delay (samples). The
-        delay is free only with at least two modes."""
+        delay is free only where `fit_delay` and with at least two modes. Bounds (chosen): natural frequencies from a
+        tenth of the lower to twice the upper end of the band, damping ratios 1e-3 to 30."""
         # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
         from scipy.optimize import least_squares
 
@@ -101,46 +102,49 @@ class ModalSearch:
             if self._fit_delay and modes > 1
             else (delay_samples - 1e-9, delay_samples + 1e-9)
         )
-        low = np.concatenate([np.full(modes, np.log(2 * np.pi * self._band_hz[0] / 10)), np.full(modes, np.log(1e-3))])
-        high = np.concatenate([np.full(modes, np.log(2 * np.pi * self._band_hz[1] * 2)), np.full(modes, np.log(30.0))])
-        low, high = np.append(low, low_delay), np.append(high, high_delay)
+        lower = np.concatenate(
+            [np.full(modes, np.log(2 * np.pi * self._band_hz[0] / 10)), np.full(modes, np.log(1e-3))]
+        )
+        upper = np.concatenate([np.full(modes, np.log(2 * np.pi * self._band_hz[1] * 2)), np.full(modes, np.log(30.0))])
+        lower, upper = np.append(lower, low_delay), np.append(upper, high_delay)
         optimum = least_squares(
             lambda unknowns: self._stack_real(self._solve(unknowns).misfit),
-            np.clip(start, low + 1e-10, high - 1e-10),
+            np.clip(start, lower + 1e-10, upper - 1e-10),
             jac=self._compute_jacobian,
-            bounds=(low, high),
+            bounds=(lower, upper),
             max_nfev=40,
             ftol=1e-5,
         )
         solution = self._solve(optimum.x)
-        pairs = list(zip(self._groups, solution.misfit, strict=True))
+        group_misfits = list(zip(self._groups, solution.misfit, strict=True))
         return ModeEstimate(
             optimum.x[:-1],
             float(optimum.x[-1]) * self._structure.step_s,
             solution.shapes,
-            float(sum(np.sum(np.abs(part[group.held_out]) ** 2) for group, part in pairs)),
+            float(sum(np.sum(np.abs(misfit[group.held_out]) ** 2) for group, misfit in group_misfits)),
             int(sum(group.count[group.held_out].sum() for group in self._groups)),
         )
 
     def _solve(self, unknowns: FloatArray) -> _Solution:
-        """Shapes by linear least squares on the lines not held out, output by output, and residuals on all lines."""
+        """Shapes by linear least squares on the lines not held out, output by output, and residuals on all lines.
+        unknowns: as in `_refine`."""
         m, p, modes = self._structure.inputs, self._structure.outputs, len(unknowns) // 2
-        basis = [self._compute_mode_responses(group, unknowns) for group in self._groups]
+        mode_responses = [self._compute_mode_responses(group, unknowns) for group in self._groups]
         shapes = np.zeros((modes, p, m))
         bases = []
         for output in range(p):
-            rows = [
+            regressor_blocks = [
                 (group.root[is_fitted, output][..., None, :] * responses[is_fitted, None, :, None]).reshape(
                     group.target[is_fitted, output].size, modes * m
                 )
-                for group, responses, is_fitted in zip(self._groups, basis, self._fitted_masks, strict=True)
+                for group, responses, is_fitted in zip(self._groups, mode_responses, self._fitted_masks, strict=True)
             ]
             targets = [
                 group.target[is_fitted, output].ravel()
                 for group, is_fitted in zip(self._groups, self._fitted_masks, strict=True)
             ]
             design, target = (
-                _concatenate_real_imaginary(np.concatenate(rows)),
+                _concatenate_real_imaginary(np.concatenate(regressor_blocks)),
                 _concatenate_real_imaginary(np.concatenate(targets)),
             )
             scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
@@ -151,7 +155,7 @@ class ModalSearch:
                 shapes[:, output] = entries.reshape(modes, m)
         misfit = [
             group.target - (group.root @ np.einsum("lk,kpm->lpm", responses, shapes)[..., None])[..., 0]
-            for group, responses in zip(self._groups, basis, strict=True)
+            for group, responses in zip(self._groups, mode_responses, strict=True)
         ]
         return _Solution(misfit, bases, shapes)
 
@@ -161,12 +165,12 @@ class ModalSearch:
         solution = self._solve(unknowns)
         mode_count = len(unknowns) // 2
         columns = []
-        for k in range(len(unknowns)):
+        for index in range(len(unknowns)):
             # A mode's own parameters change its response alone, the delay changes all of them.
-            modes = np.arange(mode_count) if k == 2 * mode_count else np.array([k % mode_count])
+            modes = np.arange(mode_count) if index == 2 * mode_count else np.array([index % mode_count])
             chosen_unknowns = np.concatenate([modes, mode_count + modes, [2 * mode_count]])
             shifted = unknowns.copy()
-            shifted[k] += _LOG_STEP
+            shifted[index] += _LOG_STEP
             residual_change = [
                 -np.einsum(
                     "lpem,lk,kpm->lpe",
@@ -184,22 +188,22 @@ class ModalSearch:
             columns.append(self._project_out(residual_change, solution.bases))
         return np.stack(columns, axis=1)
 
-    def _compute_explained_by_mode(self, solution: _Solution, unknowns: FloatArray) -> float:
+    def _compute_explained_squares(self, solution: _Solution, unknowns: FloatArray) -> float:
         """Fall of the residual sum of squares by a further mode, all shapes free. unknowns: its three, as in
         `_refine`."""
         responses = [self._compute_mode_responses(group, unknowns)[:, 0] for group in self._groups]
         explained_squares = 0.0
         for output, basis in enumerate(solution.bases):
-            rows = [
+            regressor_blocks = [
                 (group.root[is_fitted, output] * response[is_fitted, None, None]).reshape(-1, self._structure.inputs)
                 for group, response, is_fitted in zip(self._groups, responses, self._fitted_masks, strict=True)
             ]
-            design = _concatenate_real_imaginary(np.concatenate(rows))
+            design = _concatenate_real_imaginary(np.concatenate(regressor_blocks))
             target = _concatenate_real_imaginary(
                 np.concatenate(
                     [
-                        part[is_fitted, output].ravel()
-                        for part, is_fitted in zip(solution.misfit, self._fitted_masks, strict=True)
+                        group_misfit[is_fitted, output].ravel()
+                        for group_misfit, is_fitted in zip(solution.misfit, self._fitted_masks, strict=True)
                     ]
                 )
             )
@@ -210,18 +214,18 @@ class ModalSearch:
 
     def _project_out(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
         """Component of a change of the residuals that no change of the shapes can compensate, output by output."""
-        parts = []
+        projected_columns = []
         for output, basis in enumerate(bases):
             column = _concatenate_real_imaginary(
                 np.concatenate(
                     [
-                        part[is_fitted, output].ravel()
-                        for part, is_fitted in zip(change, self._fitted_masks, strict=True)
+                        group_change[is_fitted, output].ravel()
+                        for group_change, is_fitted in zip(change, self._fitted_masks, strict=True)
                     ]
                 )
             )
-            parts.append(column - basis @ (basis.T @ column))
-        return np.concatenate(parts)
+            projected_columns.append(column - basis @ (basis.T @ column))
+        return np.concatenate(projected_columns)
 
     def _stack_real(self, misfit: Sequence[ComplexArray]) -> FloatArray:
         """Residuals on the lines not held out as a real vector, output by output, in the rows' order of the bases."""
@@ -230,8 +234,8 @@ class ModalSearch:
                 _concatenate_real_imaginary(
                     np.concatenate(
                         [
-                            part[is_fitted, output].ravel()
-                            for part, is_fitted in zip(misfit, self._fitted_masks, strict=True)
+                            group_misfit[is_fitted, output].ravel()
+                            for group_misfit, is_fitted in zip(misfit, self._fitted_masks, strict=True)
                         ]
                     )
                 )

@@ -1,5 +1,6 @@
 """Modal parametrisation of a mechanical model: each mode has its own shape at the commands and at the sensors, for
-devices whose sensors are not collocated with the commands. Fitted by `modal_order`."""
+devices whose sensors are not collocated with the commands. Called by `modal_order`, which fits it, and
+`physical_model`, which converts the result."""
 
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,8 @@ _BAND_MARGIN = 10.0
 _LEAST_DAMPING_RATIO, _LARGEST_DAMPING_RATIO = 1e-4, 100.0
 """Least and largest damping ratio of a mode; a rigid body on weak springs has the largest. Heuristic."""
 _RANK_TOLERANCE = 1e-9
-"""Least singular value of the input matrix, relative to the largest: below it, an axis counts as not driven."""
+"""Least singular value of the input matrix, relative to the largest: below it, an axis counts as not driven. Chosen
+above rounding errors."""
 _LARGEST_FLEXIBLE_SHARE = 0.5
 """Largest norm of the input shape of a flexible mode, relative to the largest of the rigid-body modes. Heuristic."""
 _RIGID_FREQUENCY_RATIO = 1.5
@@ -73,12 +75,12 @@ class ModalStructure:
 
     def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds (parameters,) of the unknowns, for a fit in this band; shapes are unbounded."""
-        low = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
-        high = -low
-        low[:, 0] = np.log(2 * np.pi * band_hz[0] / _BAND_MARGIN / self.speed_scale)
-        high[:, 0] = np.log(2 * np.pi * band_hz[1] * _BAND_MARGIN / self.speed_scale)
-        low[:, 1], high[:, 1] = np.log(_LEAST_DAMPING_RATIO), np.log(_LARGEST_DAMPING_RATIO)
-        return low.ravel(), high.ravel()
+        lower = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
+        upper = -lower
+        lower[:, 0] = np.log(2 * np.pi * band_hz[0] / _BAND_MARGIN / self.speed_scale)
+        upper[:, 0] = np.log(2 * np.pi * band_hz[1] * _BAND_MARGIN / self.speed_scale)
+        lower[:, 1], upper[:, 1] = np.log(_LEAST_DAMPING_RATIO), np.log(_LARGEST_DAMPING_RATIO)
+        return lower.ravel(), upper.ravel()
 
 
 def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:

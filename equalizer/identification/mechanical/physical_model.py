@@ -72,12 +72,13 @@ def _estimate_oscillator_tolerance(structure: Structure, fit: AnyFit) -> Toleran
 
 def _list_axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
     """(3 m,): mass, then damping to the ground, then stiffness to the ground, each at all m driven axes."""
-    return np.concatenate([np.diag(part) for part in structure.find_grounded_parts(unknowns)])
+    return np.concatenate([np.diag(part) for part in structure.compute_axis_matrices(unknowns)])
 
 
 def _compute_covariance(fit: AnyFit) -> FloatArray:
     """Covariance of the unknowns (parameters, parameters). Columns of the Jacobian are scaled to length 1; the
-    pseudo-inverse truncates directions that the data do not determine (singular values of J'J below 1e-10)."""
+    pseudo-inverse truncates directions that the data do not determine (singular values of J'J below 1e-10 of the
+    largest)."""
     jacobian = fit.jacobian
     column_norms = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     inverse = np.linalg.pinv((jacobian / column_norms).T @ (jacobian / column_norms), rcond=1e-10)
@@ -88,7 +89,8 @@ def _compute_covariance(fit: AnyFit) -> FloatArray:
 def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
     """The model with absolute positions z of the oscillators in place of their relative modal coordinates
     e = |L| (z - hᵀ x), where L is the participation, h = L / |L| the direction, and |L|² the mass of an oscillator.
-    Unchanged where a participation is too small to divide by. m: number of driven axes."""
+    Unchanged without oscillators, and where a participation is too small to divide by: |L| below 1e-6 of the root of
+    the largest mass. m: number of driven axes. joint: whether the oscillators are on the axes beyond a joint."""
     n, carrier, oscillators = (
         model.coordinates,
         slice(m, 2 * m) if joint else slice(0, m),

@@ -30,8 +30,8 @@ RIGID_OCTAVES = 3.0
 """Width in octaves of the lowest part of the band, in which the device moves as a rigid body and friction matters
 most. Chosen by hand."""
 LEAST_MASS_TOLERANCE, LEAST_DAMPING_TOLERANCE = 0.02, 0.05
-"""Smallest tolerances of mass and damping, relative to the largest value of all axes. Chosen by hand: about as well as
-a laboratory knows them."""
+"""Smallest tolerances of mass and damping, relative to the largest value of all axes. Chosen by hand: about the
+accuracy of a laboratory's measurement of them."""
 FRICTION_TOLERANCE = 0.2
 """Tolerance of the subtracted equivalent damping, relative to it: real friction is not exactly Coulomb friction. Chosen
 by hand."""
@@ -59,21 +59,21 @@ class RigidBody:
 
 
 def fit_rigid_body(
-    fit: MechanicalFit, stronger: Recording, weaker: Recording, settings: MechanicalFitSettings
+    fit: MechanicalFit, stronger_recording: Recording, weaker_recording: Recording, settings: MechanicalFitSettings
 ) -> RigidBody:
     """Fit a rigid body to two recordings of the same device, at a stronger and a weaker level of the excitation, and
     compute the equivalent damping of friction from their difference (limited to 0 to `LARGEST_REMOVED_SHARE` of the
     damping). fit: that of the whole band, whose tolerances are kept where they are wider. settings: of `fit`. Raises
-    MechanicalFitRefused where a recording does not determine a rigid body."""
+    MechanicalFitRefused where a recording does not determine a rigid body, ValueError where one has no segments."""
     low_hz, high_hz = fit.band_hz
     up_to_hz = min(high_hz, low_hz * 2**RIGID_OCTAVES)
     rigid_settings = replace(
         settings, band_hz=(low_hz, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
     )
-    level_ratio = _find_largest_amplitude(stronger) / _find_largest_amplitude(weaker)
+    level_ratio = _find_largest_amplitude(stronger_recording) / _find_largest_amplitude(weaker_recording)
     stronger_values, weaker_values = (
         _extract_axis_parameters(fit_mechanical_model([recording], rigid_settings).model)
-        for recording in (stronger, weaker)
+        for recording in (stronger_recording, weaker_recording)
     )
     mass, damping, _ = stronger_values
     friction_damping = np.clip(
@@ -99,8 +99,8 @@ def fit_rigid_body(
 
 def remove_friction_damping(model: MechanicalModel, friction_damping: FloatArray) -> MechanicalModel:
     """The model without friction's equivalent damping. friction_damping: (m,), N s/m at each driven axis."""
-    axes = compute_driven_axes(model)
-    return replace(model, damping=model.damping - (axes * friction_damping) @ axes.T)
+    driven_axes = compute_driven_axes(model)
+    return replace(model, damping=model.damping - (driven_axes * friction_damping) @ driven_axes.T)
 
 
 def _extract_axis_parameters(model: MechanicalModel) -> FloatArray:

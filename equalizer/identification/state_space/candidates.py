@@ -4,7 +4,7 @@ The cost as a function of poles and output shapes has many local minima. Two sub
 models without iteration, each for several horizons (`identify` calls them): frequency-domain identification on a warped
 frequency axis (`warped_subspace`), and canonical variate analysis of time records (`canonical_variate`). Each start is
 refined by maximum likelihood (`refinement`), first on lines averaged in bins, where the cost is smooth and cheap, then,
-in a narrow band, on all lines. Equations and references are in these modules.
+in a narrow band, on all lines. Equations and references are in these modules. Called by `identify` and `relaxed_poles`.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from equalizer.identification.state_space.canonical_variate import (
     choose_decimation_factor,
     collect_driven_records,
     estimate_observability,
+    estimate_poles_and_shapes,
 )
-from equalizer.identification.state_space.canonical_variate import estimate_poles_and_shapes as from_records
 from equalizer.identification.state_space.modal_form import ModalForm
 from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine_form
 from equalizer.identification.state_space.settings import IdentificationSettings
@@ -44,10 +44,11 @@ LARGEST_OUTSIDE_GAIN = 100.0
 """Largest acceptable `Candidate.outside_gain`: a model above it fits the lines by cancellation of large modes.
 Heuristic."""
 GAIN_POINTS = 2000
-"""Number of frequencies from 0 to half the sample rate over which `compute_outside_gain` takes the largest gain."""
+"""Number of frequencies from 0 to half the sample rate over which `compute_outside_gain` takes the largest gain.
+Chosen."""
 MOST_BIN_STEPS, MOST_LINE_STEPS = (60, 20, 20), 4
 """Largest number of Levenberg-Marquardt steps: in each of three passes on averaged lines, and at the end on all lines
-of a narrow band."""
+of a narrow band. Heuristic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,18 +98,18 @@ def estimate_record_starts(
     recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
 ) -> tuple[Start, ...]:
     """Starting models by canonical variate analysis of time records, one per horizon that has enough rows and samples;
-    none where the band is too wide for decimation."""
-    factor = choose_decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
-    if factor < 2:
+    none where the band is too wide for decimation by 2 or more."""
+    decimation_factor = choose_decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
+    if decimation_factor < 2:
         return ()
-    records = collect_driven_records(recordings, factor)
+    records = collect_driven_records(recordings, decimation_factor)
     p, m = lines.response.shape[1:]
     radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
     starts = []
     for horizon in settings.record_horizons:
         observability = estimate_observability(records, m, horizon) if horizon * p > settings.order + p else None
         if observability is not None:
-            form = from_records(observability, p, settings.order, factor, radius)
+            form = estimate_poles_and_shapes(observability, p, settings.order, decimation_factor, radius)
             starts.append(Start(f"canonical variates, horizon {horizon}", form))
     return tuple(starts)
 

@@ -19,22 +19,25 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_RATE_OVER_BAND = 3.5
-"""Records are decimated to at least this many samples per period of the band's upper end, and to hardly more."""
+"""Records are decimated to at least this many samples per period of the band's upper end, and to hardly more. Chosen
+above the limit of 2 of the sampling theorem, which leaves room for the low-pass filter."""
 LEAST_SAMPLES_PER_COLUMN = 4
-"""Least length of a record that is used, in samples times the number of records, per column of the data matrix."""
+"""Rows that a record must have, times the number of records, per column of the data matrix: more equations than
+unknowns. Chosen."""
 _UNDRIVEN_SEGMENT_KINDS = ("rest", "free")
 """Kinds of segments without a command: rest and free decay."""
 
 
 def choose_decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
-    """Largest decimation factor that leaves RATE_OVER_BAND samples or more per period of high_hz, at least 1."""
+    """Largest decimation factor that leaves `LEAST_RATE_OVER_BAND` samples or more per period of high_hz; 1 where none
+    does."""
     return max(1, int(sample_rate_hz / (LEAST_RATE_OVER_BAND * high_hz)))
 
 
-def collect_driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatArray]:
+def collect_driven_records(recordings: Sequence[Recording], decimation_factor: int) -> list[FloatArray]:
     """Collect commands and responses side by side, (n, m + p) each: every driven segment that is not held out for a
-    test, with its mean removed, then low-pass filtered and decimated by `factor`. Segments with missing samples are
-    left out."""
+    test, with its mean removed, then low-pass filtered and decimated by `decimation_factor`. Segments with missing
+    samples are left out."""
     records = []
     for recording in recordings:
         signals = np.hstack([recording.command.samples, recording.response.samples])
@@ -43,7 +46,7 @@ def collect_driven_records(recordings: Sequence[Recording], factor: int) -> list
             if segment.kind in _UNDRIVEN_SEGMENT_KINDS or segment.role == "test" or not np.isfinite(samples).all():
                 continue
             centred = samples - samples.mean(axis=0)
-            records.append(resample_poly(centred, 1, factor, axis=0) if factor > 1 else centred)
+            records.append(resample_poly(centred, 1, decimation_factor, axis=0) if decimation_factor > 1 else centred)
     return records
 
 
@@ -66,19 +69,24 @@ def estimate_observability(records: Sequence[FloatArray], inputs: int, horizon: 
     )
     triangle = _compute_qr_triangle(triangle)
     p = records[0].shape[1] - inputs
-    command_columns, future = horizon * inputs, triangle.shape[1] - horizon * p
-    predicted_part, innovation_part = triangle[command_columns:future, future:], triangle[future:, future:]
+    past_start, future_start = horizon * inputs, triangle.shape[1] - horizon * p
+    predicted_part, innovation_part = (
+        triangle[past_start:future_start, future_start:],
+        triangle[future_start:, future_start:],
+    )
     # Covariance L L' of the future responses, given the future commands: part predicted by the past, and innovation.
     covariance = predicted_part.T @ predicted_part + innovation_part.T @ innovation_part
+    # Raised above rounding errors, so that it is positive definite.
     covariance[np.diag_indices_from(covariance)] += 1e-13 * np.trace(covariance)
     covariance_root = np.linalg.cholesky(covariance)
-    # Canonical correlations are the singular values of L^-1 by_past', because the past is orthonormal in the QR basis.
+    # Canonical correlations are the singular values of L^-1 predicted_part', because the past is orthonormal in the QR
+    # basis.
     vectors, correlations, _ = np.linalg.svd(np.linalg.solve(covariance_root, predicted_part.T), full_matrices=False)
     return np.asarray(covariance_root @ (vectors * np.sqrt(correlations)), dtype=np.float64)
 
 
 def _compute_qr_triangle(rows: FloatArray) -> FloatArray:
-    """Triangular factor R of the QR decomposition; R'R equals the products of the rows."""
+    """Triangular factor R of the QR decomposition; R'R equals rows' rows."""
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
@@ -97,17 +105,22 @@ def _stack_past_and_future(record: FloatArray, inputs: int, horizon: int) -> Flo
     )
 
 
-def estimate_poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
+def estimate_poles_and_shapes(
+    extended_observability: FloatArray, outputs: int, order: int, decimation_factor: int, radius: float
+) -> ModalForm:
     """Modal form of a model of this order at the full rate. The poles are the eigenvalues of the matrix A that shifts
     the observability matrix by one sample, in least squares. A pole of the decimated records becomes its factor-th
-    root. observed: result of `estimate_observability`; radius: largest magnitude of a pole at the full rate."""
-    observability = observed[:, :order]
+    root. extended_observability: result of `estimate_observability`; decimation_factor: of the records; radius:
+    largest magnitude of a pole at the full rate."""
+    observability = extended_observability[:, :order]
     eigenvalues, eigenvectors = np.linalg.eig(
         np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0]
     )
-    decimated_poles: ComplexArray = stabilise_poles(eigenvalues, radius**factor)
+    decimated_poles: ComplexArray = stabilise_poles(eigenvalues, radius**decimation_factor)
     # A negative real pole may have no real factor-th root; the positive pole with the same decay is used.
     rootable_poles = np.where(
         (decimated_poles.imag == 0) & (decimated_poles.real < 0), -decimated_poles, decimated_poles
     )
-    return from_poles(stabilise_poles(rootable_poles ** (1 / factor), radius), observability[:outputs] @ eigenvectors)
+    return from_poles(
+        stabilise_poles(rootable_poles ** (1 / decimation_factor), radius), observability[:outputs] @ eigenvectors
+    )

@@ -31,7 +31,7 @@ class SlowModes:
 
 def extract_slow_modes(identified: Identified, least_magnitude: float) -> SlowModes | None:
     """Extract the 2 x 2 blocks with a pole of magnitude above `least_magnitude`; None where there are none, or where no
-    pole was relaxed (`relaxed_poles`). A pole at its bound is left out, because its decay is not known."""
+    pole was relaxed (`relaxed_poles`). A block with a pole at its bound is left out, because its decay is not known."""
     fitted = identified.chosen.fitted
     pole_magnitudes = np.abs(fitted.form.poles).reshape(2, -1).max(axis=0)
     is_slow = (pole_magnitudes > least_magnitude) & ~is_at_bound(fitted, identified.chosen.radius)
@@ -45,13 +45,13 @@ def extract_slow_modes(identified: Identified, least_magnitude: float) -> SlowMo
     )
 
 
-def subtract_free_decay(recordings: Sequence[Recording], slow: SlowModes) -> tuple[Recording, ...]:
-    """Subtract the free decay of the slow modes from every period of the periodic segments. From the first missing
-    command sample on, periods are not changed, because the state is unknown."""
-    return tuple(_subtract_from_periods(recording, slow) for recording in recordings)
+def subtract_free_decay(recordings: Sequence[Recording], slow_modes: SlowModes) -> tuple[Recording, ...]:
+    """Subtract the free decay of the slow modes from every period of the periodic segments. Periods that end after the
+    first missing command sample of a recording are not changed, because the state is unknown."""
+    return tuple(_subtract_from_periods(recording, slow_modes) for recording in recordings)
 
 
-def _subtract_from_periods(recording: Recording, slow: SlowModes) -> Recording:
+def _subtract_from_periods(recording: Recording, slow_modes: SlowModes) -> Recording:
     """`subtract_free_decay` for one recording."""
     command_samples, response_samples = recording.command.samples, np.array(recording.response.samples)
     states: dict[int, FloatArray] = {}
@@ -62,15 +62,15 @@ def _subtract_from_periods(recording: Recording, slow: SlowModes) -> Recording:
         for start in range(segment.start, segment.stop - segment.period + 1, segment.period)
     ]
     period_edges = {edge for period in periods for edge in period}
-    x = np.zeros(len(slow.A))
+    x = np.zeros(len(slow_modes.A))
     for k in range(max(period_edges, default=-1) + 1):
         if k in period_edges:
             states[k] = x
         if k < len(command_samples):
-            x = slow.A @ x + slow.B @ command_samples[k]
+            x = slow_modes.A @ x + slow_modes.B @ command_samples[k]
     for start, stop in periods:
         if np.isfinite(states[stop]).all():
-            response_samples[start:stop] -= _compute_free_decay(slow, states[start], states[stop], stop - start)
+            response_samples[start:stop] -= _compute_free_decay(slow_modes, states[start], states[stop], stop - start)
     response = recording.response
     return replace(
         recording,
@@ -79,13 +79,13 @@ def _subtract_from_periods(recording: Recording, slow: SlowModes) -> Recording:
 
 
 def _compute_free_decay(
-    slow: SlowModes, start_state: FloatArray, end_state: FloatArray, sample_count: int
+    slow_modes: SlowModes, start_state: FloatArray, end_state: FloatArray, sample_count: int
 ) -> FloatArray:
     """Free decay (sample_count, p) within a period that starts and ends in the given states, (n,) each."""
-    one_period = np.linalg.matrix_power(slow.A, sample_count)
-    x = np.linalg.solve(np.eye(len(slow.A)) - one_period, start_state - end_state)
-    decay = np.empty((sample_count, len(slow.C)))
+    period_transition = np.linalg.matrix_power(slow_modes.A, sample_count)
+    x = np.linalg.solve(np.eye(len(slow_modes.A)) - period_transition, start_state - end_state)
+    decay = np.empty((sample_count, len(slow_modes.C)))
     for k in range(sample_count):
-        decay[k] = slow.C @ x
-        x = slow.A @ x
+        decay[k] = slow_modes.C @ x
+        x = slow_modes.A @ x
     return decay

@@ -30,7 +30,8 @@ class HeldOutValidation:
     band."""
     noise: float | None
     """Rms of the response's noise over rms of the response, estimated from the difference of the residuals between the
-    last two periods; None where a segment has fewer than three periods. A perfect model has this error."""
+    last two periods; None where a segment is not periodic or has fewer than three periods. A perfect model has this
+    error."""
     seconds: float
     """Duration that was compared (s), summed over the segments."""
 
@@ -79,29 +80,29 @@ def _iterate_test_segments(recordings: Sequence[Recording]) -> Iterator[tuple[Re
 
 
 def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segment) -> _SegmentComparison:
-    """Simulate from rest, beginning with the run-in or after the last missing command in it, and compare. Raises
-    ValueError."""
+    """Simulate from rest, beginning with the run-in or after the last missing command in it, and compare with the
+    response. Raises ValueError as `validate_on_test` does."""
     _check_compatible(model, recording)
     rate_hz = recording.sample_rate_hz
     start = max(0, segment.start - _count_run_in_samples(model))
-    gaps = np.flatnonzero(~np.isfinite(recording.command.samples[start : segment.start]).all(axis=1))
-    start += int(gaps[-1]) + 1 if len(gaps) else 0
+    missing_indices = np.flatnonzero(~np.isfinite(recording.command.samples[start : segment.start]).all(axis=1))
+    start += int(missing_indices[-1]) + 1 if len(missing_indices) else 0
     commands = recording.command.samples[start : segment.stop]
     response = recording.response.samples[start : segment.stop]
     if not (np.isfinite(commands).all() and np.isfinite(response[segment.start - start :]).all()):
         raise ValueError(f"samples {start} to {segment.stop} hold missing values; a test segment needs all of them")
     predicted = simulate(model, commands)
-    first_compared = _find_first_compared_sample(segment) - start
-    compared_count = segment.stop - start - first_compared
-    measured_spectrum = _compute_band_spectrum(response[first_compared:], rate_hz, model.band_hz)
-    error_spectrum = measured_spectrum - _compute_band_spectrum(predicted[first_compared:], rate_hz, model.band_hz)
+    first_index = _find_first_compared_sample(segment) - start
+    compared_count = segment.stop - start - first_index
+    measured_spectrum = _compute_band_spectrum(response[first_index:], rate_hz, model.band_hz)
+    error_spectrum = measured_spectrum - _compute_band_spectrum(predicted[first_index:], rate_hz, model.band_hz)
     noise_power = None
     if (
-        segment.period and first_compared - 2 * compared_count >= segment.start - start
+        segment.period and first_index - 2 * compared_count >= segment.start - start
     ):  # at least three periods: the first contains the transient
         # From the residuals, so that a free decay from period to period does not count as noise.
         previous_error_spectrum = _compute_band_spectrum(
-            (response - predicted)[first_compared - compared_count : first_compared], rate_hz, model.band_hz
+            (response - predicted)[first_index - compared_count : first_index], rate_hz, model.band_hz
         )
         noise_power = _compute_power(error_spectrum - previous_error_spectrum) / 2
     return _SegmentComparison(
@@ -110,9 +111,9 @@ def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segm
 
 
 def _count_run_in_samples(model: IdentifiedModel) -> int:
-    """Length of the run-in in samples."""
-    radius = model.spectral_radius
-    time_constant_samples = -1 / np.log(radius) if 0 < radius < 1 else 0.0
+    """Length of the run-in in samples; `MIN_RUN_IN_S` alone counts where the spectral radius is 0, or 1 and more."""
+    spectral_radius = model.spectral_radius
+    time_constant_samples = -1 / np.log(spectral_radius) if 0 < spectral_radius < 1 else 0.0
     return round(max(MIN_RUN_IN_S * model.sample_rate_hz, MIN_RUN_IN_TIME_CONSTANTS * time_constant_samples))
 
 

@@ -53,7 +53,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summary, SummaryDisplay
 
 FIRST_SEARCH_PROGRESS = 0.8
-"""Fraction of the reported progress that the first search takes; the relaxation of poles takes the rest."""
+"""Fraction of the reported progress that the first search takes; the relaxation of poles takes the rest. Chosen."""
 DELAY_SAMPLES = 1.0
 """Delay of the response to a command, samples: each response is sampled just before the command of the same row is
 written."""
@@ -69,16 +69,19 @@ class Identified(SummaryDisplay):
     rms_relative_error: float
     """Rms error of the model against the estimate over the band, the estimate's noise included."""
     worst_relative_error: float
-    """Error of the worst line, relative to the root mean square of the response."""
+    """Error of the worst line in the band, relative to the root mean square of the response."""
     scatter: float | None
     """Error of the model that the noise causes, from the bootstrap draws: root mean square over the lines, relative to
     the response; None without draws. Lack of fit is not included."""
     misfit: Misfit
     """Lack of fit: difference of the lines from the model beyond their noise."""
     expected_error: float | None
-    """95 % bound of the total error, likewise relative: noise, and the most misfit that the noise may hide."""
+    """95 % bound of the total error, relative to the response: `scatter`, and the upper bound of the misfit; None
+    without draws."""
     lines: int
+    """Number of lines within the band, without its margins."""
     candidates: tuple[Candidate, ...]
+    """All refined models of the search, the chosen one included."""
     chosen: Candidate
     relaxed: tuple[SlowPole, ...]
     """Poles with a longer decay than the ordinary bound, which the data require; slowest first."""
@@ -94,6 +97,7 @@ class Identified(SummaryDisplay):
         return float(-1 / (np.log(radius) * self.model.sample_rate_hz)) if radius > 0 else 0.0
 
     def summary(self) -> Summary:
+        """Rows for display: those of the model, expected error, cost and remarks."""
         expected = "not known" if self.expected_error is None else f"{100 * self.expected_error:.3g} % (95 %)"
         return Summary(
             "Identified device",
@@ -115,12 +119,13 @@ def identify(
 ) -> Identified:
     """Fit one model to all estimates together, each line weighted by its noise. The model is always stable.
 
-    `records` give further starts in the time domain. `on_progress` takes the share done, 0 to 1. `initial`: a model to
-    refine on these lines instead of a search; poles that were relaxed for it are bounded again where that costs
-    nothing. Raises IdentificationRefused where no model can be fitted to the data.
+    `records` give further starts in the time domain. `initial`: a model to refine on these lines instead of a search;
+    poles that were relaxed for it are bounded again where that costs nothing. `on_progress` takes the share done, 0 to
+    1, of a search; it is not called with `initial`. Raises IdentificationRefused where no model can be fitted to the
+    data.
     """
     settings = settings or IdentificationSettings()
-    report = on_progress or (lambda _: None)
+    report_progress = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = require_lines(responses, settings)
     _refuse_foreign_records(records, responses[0])
@@ -128,7 +133,7 @@ def identify(
     if initial is not None:
         refit = RelaxedFit(refine_and_tighten(initial, lines, settings), is_bound_binding=False)
         return _assess_model((refit.candidate,), refit, lines, responses[0], settings)
-    candidates = _search(lines, settings, records, lambda share: report(FIRST_SEARCH_PROGRESS * share))
+    candidates = _search(lines, settings, records, lambda share: report_progress(FIRST_SEARCH_PROGRESS * share))
     relaxed_fit = relax_poles(
         choose_best(candidates),
         lambda relaxed_settings: _search(lines, relaxed_settings, records, lambda _: None),
@@ -137,7 +142,7 @@ def identify(
     )
     all_candidates = candidates if relaxed_fit.candidate in candidates else [*candidates, relaxed_fit.candidate]
     identified = _assess_model(tuple(all_candidates), relaxed_fit, lines, responses[0], settings)
-    report(1.0)
+    report_progress(1.0)
     return identified
 
 
@@ -145,16 +150,17 @@ def _search(
     lines: WeightedLines,
     settings: IdentificationSettings,
     records: tuple[Recording, ...],
-    report: Callable[[float], None],
+    report_progress: Callable[[float], None],
 ) -> list[Candidate]:
-    """Refine all starting models. report: takes the share done, 0 to 1. Raises IdentificationRefused."""
+    """Refine all starting models. report_progress: takes the share done, 0 to 1. Raises IdentificationRefused as
+    `_make_starts` does."""
     starts = _make_starts(lines, settings, records)
     candidates = []
     for start_index, start in enumerate(starts):
-        report(start_index / len(starts))
+        report_progress(start_index / len(starts))
         candidates.append(refine_start(start, lines, settings))
     candidates += _search_spare_horizons(choose_best(candidates), lines, settings)
-    report(1.0)
+    report_progress(1.0)
     return candidates
 
 
@@ -195,25 +201,25 @@ def _assess_model(
 ) -> Identified:
     """Result for the fitted model: cost, errors in the band, misfit, scatter of the bootstrap draws, and remarks."""
     chosen = relaxed_fit.candidate
-    low, high = settings.band_hz
+    low_hz, high_hz = settings.band_hz
     p, m = lines.response.shape[1:]
     unknowns = count_unknowns(settings.order, p, m)
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
-    in_band = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
-    modelled = chosen.fitted.compute_response(lines.z)
-    relative_error = lines.compute_relative_error(modelled)[in_band]
+    is_in_band = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
+    modelled_response = chosen.fitted.compute_response(lines.z)
+    relative_error = lines.compute_relative_error(modelled_response)[is_in_band]
     relaxed_poles = () if settings.longest_decay_s else list_slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
-    misfit = compute_misfit(lines, modelled, in_band, unknowns)
+    misfit = compute_misfit(lines, modelled_response, is_in_band, unknowns)
     model = _make_model(chosen, lines, cost, response, settings, relaxed_poles)
     return Identified(
         model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((relative_error**2).mean())),
         worst_relative_error=float(relative_error.max()),
-        scatter=(scatter := compute_relative_deviation(model, lines.frequency_hz[in_band], relaxed_poles)),
+        scatter=(scatter := compute_relative_deviation(model, lines.frequency_hz[is_in_band], relaxed_poles)),
         misfit=misfit,
         expected_error=None if scatter is None else float(np.hypot(scatter, misfit.upper_bound)),
-        lines=int(in_band.sum()),
+        lines=int(is_in_band.sum()),
         candidates=candidates,
         chosen=chosen,
         relaxed=relaxed_poles,

@@ -1,5 +1,9 @@
-"""Identification from recordings: estimate and fit, repeated where long decays disturb the estimate, or where the lines
-scatter more than their noise."""
+"""Identification of a state-space model from recordings: estimate of the frequency response, fit, and repetitions.
+
+The free decay of slow poles disturbs the estimate: it is subtracted from the recordings, and estimate and fit are
+repeated. Where the lines scatter more than their noise, the fit is repeated on local averages. Called as
+`equalizer.identify` and by `study.workflows.equalizer.identify_model`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +22,17 @@ from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.recording import Recording
 
 DISTURBING_DECAY_S = 1.0
-"""Time constant above which the transient of a start disturbs the estimate, which leaves out its first 5 s."""
+"""Time constant (s) above which the transient at the start of an excitation disturbs the estimate, which leaves out the
+first 5 s (`experiments.TRANSIENT_S`). Chosen: after five time constants less than 1 % remains."""
 MOST_ROUNDS = 8
-"""Most repetitions in which slow transients are subtracted and the model is refined."""
-SETTLED = 1e-4
-"""Relative change of the slowest decay between rounds below which no further round is made."""
-SMOOTHED = (
+"""Most repetitions in which slow transients are subtracted and the model is refined. Chosen."""
+SETTLED_DECAY_CHANGE = 1e-4
+"""Relative change of the slowest decay between rounds below which no further round is made. Chosen."""
+SMOOTHED_REMARK = (
     "The lines differ from the model by more than their noise: the fit was made to a local average over neighbouring "
     "lines (--no-smooth fits the lines themselves)."
 )
+"""Remark of a model that was fitted to local averages."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +40,7 @@ class IdentifiedRecordings:
     """Result of `identify_recordings`: frequency response of the recordings, and the state-space model fitted to it."""
 
     estimate: FrequencyResponse
+    """Frequency response of the recordings, free decays of slow poles subtracted."""
     fitted: FrequencyResponse
     """The frequency response that the model was fitted to: the estimate, or its local averages."""
     identified: Identified
@@ -47,9 +54,10 @@ def identify_recordings(
 ) -> IdentifiedRecordings:
     """Identify a state-space model of the recorded device, and state how well it fits.
 
-    smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, because they would
-    blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes the share done, 0 to
-    1. Raises TransferEstimateError, IdentificationRefused.
+    smooth: whether to fit local averages over neighbouring lines, taken about the model where a pole was relaxed,
+    because they would blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes
+    the share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does, and IdentificationRefused as
+    `identify` does.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or IdentificationSettings()
@@ -68,16 +76,18 @@ def _fit_estimate(
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
     smooth: bool | None,
-    report: Callable[[float], None],
+    report_progress: Callable[[float], None],
 ) -> IdentifiedRecordings:
+    """Fit the lines of the estimate, then, depending on `smooth`, local averages of them. report_progress: takes the
+    share done."""
     if smooth and settings.longest_decay_s is not None:
-        return _fit_smoothed(estimate, recordings, settings, None, report)
-    identified = identify(estimate, settings, recordings, lambda share: report(share / 2))
+        return _fit_smoothed(estimate, recordings, settings, None, report_progress)
+    identified = identify(estimate, settings, recordings, lambda share: report_progress(share / 2))
     estimate, identified = _remove_transients(estimate, identified, recordings, settings)
     if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED_COST):
-        report(1.0)
+        report_progress(1.0)
         return IdentifiedRecordings(estimate, estimate, identified)
-    return _fit_smoothed(estimate, recordings, settings, identified, lambda share: report(0.5 + share / 2))
+    return _fit_smoothed(estimate, recordings, settings, identified, lambda share: report_progress(0.5 + share / 2))
 
 
 def _add_causes(
@@ -85,12 +95,12 @@ def _add_causes(
 ) -> IdentifiedRecordings:
     """Add the causes of the misfit, judged on the lines themselves: residuals of local averages are always smooth,
     because neighbours share their lines."""
-    identified, averaged = result.identified, result.fitted is not result.estimate
-    misfit = compute_estimate_misfit(identified.model, result.estimate) if averaged else identified.misfit
+    identified, is_averaged = result.identified, result.fitted is not result.estimate
+    misfit = compute_estimate_misfit(identified.model, result.estimate) if is_averaged else identified.misfit
     misfit = misfit if has_repeats else replace(misfit, smooth=None)
-    cost = misfit.cost if averaged else identified.cost
+    cost = misfit.cost if is_averaged else identified.cost
     causes = describe_misfit_causes(cost, misfit, identified.relaxed, identified.is_bound_binding, settings)
-    remarks = (*([SMOOTHED] if averaged else []), *causes, *write_outside_gain_remark(identified.chosen))
+    remarks = (*([SMOOTHED_REMARK] if is_averaged else []), *causes, *write_outside_gain_remark(identified.chosen))
     return replace(result, identified=replace(identified, misfit=misfit, remarks=remarks))
 
 
@@ -111,14 +121,18 @@ def _remove_transients(
     recordings: Sequence[Recording],
     settings: IdentificationSettings,
 ) -> tuple[FrequencyResponse, Identified]:
-    """Subtract the free decay of slow poles from the recordings, and identify again, until the decay settles."""
-    radius, without_draws = compute_pole_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
+    """Subtract the free decay of slow poles from the recordings, and identify again, until the slowest decay changes by
+    less than `SETTLED_DECAY_CHANGE`, or `MOST_ROUNDS` are done."""
+    radius, settings_without_draws = (
+        compute_pole_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz),
+        replace(settings, draws=0),
+    )
     rounds = 0
-    while (slow := extract_slow_modes(identified, radius)) is not None and rounds < MOST_ROUNDS:
+    while (slow_modes := extract_slow_modes(identified, radius)) is not None and rounds < MOST_ROUNDS:
         previous_decay_s, rounds = identified.slowest_decay_s, rounds + 1
-        estimate = estimate_transfer(subtract_free_decay(recordings, slow))
-        identified = identify(estimate, without_draws, initial=identified.chosen)
-        if abs(identified.slowest_decay_s / previous_decay_s - 1) < SETTLED:
+        estimate = estimate_transfer(subtract_free_decay(recordings, slow_modes))
+        identified = identify(estimate, settings_without_draws, initial=identified.chosen)
+        if abs(identified.slowest_decay_s / previous_decay_s - 1) < SETTLED_DECAY_CHANGE:
             break
     return estimate, identify(estimate, settings, initial=identified.chosen) if rounds else identified
 
@@ -128,18 +142,20 @@ def _fit_smoothed(
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
     unsmoothed: Identified | None,
-    report: Callable[[float], None],
+    report_progress: Callable[[float], None],
 ) -> IdentifiedRecordings:
-    relaxed = unsmoothed is not None and bool(unsmoothed.relaxed)
-    if unsmoothed is not None and relaxed:
+    """Fit local averages of the lines. unsmoothed: the fit of the lines themselves, whose chosen model is refined where
+    a pole was relaxed; None, or no relaxed pole: a new search. report_progress: takes the share done."""
+    has_relaxed_pole = unsmoothed is not None and bool(unsmoothed.relaxed)
+    if unsmoothed is not None and has_relaxed_pole:
         fitted = smooth_response(estimate, baseline=compute_model_response(unsmoothed.model, estimate.frequency_hz))
         identified = identify(fitted, settings, initial=unsmoothed.chosen)
     else:
         fitted = smooth_response(estimate)
         # Averaged lines are correlated, so the likelihood-ratio test for a longer decay does not hold on them.
-        bounded = replace(settings, longest_decay_s=settings.decay_s)
-        identified = identify(fitted, bounded, recordings, report)
-    report(1.0)
+        bounded_settings = replace(settings, longest_decay_s=settings.decay_s)
+        identified = identify(fitted, bounded_settings, recordings, report_progress)
+    report_progress(1.0)
     # For the same reason the cost of the bound cannot be tested on averaged lines.
     is_bound_binding = unsmoothed is not None and unsmoothed.is_bound_binding
     return IdentifiedRecordings(estimate, fitted, replace(identified, is_bound_binding=is_bound_binding))

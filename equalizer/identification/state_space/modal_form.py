@@ -42,21 +42,21 @@ class ModalForm:
     def compute_state_outputs(self, z: ComplexArray) -> ComplexArray:
         """C (zI - A)^-1, shape (lines, p, n). z: (lines,)."""
         offset = z[:, None] - self.a
-        scale = 1 / (offset**2 - self.b)
+        inverse_denominator = 1 / (offset**2 - self.b)
         first, second = self.C[:, ::2], self.C[:, 1::2]
-        states = np.empty((len(z), *self.C.shape), dtype=np.complex128)
-        states[:, :, ::2] = (first * offset[:, None] + second * self.b) * scale[:, None]
-        states[:, :, 1::2] = (first + second * offset[:, None]) * scale[:, None]
-        return states
+        state_outputs = np.empty((len(z), *self.C.shape), dtype=np.complex128)
+        state_outputs[:, :, ::2] = (first * offset[:, None] + second * self.b) * inverse_denominator[:, None]
+        state_outputs[:, :, 1::2] = (first + second * offset[:, None]) * inverse_denominator[:, None]
+        return state_outputs
 
     def compute_state_responses(self, z: ComplexArray, B: FloatArray) -> ComplexArray:
         """(zI - A)^-1 B, shape (lines, n, m). z: (lines,), B: (n, m)."""
         offset = (z[:, None] - self.a)[:, :, None]
-        scale = 1 / (offset**2 - self.b[:, None])
-        states = np.empty((len(z), *B.shape), dtype=np.complex128)
-        states[:, ::2] = (offset * B[::2] + B[1::2]) * scale
-        states[:, 1::2] = (self.b[:, None] * B[::2] + offset * B[1::2]) * scale
-        return states
+        inverse_denominator = 1 / (offset**2 - self.b[:, None])
+        state_responses = np.empty((len(z), *B.shape), dtype=np.complex128)
+        state_responses[:, ::2] = (offset * B[::2] + B[1::2]) * inverse_denominator
+        state_responses[:, 1::2] = (self.b[:, None] * B[::2] + offset * B[1::2]) * inverse_denominator
+        return state_responses
 
 
 def compute_modal_form(A: FloatArray, C: FloatArray) -> ModalForm:

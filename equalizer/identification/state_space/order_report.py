@@ -2,7 +2,8 @@
 
 Each order is fitted to every second line and tested on the others. The suggested order follows the one-standard-error
 rule (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984): the lowest order whose error on
-held-out lines exceeds the least one by no more than the standard error of that difference.
+held-out lines exceeds the least one by no more than the standard error of that difference. Called by
+`study.workflows.equalizer.report_identification`.
 """
 
 from collections.abc import Callable, Sequence
@@ -60,27 +61,28 @@ def compare_orders(
     orders: Sequence[int] = (10, 14, 16, 20, 26),
     on_progress: Callable[[float], None] | None = None,
 ) -> OrderReport:
-    """Fit every order to every second line and test it on the others. on_progress: called with the share done, 0 to 1.
-    Raises IdentificationRefused where there are too few lines for the highest order."""
+    """Fit every order to every second line and test it on the others. orders: even numbers of states (default chosen).
+    on_progress: called with the share done, 0 to 1. Raises IdentificationRefused as `require_lines` does, for example
+    where there are too few lines for the highest order."""
     settings = settings or IdentificationSettings()
     report_progress = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     top_settings = replace(settings, order=max(orders))
-    fit, test = (
-        require_lines([estimate.select_lines(_mask_lines(estimate, k)) for estimate in responses], top_settings)
-        for k in (0, 1)
+    fitted, held_out = (
+        require_lines([estimate.select_lines(_mask_lines(estimate, parity)) for estimate in responses], top_settings)
+        for parity in (0, 1)
     )
     line_costs = []
     rows = []
     for index, order in enumerate(sorted(orders)):
         report_progress(index / len(orders))
         trial = replace(settings, order=order)
-        best = choose_best([refine_start(start, fit, trial) for start in estimate_subspace_starts(fit, trial)])
-        modelled = best.fitted.compute_response(test.z)
-        costs = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
+        best = choose_best([refine_start(start, fitted, trial) for start in estimate_subspace_starts(fitted, trial)])
+        modelled_response = best.fitted.compute_response(held_out.z)
+        costs = (np.abs(held_out.weight * (modelled_response - held_out.response)) ** 2).mean(axis=(1, 2))
         line_costs.append(costs)
-        error = float(np.sqrt((test.compute_relative_error(modelled) ** 2).mean()))
-        p, m = test.response.shape[1:]
+        error = float(np.sqrt((held_out.compute_relative_error(modelled_response) ** 2).mean()))
+        p, m = held_out.response.shape[1:]
         rows.append(
             OrderRow(order, float(costs.mean()), error, count_products(order, p, m), count_dense_products(order, p, m))
         )
@@ -92,7 +94,7 @@ def compare_orders(
         singular_values,
         int((singular_values > VISIBLE_RATIO).sum()),
         tuple(rows),
-        _compute_relative_noise(test),
+        _compute_relative_noise(held_out),
         rows[_suggest_order(line_costs)].order,
     )
 
@@ -108,9 +110,9 @@ def count_dense_products(order: int, outputs: int, inputs: int) -> int:
     return order**2 + order * (outputs + inputs) + outputs * inputs
 
 
-def _mask_lines(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Mask (lines,) of every second line, from the line `first` (0 or 1) on."""
-    return np.asarray(np.arange(len(response)) % 2 == first)
+def _mask_lines(response: FrequencyResponse, first_line: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Mask (lines,) of every second line, from the line with the index `first_line` (0 or 1) on."""
+    return np.asarray(np.arange(len(response)) % 2 == first_line)
 
 
 def _compute_relative_noise(lines: WeightedLines) -> float:

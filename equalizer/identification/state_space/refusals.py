@@ -2,7 +2,7 @@
 
 In order: estimates that disagree, a band beyond half the sample rate, inputs without excitation, outputs that are
 always zero, a band without lines or with a gap, too much noise, and fewer lines than the order needs. Thresholds are
-heuristic.
+heuristic. Called by `identify` and `order_report`.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines, w
 
 LEAST_SIGNAL_TO_NOISE = 2.0
 """Least ratio of magnitude to standard error of the strongest entry at a typical (median) line, for a single entry;
-more entries raise it, as the largest of them is larger by chance."""
-LARGEST_GAP = 0.1
-"""Gap without a line, in octaves, above which a model is refused, if `SPACINGS` is exceeded too."""
-SPACINGS = 3.0
-"""Gap, in median line spacings, above which a model is refused, if `LARGEST_GAP` is exceeded too."""
+n entries raise it by the factor sqrt(log(n) + 1), as the largest of them is larger by chance."""
+LARGEST_GAP_OCTAVES = 0.1
+"""Gap without a line, in octaves, above which a model is refused, if `LARGEST_GAP_SPACINGS` is exceeded too."""
+LARGEST_GAP_SPACINGS = 3.0
+"""Gap, in median line spacings, above which a model is refused, if `LARGEST_GAP_OCTAVES` is exceeded too."""
 
 
 class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
@@ -47,32 +47,38 @@ def require_lines(responses: Sequence[FrequencyResponse], settings: Identificati
 
 
 def _refuse_mixed_responses(responses: Sequence[FrequencyResponse]) -> None:
+    """Raises IdentificationRefused without any response, and where sample rate, channels or units differ."""
     if not responses:
         raise IdentificationRefused("no frequency response was given; estimate one from a recorded sweep first")
     first = responses[0]
-    for second in responses[1:]:
+    for other in responses[1:]:
         for name in ("sample_rate_hz", "input_channels", "output_channels", "input_unit", "output_unit"):
-            if getattr(second, name) != getattr(first, name):
+            if getattr(other, name) != getattr(first, name):
                 raise IdentificationRefused(
-                    f"the records differ in {name} ({getattr(first, name)} and {getattr(second, name)}); identify each "
+                    f"the records differ in {name} ({getattr(first, name)} and {getattr(other, name)}); identify each "
                     "separately or convert one"
                 )
 
 
 def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    determined = [
+    """Raises IdentificationRefused where the response to some inputs, but not to all, is not finite at any line of the
+    band."""
+    has_response = [
         np.isfinite(estimate.select_band(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses
     ]
-    missing = ~np.any(determined, axis=0)
-    names = ", ".join(name for name, is_missing in zip(responses[0].input_channels, missing, strict=True) if is_missing)
-    if names and not missing.all():
+    undetermined = ~np.any(has_response, axis=0)
+    names = ", ".join(
+        name for name, is_missing in zip(responses[0].input_channels, undetermined, strict=True) if is_missing
+    )
+    if names and not undetermined.all():
         raise IdentificationRefused(
-            f"the response to {names} is not determined: as many experiments as inputs are needed, {len(missing)} "
+            f"the response to {names} is not determined: as many experiments as inputs are needed, {len(undetermined)} "
             "here; record one sweep per input"
         )
 
 
 def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
+    """Raises IdentificationRefused where an output is zero at all lines of the band."""
     in_band = [np.nan_to_num(estimate.select_band(*settings.band_hz).response) for estimate in responses]
     zero_outputs = ~np.any([(response != 0).any(axis=(0, 2)) for response in in_band], axis=0)
     names = ", ".join(name for name, is_zero in zip(responses[0].output_channels, zero_outputs, strict=True) if is_zero)
@@ -85,11 +91,12 @@ def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: Ident
 def _refuse_empty_band(
     responses: Sequence[FrequencyResponse], lines: WeightedLines, settings: IdentificationSettings
 ) -> None:
+    """Raises IdentificationRefused without any line to fit, and for a gap (`_refuse_gap`)."""
     low, high = settings.band_hz
-    measured = sum(len(estimate.select_band(low, high)) for estimate in responses)
+    measured_count = sum(len(estimate.select_band(low, high)) for estimate in responses)
     if not len(lines):
         reasons = "; ".join(dict.fromkeys(remark for estimate in responses for remark in estimate.remarks))
-        finding = "none of its lines is reliable" if measured else "no line was excited there"
+        finding = "none of its lines is reliable" if measured_count else "no line was excited there"
         raise IdentificationRefused(
             f"no data in {low:g} to {high:g} Hz: {finding}{f' ({reasons})' if reasons else ''}; "
             f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz"
@@ -98,32 +105,36 @@ def _refuse_empty_band(
 
 
 def _refuse_gap(lines: WeightedLines, settings: IdentificationSettings) -> None:
-    """Raises IdentificationRefused for a gap wider than `LARGEST_GAP` and `SPACINGS`, which a model could fill at
-    will."""
+    """Raises IdentificationRefused for a gap wider than `LARGEST_GAP_OCTAVES` and `LARGEST_GAP_SPACINGS`, in which the
+    data do not determine the model. The message suggests a sweep with margins of 10 % below and 6 % above."""
     low, high = settings.band_hz
-    ends = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
-    octaves, steps = np.diff(np.log2(ends)), np.diff(ends)
-    usual_step = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
-    widest = int(np.argmax(octaves))
-    if octaves[widest] <= LARGEST_GAP or steps[widest] <= SPACINGS * usual_step:
+    edges_hz = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
+    gap_octaves, gap_hz = np.diff(np.log2(edges_hz)), np.diff(edges_hz)
+    median_spacing_hz = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
+    widest_index = int(np.argmax(gap_octaves))
+    if (
+        gap_octaves[widest_index] <= LARGEST_GAP_OCTAVES
+        or gap_hz[widest_index] <= LARGEST_GAP_SPACINGS * median_spacing_hz
+    ):
         return
-    below, above = ends[widest], ends[widest + 1]
-    low_end, high_end = max((low, below), (above, high), key=lambda side: float(side[1] / side[0]))
+    below_hz, above_hz = edges_hz[widest_index], edges_hz[widest_index + 1]
+    covered_low_hz, covered_high_hz = max((low, below_hz), (above_hz, high), key=lambda side: float(side[1] / side[0]))
     raise IdentificationRefused(
-        f"between {below:.3g} and {above:.3g} Hz no line can be used, but the band is {low:g} to {high:g} Hz; "
+        f"between {below_hz:.3g} and {above_hz:.3g} Hz no line can be used, but the band is {low:g} to {high:g} Hz; "
         f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz, or choose a band that the lines cover "
-        f"({low_end:.3g} to {high_end:.3g} Hz)"
+        f"({covered_low_hz:.3g} to {covered_high_hz:.3g} Hz)"
     )
 
 
 def _refuse_noise(lines: WeightedLines, settings: IdentificationSettings) -> None:
-    strongest = (lines.weight * np.abs(lines.response)).max(axis=(1, 2))
-    ratio = float(np.median(strongest))
-    if ratio < LEAST_SIGNAL_TO_NOISE * np.sqrt(np.log(lines.response[0].size) + 1):
+    """Raises IdentificationRefused where the median line does not exceed its noise by `LEAST_SIGNAL_TO_NOISE`."""
+    strongest_ratios = (lines.weight * np.abs(lines.response)).max(axis=(1, 2))
+    median_ratio = float(np.median(strongest_ratios))
+    if median_ratio < LEAST_SIGNAL_TO_NOISE * np.sqrt(np.log(lines.response[0].size) + 1):
         low, high = settings.band_hz
         raise IdentificationRefused(
-            f"the band {low:g} to {high:g} Hz contains only noise: its typical line is {ratio:.1f} times the noise; "
-            "excite it more strongly or for longer (twice the time gives 3 dB)"
+            f"the band {low:g} to {high:g} Hz contains only noise: its typical line is {median_ratio:.1f} times the "
+            "noise; excite it more strongly or for longer (twice the time gives 3 dB)"
         )
 
 
@@ -132,11 +143,11 @@ def _refuse_too_high_an_order(lines: WeightedLines, settings: IdentificationSett
     p, m = lines.response.shape[1:]
     n = settings.order
     unknowns = n * (p + m) + p * m
-    rows = choose_horizon(n, p) + max(settings.longer_horizons)
-    minimum = max(-(-unknowns // (p * m)), -(-rows * (p + m) // (2 * m)))
+    block_rows = choose_horizon(n, p) + max(settings.longer_horizons)
+    minimum = max(-(-unknowns // (p * m)), -(-block_rows * (p + m) // (2 * m)))
     if len(lines) < minimum:
-        spacing = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / max(len(lines) - 1, 1)
-        advice = f", or record longer periods (now {1 / spacing:.3g} s)" if spacing > 0 else ""
+        spacing_hz = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / max(len(lines) - 1, 1)
+        advice = f", or record longer periods (now {1 / spacing_hz:.3g} s)" if spacing_hz > 0 else ""
         raise IdentificationRefused(
             f"order {n} has {unknowns} unknowns and needs at least {minimum} lines, but the band holds {len(lines)}; "
             f"choose a lower order{advice}"

@@ -1,6 +1,7 @@
 """Settings of the identification of a state-space model (`identify`): band, order, bound of the time constants, search.
 
-Defaults without a stated reason are heuristic.
+Defaults without a stated reason are heuristic. Read by `identify` and the modules that it calls; set by the workflows
+`identify_model` and `report_identification`.
 """
 
 from dataclasses import dataclass

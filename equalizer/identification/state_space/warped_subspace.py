@@ -34,7 +34,7 @@ class Subspace:
 
 
 def choose_horizon(order: int, outputs: int) -> int:
-    """Number of block rows: as many as the order needs, and three more to average noise."""
+    """Number of block rows: as many as the order needs, and three more (chosen) to average noise."""
     return -(-order // outputs) + 3
 
 
@@ -71,8 +71,8 @@ def _project_out_inputs(input_rows: ComplexArray, output_rows: ComplexArray) -> 
     decomposition of real and imaginary parts."""
     rows = np.concatenate([input_rows, output_rows])
     real_rows = np.concatenate([rows.real, rows.imag], axis=1)
-    triangular = np.asarray(np.linalg.qr(real_rows.T, mode="r"))
-    return np.asarray(triangular[len(input_rows) :, len(input_rows) :].T, dtype=np.float64)
+    triangle = np.asarray(np.linalg.qr(real_rows.T, mode="r"))
+    return np.asarray(triangle[len(input_rows) :, len(input_rows) :].T, dtype=np.float64)
 
 
 def extract_poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:

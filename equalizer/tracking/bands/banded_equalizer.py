@@ -152,7 +152,7 @@ class BandedEqualizer:
         by_band = (low, middle, other_forces - low)
         return BandedForces(
             commands=total_forces - self._compute_spring_force(motion, middle_response),
-            entering=total_forces,
+            total_forces=total_forces,
             by_band=by_band,
             predicted=self._predict_bands(by_band, motion, middle_response),
             bands=bands,

@@ -1,6 +1,7 @@
-"""Result of the banded equalizer (`BandedEqualizer.compute_forces`): forces, predicted accelerations, loss by the cap.
+"""Result of the banded equalizer: forces, predicted accelerations, and loss of tracking due to the force cap.
 
-N: rows, m: axes of force, p: axes of acceleration. Forces in N, accelerations in m/s², one row per sample.
+Made by `BandedEqualizer.compute_forces`, read by `narrow_and_wide_models`. N: rows, m: axes of force, p: axes of
+acceleration. Forces in N, accelerations in m/s², one row per sample.
 """
 
 from dataclasses import dataclass
@@ -16,24 +17,25 @@ from equalizer.tracking.lqr.limits import ForcePeaks
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedForces:
-    """Forces and predicted accelerations. The N rows are those of the wanted acceleration, shifted by
-    `latency_samples`, and the run-in and run-out around them; see `rows_of_wanted`."""
+    """Forces and predicted accelerations. Row `latency_samples` is the first row of the reference acceleration; the
+    rows before and after it are the run-in and the run-out, see `find_reference_rows`."""
 
     commands: FloatArray
     """(N, m), N: forces to command. The rendered spring of the device's control loop adds its own force to them."""
-    entering: FloatArray
+    total_forces: FloatArray
     """(N, m), N: total force on the device, commands and spring together."""
     by_band: tuple[FloatArray, FloatArray, FloatArray]
-    """(N, m), N: the parts of `entering` of the low, middle and high band."""
+    """(N, m), N: the parts of `total_forces` of the low, middle and high band."""
     predicted: tuple[FloatArray, FloatArray, FloatArray]
     """(N, p), m/s²: predicted acceleration due to the forces of each band. Where there is a high band, its response is
     used for all three, because it covers the effect of a band's forces outside that band; else each band's model."""
     bands: Bands
-    """The wanted acceleration, split into bands."""
+    """The reference acceleration, split into bands."""
     latency_samples: int
-    """Rows before that of the first wanted sample: the delay of the band split and, unless it is causal, the run-in."""
+    """Number of rows before the first of the reference: delay of the band split and, unless it is causal, the
+    run-in."""
     peaks: ForcePeaks | None
-    """Largest norms of `entering`, against the cap; None without a cap."""
+    """Largest norms of `total_forces`, against the cap; None without a cap."""
     loss: TrackingLoss | None
     """Loss of tracking in the middle band due to the force cap; None where no cap constrained it."""
     motion: SlowMotion | None
@@ -48,6 +50,6 @@ class BandedForces:
         """(N, p), m/s²: predicted acceleration due to all forces."""
         return self.predicted[0] + self.predicted[1] + self.predicted[2]
 
-    def rows_of_wanted(self, samples: int) -> slice:
-        """Slice of the rows that correspond to the wanted acceleration. samples: number of its rows."""
+    def find_reference_rows(self, samples: int) -> slice:
+        """Slice of the rows that correspond to the reference acceleration. samples: number of its rows."""
         return slice(self.latency_samples, self.latency_samples + samples)

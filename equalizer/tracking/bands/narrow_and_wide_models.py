@@ -1,8 +1,10 @@
-"""Banded feedforward from two models of the same place: an accurate narrow one and a wide one.
+"""Banded feedforward from two models of the same place: an accurate one of a narrow band, and one of a wide band.
 
-Below the narrow model's band, a rigid model fitted to its lowest lines is used; in its band, the narrow model; above
-it, the wide model's response along one direction. The outer bands' run-in and run-out are no rows of the table and are
-cut off; the middle band is solved for the rows alone, for the acceleration that the cut forces leave.
+Low band, below the narrow model's band: a rigid model fitted to the narrow model's lowest lines. Middle: the narrow
+model. High, above it: the wide model's response along one direction. Forces are played from the first to the last row
+of the reference; those of the low and the high band before and after it (run-in and run-out) are cut off. The middle
+band is then solved again for the reference minus the narrow model's response to the cut forces. Called by
+`study.workflows.equalizer.equalize_trajectory`.
 """
 
 from dataclasses import dataclass
@@ -32,33 +34,34 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeigh
 
 RIGID_OCTAVES = 0.6
 """Width in octaves of the lowest part of the narrow band to which the rigid model is fitted: below the first
-resonance. By hand."""
+resonance. Chosen by hand."""
 RIGID_LINES = 30
-"""Number of lines, evenly spaced in the logarithm of frequency, at which the rigid model is fitted. By hand."""
+"""Number of lines, evenly spaced in the logarithm of frequency, at which the rigid model is fitted. Chosen by hand."""
 LEAST_REACH = 2.0
-"""Least ratio of the two bands' upper ends: a high band, whose force has a single direction, needs an octave. By
-hand."""
+"""Least ratio of the two bands' upper ends: a high band, whose force has a single direction, needs an octave. Chosen
+by hand."""
 BINS_PER_OCTAVE = 6
-"""Bins per octave of `level_error`."""
+"""Bins per octave of `compute_level_error`. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwoModels:
-    """A narrow and a wide model. Raises ValueError unless the bands overlap and leave room for a band above."""
+    """A narrow and a wide model. Raises ValueError unless the bands overlap and leave room for a low and a high band
+    (`LEAST_REACH`), and where both state how they were identified, but differently."""
 
     narrow: IdentifiedModel
     wide: IdentifiedModel
 
     def __post_init__(self) -> None:
-        (low, high), (lowest, highest) = self.narrow.band_hz, self.wide.band_hz
-        if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * BAND_MARGIN_HZ):
+        (low_hz, high_hz), (lowest_hz, highest_hz) = self.narrow.band_hz, self.wide.band_hz
+        if not (lowest_hz <= high_hz and highest_hz >= LEAST_REACH * high_hz and low_hz > 2 * BAND_MARGIN_HZ):
             raise ValueError(
-                f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz cannot be combined: the wider one "
-                f"must begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one "
-                f"begin above {2 * BAND_MARGIN_HZ:g} Hz"
+                f"bands of {low_hz:g} to {high_hz:g} Hz and {lowest_hz:g} to {highest_hz:g} Hz cannot be combined: the "
+                f"wider one must begin at {high_hz:g} Hz or below and reach {LEAST_REACH * high_hz:g} Hz or more, the "
+                f"narrower one begin above {2 * BAND_MARGIN_HZ:g} Hz"
             )
-        origins = [[model.provenance.get(key) for key in ("hand", "input")] for model in (self.narrow, self.wide)]
-        if origins[0] != origins[1] and None not in origins[0] + origins[1]:
+        conditions = [[model.provenance.get(key) for key in ("hand", "input")] for model in (self.narrow, self.wide)]
+        if conditions[0] != conditions[1] and None not in conditions[0] + conditions[1]:
             raise ValueError(
                 f"the narrower one was made {_describe_conditions(self.narrow)}, the wider one "
                 f"{_describe_conditions(self.wide)}: two bands must be of one device, held and driven alike"
@@ -66,50 +69,50 @@ class TwoModels:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BandFacts:
-    """Predicted errors and other figures of a banded feedforward; errors are relative to what is wanted in the band."""
+class BandPredictions:
+    """Predicted errors and other figures of a banded feedforward; errors are relative to the reference in the band."""
 
     edges_hz: tuple[float, float]
+    """Crossover frequencies of the middle band to the low and to the high band."""
     cut_error: float
     """Error in the middle band if the run-in and run-out were cut off and the middle band not solved again."""
-    whole_error: float
+    uncut_error: float
     """Error in the middle band if the run-in and run-out were played."""
     level_error: float | None
-    """Error of the high band's level by sixths of an octave, of the table's rows; None where nothing is wanted in this
-    band."""
+    """Error of the high band's level, from `compute_level_error`; None for a reference without content in this band."""
     direction: tuple[float, ...]
-    """Unit vector of the high band's force."""
+    """Unit vector of the high band's force; empty without a high band."""
     travel_m: float
     """Largest displacement of the handle by the low band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedFeedforward:
-    """Result of `solve_banded_feedforward`: forces from the first row on, one row per row of the wanted
-    acceleration."""
+    """Result of `solve_banded_feedforward`: forces, one row per row of the reference acceleration, and their
+    figures."""
 
     feedforward: Feedforward
     """Forces of all bands; their `error` is that in the middle band, by the narrow model."""
-    facts: BandFacts
+    predictions: BandPredictions
 
 
 def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
-    """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where nothing is wanted in
-    the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
+    """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where the reference has no
+    content in the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
     check_reference(models.narrow, reference)
     check_reference(models.wide, reference)
     equalizer, rate_hz = make_banded_equalizer(models, settings.weight), reference.sample_rate_hz
     in_band_reference = _remove_above_band(reference.samples, models.wide)
     banded_forces = equalizer.compute_forces(in_band_reference)
-    rows = banded_forces.rows_of_wanted(len(reference))
+    rows = banded_forces.find_reference_rows(len(reference))
     if not np.linalg.norm(banded_forces.bands.middle[rows]) > LEAKAGE_SHARE * np.linalg.norm(reference.samples):
-        low, high = models.narrow.band_hz
-        raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the narrower model's band")
+        low_hz, high_hz = models.narrow.band_hz
+        raise TrackingError(f"nothing is wanted between {low_hz:g} and {high_hz:g} Hz, the narrower model's band")
     problem = make_tracking_problem(models.narrow, TrackingWeights(settings.weight))
     outer_forces = (banded_forces.by_band[0] + banded_forces.by_band[2])[rows]
     middle_reference = extract_band(models.narrow, in_band_reference - simulate_from_rest(problem, outer_forces))
-    middle, loss = solve_causally(problem, middle_reference, settings, outer_forces)
-    forces = middle + outer_forces
+    middle_forces, loss = solve_causally(problem, middle_reference, settings, outer_forces)
+    forces = middle_forces + outer_forces
     predicted = simulate_from_rest(problem, forces)
     low_reference = (
         np.zeros_like(in_band_reference) if banded_forces.motion is None else banded_forces.motion.acceleration[rows]
@@ -126,53 +129,54 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
         peaks=require_under_cap(forces, settings.cap_n, rate_hz),
         loss=loss,
     )
-    return BandedFeedforward(solution, _collect_facts(models, equalizer, banded_forces, in_band_reference, forces))
+    return BandedFeedforward(solution, _predict_bands(models, equalizer, banded_forces, in_band_reference, forces))
 
 
 def make_banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
     """Equalizer in three bands, split by linear-phase filters BAND_MARGIN_HZ beyond the narrow model's band on either
     side. weight: R = weight I, of |u|². Raises ValueError for a weight outside 1e-3 to 1e-2."""
-    low, high = models.narrow.band_hz
-    edges = BandEdges(low - BAND_MARGIN_HZ, high + BAND_MARGIN_HZ)
+    low_hz, high_hz = models.narrow.band_hz
+    edges = BandEdges(low_hz - BAND_MARGIN_HZ, high_hz + BAND_MARGIN_HZ)
     return BandedEqualizer(
         models.narrow,
         LinearPhaseSplit(edges, models.narrow.sample_rate_hz),
-        LowBand(rigid_part(models.narrow)),
+        LowBand(fit_rigid_part(models.narrow)),
         HighBand(ModelledResponse(models.wide)),
         TrackingWeights(weight),
     )
 
 
-def rigid_part(model: IdentifiedModel) -> RigidModel:
-    """Rigid model (mass, damping, stiffness) fitted to the model's response in the lowest RIGID_OCTAVES of its band."""
-    low, high = model.band_hz
-    lines_hz = np.geomspace(low, min(high, low * 2**RIGID_OCTAVES), RIGID_LINES)
+def fit_rigid_part(model: IdentifiedModel) -> RigidModel:
+    """Fit a rigid model (mass, damping, stiffness) to the model's response in the lowest RIGID_OCTAVES of its band."""
+    low_hz, high_hz = model.band_hz
+    lines_hz = np.geomspace(low_hz, min(high_hz, low_hz * 2**RIGID_OCTAVES), RIGID_LINES)
     return fit_rigid_model(lines_hz, compute_model_response(model, lines_hz), model.sample_rate_hz)
 
 
-def level_error(
+def compute_level_error(
     reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]
 ) -> float | None:
-    """Relative error of the level (root of the power of all axes together) by sixths of an octave, where people no
-    longer perceive the direction of a vibration but only its level: |L_played - L_wanted| / |L_wanted|, L (bins,) from
-    the DFT, zero-padded to twice the length. reference, delivered: (n, axes). None where nothing is wanted in the
-    band."""
+    """Relative error of the level (root of the power of all axes together) by sixths of an octave, for a band in which
+    people perceive the level of a vibration but not its direction: |L_delivered - L_reference| / |L_reference|, with L
+    (bins,) from the DFT, zero-padded to twice the length. reference, delivered: (n, axes). None where the reference has
+    at most `LEAKAGE_SHARE` of its level in the band."""
     length = 2 * len(reference)
     lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
-    count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
-    bins = np.digitize(lines_hz, np.geomspace(*band_hz, count + 1))
+    bin_count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
+    bins = np.digitize(lines_hz, np.geomspace(*band_hz, bin_count + 1))
     levels = []
     for samples in (reference, delivered):
         power = (np.abs(np.fft.rfft(samples, length, axis=0)) ** 2).sum(axis=1)
-        levels.append(np.sqrt(np.bincount(bins, power, minlength=count + 2)))
-    size = float(np.linalg.norm(levels[0][1:-1]))
-    if size <= LEAKAGE_SHARE * float(np.linalg.norm(levels[0])):
+        levels.append(np.sqrt(np.bincount(bins, power, minlength=bin_count + 2)))
+    reference_level = float(np.linalg.norm(levels[0][1:-1]))
+    if reference_level <= LEAKAGE_SHARE * float(np.linalg.norm(levels[0])):
         return None
-    return float(np.linalg.norm((levels[1] - levels[0])[1:-1]) / size)
+    return float(np.linalg.norm((levels[1] - levels[0])[1:-1]) / reference_level)
 
 
 def _remove_above_band(reference: FloatArray, wide: IdentifiedModel) -> FloatArray:
-    """The wanted acceleration without frequencies above the wide band."""
+    """The reference acceleration without frequencies above the wide band; unchanged where that band ends within twice
+    BAND_MARGIN_HZ of half the sample rate."""
     edge_hz = wide.band_hz[1] + BAND_MARGIN_HZ
     if edge_hz + BAND_MARGIN_HZ >= wide.sample_rate_hz / 2:
         return reference
@@ -180,28 +184,32 @@ def _remove_above_band(reference: FloatArray, wide: IdentifiedModel) -> FloatArr
     return bands.middle[bands.latency_samples : bands.latency_samples + len(reference)]
 
 
-def _collect_facts(
+def _predict_bands(
     models: TwoModels,
     equalizer: BandedEqualizer,
     banded_forces: BandedForces,
     reference: FloatArray,
     forces: FloatArray,
-) -> BandFacts:
+) -> BandPredictions:
     """Predicted errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
-    one. reference: (n, axes), without what lies above the wide band."""
-    edges, rows, band_hz = equalizer.split.edges, banded_forces.rows_of_wanted(len(reference)), models.narrow.band_hz
+    one. reference: (n, axes), without frequencies above the wide band."""
+    edges, rows, band_hz = (
+        equalizer.split.edges,
+        banded_forces.find_reference_rows(len(reference)),
+        models.narrow.band_hz,
+    )
     rate_hz, problem = models.narrow.sample_rate_hz, make_tracking_problem(models.narrow, equalizer.weights)
     full_response, cut_response = (
-        simulate_from_rest(problem, banded_forces.entering)[rows],
-        simulate_from_rest(problem, banded_forces.entering[rows]),
+        simulate_from_rest(problem, banded_forces.total_forces)[rows],
+        simulate_from_rest(problem, banded_forces.total_forces[rows]),
     )
     upper_hz = band_hz[1] + 2 * BAND_MARGIN_HZ, models.wide.band_hz[1]
     high_response = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
-    return BandFacts(
+    return BandPredictions(
         edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
         cut_error=compute_band_error(reference, cut_response, rate_hz, band_hz),
-        whole_error=compute_band_error(reference, full_response, rate_hz, band_hz),
-        level_error=level_error(reference, high_response, rate_hz, upper_hz),
+        uncut_error=compute_band_error(reference, full_response, rate_hz, band_hz),
+        level_error=compute_level_error(reference, high_response, rate_hz, upper_hz),
         direction=()
         if banded_forces.high is None
         else tuple(float(component) for component in banded_forces.high.direction),
@@ -210,7 +218,7 @@ def _collect_facts(
 
 
 def _describe_conditions(model: IdentifiedModel) -> str:
-    """Conditions of the identification in words, from the model's provenance."""
+    """Text of the conditions of the identification, from the model's provenance."""
     hand_condition = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
     spring_condition = "with" if model.provenance.get("input") == "excitation" else "without"
     return f"{hand_condition} and {spring_condition} the spring in it"

@@ -28,7 +28,7 @@ class RigidModel:
     """Delay (s) from a command to its acceleration, without the half sample of the zero-order hold."""
 
     def __post_init__(self) -> None:
-        shapes = {np.shape(part) for part in (self.mass_kg, self.damping_n_s_per_m, self.stiffness_n_per_m)}
+        shapes = {np.shape(matrix) for matrix in (self.mass_kg, self.damping_n_s_per_m, self.stiffness_n_per_m)}
         if len(shapes) != 1 or (shape := next(iter(shapes))) != shape[:1] * 2:
             raise ValueError(f"mass, damping and stiffness must be square matrices of one shape, not {sorted(shapes)}")
 
@@ -36,8 +36,8 @@ class RigidModel:
         """Inverse response (lines, m, m), N per m/s², with the delay compensated. frequency_hz: (lines,), above
         zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
-        ratio = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
-        return np.asarray(ratio * np.exp(s * self.delay_s))
+        force_per_acceleration = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
+        return np.asarray(force_per_acceleration * np.exp(s * self.delay_s))
 
 
 def fit_rigid_model(
@@ -63,10 +63,13 @@ def fit_rigid_model(
     delay_factor = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]
     inverse = np.linalg.inv(response / delay_factor)
     weight = 1 / np.linalg.norm(inverse, axis=(1, 2))
-    force = inverse.reshape(len(s), -1) * weight[:, None]
-    basis = np.stack([np.ones_like(s), 1 / s, 1 / s**2], axis=1) * weight[:, None]
-    real_basis, real_force = np.vstack([basis.real, basis.imag]), np.vstack([force.real, force.imag])
-    scale = np.linalg.norm(real_basis, axis=0)
-    matrices = np.linalg.lstsq(real_basis / scale, real_force, rcond=None)[0] / scale[:, None]
+    weighted_inverse = inverse.reshape(len(s), -1) * weight[:, None]
+    regressors = np.stack([np.ones_like(s), 1 / s, 1 / s**2], axis=1) * weight[:, None]
+    real_regressors, real_target = (
+        np.vstack([regressors.real, regressors.imag]),
+        np.vstack([weighted_inverse.real, weighted_inverse.imag]),
+    )
+    scale = np.linalg.norm(real_regressors, axis=0)
+    matrices = np.linalg.lstsq(real_regressors / scale, real_target, rcond=None)[0] / scale[:, None]
     mass, damping, stiffness = matrices.reshape(3, m, m)
     return RigidModel(mass, damping, stiffness, delay_s)

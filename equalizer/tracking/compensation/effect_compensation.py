@@ -21,7 +21,12 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.effect_roles import compute_lead_s, explain_not_compensated
-from equalizer.tracking.compensation.known_forces import LAWS, Law, compute_deadband_share, compute_equivalent_impedance
+from equalizer.tracking.compensation.known_forces import (
+    LAWS,
+    ForceLaw,
+    compute_deadband_share,
+    compute_equivalent_impedance,
+)
 from equalizer.tracking.compensation.law_compensation import (
     compute_compensating_force,
     compute_linear_share,
@@ -181,7 +186,7 @@ def evaluate_force_law(
     motion: PlannedMotion,
     command_channels_and_rate: tuple[tuple[str, ...], float],
     slip_mps: float,
-) -> tuple[Law, FloatArray]:
+) -> tuple[ForceLaw, FloatArray]:
     """Return the law of an effect along a single axis, and the force (N,) to be added along a motion.
     command_channels_and_rate: channels of the commands, and the sample rate (Hz). slip_mps: speed below which a change
     of sign is smoothed, m/s; for 0 (an axis at rest), the force of a law of `LAWS` is zero."""

@@ -13,7 +13,7 @@ from equalizer.tracking.compensation.known_forces import LAWS
 from equalizer.tracking.compensation.law_compensation import explain_law_not_compensated
 
 IN_MODEL_REASON = "it is linear, so the identified model has it; compensating it again would count it twice"
-"""Reason for linear effects."""
+"""Reason for linear effects that the identified model contains."""
 
 REASONS_NOT_COMPENSATED = {
     "viscous_damping": IN_MODEL_REASON,
@@ -40,15 +40,16 @@ SENSOR_REASON = (
 """Reason for all effects of the sensor but its lag."""
 SCALING_REASON = "in the identified model as far as it is linear; used to scale what is added"
 TIMING_REASON = "in the identified model; used to send what is added ahead of time"
-"""Reasons for the effects of `SCALING_EFFECTS` and of `TIMING_EFFECTS`."""
+"""Reasons for the effects of `SCALING_EFFECTS` and of `TIMING_EFFECTS`; what is added are the compensating forces."""
 
 SCALING_EFFECTS, TIMING_EFFECTS = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
 """Effects that scale the added forces, and effects that determine by how much they are advanced (`compute_lead_s`)."""
 
 
 def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
-    """The reason why an effect is not compensated, as a clause for the user; empty for an effect that is. inputs:
-    channels of the commands, by which a discovered law names the axes."""
+    """Explain why an effect is not compensated, as a clause for the user; empty for a compensated effect. inputs:
+    channels of the commands, by which a discovered law names the axes. Raises KeyError for an effect that is not in the
+    catalogue."""
     kind = effect.kind
     if effect.law is not None:
         return explain_law_not_compensated(effect.law, derive_axis_letters(inputs))
@@ -64,10 +65,10 @@ def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx"
 
 
 def compute_lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
-    """Delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the time constant
-    1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f; an effect
-    `sensor_lag` replaces the sensor's corner. The identified model includes this delay; forces that are added to the
-    model's forces must be advanced by it."""
+    """Compute the delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the
+    time constant 1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f; an
+    effect `sensor_lag` replaces the sensor's corner. The identified model includes this delay; forces that are added to
+    the model's forces must be advanced by it."""
     corners_hz = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
     delay_s = 0.5 / sample_rate_hz + physics.actuator.delay_s
     for effect in physics.effects:

@@ -1,10 +1,10 @@
 """Forces by which known effects resist a motion along an axis, and their linear equivalents (describing functions).
 
-Each law F(parameters, x, v, slip) takes the position x (m), the velocity v (m/s), (N,) each, and the speed (m/s) below
-which a change of sign is smoothed: sign(v) becomes tanh(v / slip), with slip above zero. It returns the force (N) that
-must be added to the command: the effect's own force with the opposite sign. For rotations the units are rad, rad/s and
-N m. Called by `effect_compensation` (feedforward) and `subtract_effects`. Reference for describing functions: Gelb and
-Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design (1968).
+Each law F(parameters, x, v, slip_mps) takes the position x (m), the velocity v (m/s), (N,) each, and the speed (m/s)
+below which a change of sign is smoothed: sign(v) becomes tanh(v / slip_mps), with slip_mps above zero. It returns the
+force (N) that must be added to the command: the effect's own force with the opposite sign. For rotations the units are
+rad, rad/s and N m. Called by `effect_compensation` (feedforward) and `subtract_effects`. Reference for describing
+functions: Gelb and Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design (1968).
 """
 
 from collections.abc import Callable, Mapping
@@ -13,51 +13,55 @@ import numpy as np
 
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-Law = Callable[[Mapping[str, float], FloatArray, FloatArray, float], FloatArray]
+ForceLaw = Callable[[Mapping[str, float], FloatArray, FloatArray, float], FloatArray]
+"""Function of the module docstring; the parameters are in SI units, by their names in the catalogue of effects."""
 
 SAMPLES_PER_CYCLE = 256
-"""Samples per cycle of the sinusoid for which a describing function is evaluated."""
+"""Samples per cycle of the sinusoid for which a describing function is evaluated. Chosen."""
 MOST_EVALUATED_LINES = 48
-"""Largest number of lines at which a describing function is evaluated; it is interpolated linearly between them."""
+"""Largest number of lines at which a describing function is evaluated; it is interpolated linearly between them.
+Chosen, to limit computing time."""
 
 
-def _smooth_sign(velocity: FloatArray, slip: float) -> FloatArray:
-    """tanh(v / slip) in place of sign(v), because a discontinuous force cannot be played."""
-    return np.asarray(np.tanh(velocity / slip))
+def _smooth_sign(velocity: FloatArray, slip_mps: float) -> FloatArray:
+    """tanh(v / slip_mps) in place of sign(v), because a discontinuous force cannot be played."""
+    return np.asarray(np.tanh(velocity / slip_mps))
 
 
-def _compute_coulomb_friction(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_coulomb_friction(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
+) -> FloatArray:
     """Coulomb friction, F = level sign(v)."""
-    return parameters["level"] * _smooth_sign(v, slip)
+    return parameters["level"] * _smooth_sign(v, slip_mps)
 
 
 def _compute_asymmetric_friction(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
-    """Coulomb friction with a level for each direction of motion."""
-    return np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip)
+    """Coulomb friction with a level for each direction of motion, the positive one where v > 0."""
+    return np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip_mps)
 
 
 def _compute_position_dependent_friction(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
     """Coulomb friction with the level max(0, level (1 + slope x + bend x²))."""
     level = parameters["level"] * (1 + parameters["slope_per_m"] * x + parameters["bend_per_m2"] * x**2)
-    return np.asarray(np.maximum(level, 0.0) * _smooth_sign(v, slip))
+    return np.asarray(np.maximum(level, 0.0) * _smooth_sign(v, slip_mps))
 
 
 def _compute_stribeck_friction(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
     """Stribeck friction, F = (coulomb + (static - coulomb) exp(-(v / speed)²)) sign(v)."""
     level = parameters["coulomb"] + (parameters["static"] - parameters["coulomb"]) * np.exp(
         -((v / parameters["speed"]) ** 2)
     )
-    return np.asarray(level * _smooth_sign(v, slip))
+    return np.asarray(level * _smooth_sign(v, slip_mps))
 
 
 def _compute_presliding_hysteresis(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
     """Dahl's bristle model (1968): F = stiffness z with dz/dx = 1 - sign(v) z stiffness / level, by implicit Euler
     steps from z = 0. At z = level / stiffness the bristle slips."""
@@ -69,27 +73,27 @@ def _compute_presliding_hysteresis(
 
 
 def _compute_quadratic_damping(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
     """Quadratic damping, F = coefficient v |v|."""
     return parameters["coefficient"] * v * np.abs(v)
 
 
 def _compute_hardening_stiffness(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
     """Cubic (Duffing) stiffness, F = k3 x³."""
     return np.asarray(parameters["k3"] * x**3)
 
 
 def _compute_asymmetric_stiffness(
-    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
 ) -> FloatArray:
     """Quadratic stiffness, F = k2 x²."""
     return np.asarray(parameters["k2"] * x**2)
 
 
-LAWS: dict[str, Law] = {
+LAWS: dict[str, ForceLaw] = {
     "coulomb_friction": _compute_coulomb_friction,
     "asymmetric_friction": _compute_asymmetric_friction,
     "position_dependent_friction": _compute_position_dependent_friction,
@@ -103,7 +107,7 @@ LAWS: dict[str, Law] = {
 
 
 def compute_equivalent_impedance(
-    law: Law, parameters: Mapping[str, float], frequency_hz: FloatArray, speed_m_s: FloatArray, slip_share: float
+    law: ForceLaw, parameters: Mapping[str, float], frequency_hz: FloatArray, speed_m_s: FloatArray, slip_share: float
 ) -> ComplexArray:
     """Sinusoidal describing function (lines,), N s/m: complex ratio of force to velocity at the fundamental, for
     velocity amplitudes `speed_m_s` (lines,), above zero. From the second of two cycles, in which the presliding
@@ -114,12 +118,12 @@ def compute_equivalent_impedance(
     )
     angle = 2 * np.pi * np.arange(2 * SAMPLES_PER_CYCLE) / SAMPLES_PER_CYCLE
     impedance = np.empty(len(line_indices), dtype=np.complex128)
-    for index, line in enumerate(line_indices):
-        v = speed_m_s[line] * np.sin(angle)
-        x = -speed_m_s[line] / (2 * np.pi * frequency_hz[line]) * np.cos(angle)
-        force = law(parameters, x, v, slip_share * speed_m_s[line])[SAMPLES_PER_CYCLE:]
+    for index, line_index in enumerate(line_indices):
+        v = speed_m_s[line_index] * np.sin(angle)
+        x = -speed_m_s[line_index] / (2 * np.pi * frequency_hz[line_index]) * np.cos(angle)
+        force = law(parameters, x, v, slip_share * speed_m_s[line_index])[SAMPLES_PER_CYCLE:]
         # sin is -i / 2 of the positive line, so that a force along the velocity gives a positive real part.
-        impedance[index] = 2j * np.mean(force * np.exp(-1j * angle[SAMPLES_PER_CYCLE:])) / speed_m_s[line]
+        impedance[index] = 2j * np.mean(force * np.exp(-1j * angle[SAMPLES_PER_CYCLE:])) / speed_m_s[line_index]
     chosen_hz = frequency_hz[line_indices]
     return np.asarray(
         np.interp(frequency_hz, chosen_hz, impedance.real) + 1j * np.interp(frequency_hz, chosen_hz, impedance.imag),

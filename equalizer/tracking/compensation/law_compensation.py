@@ -3,7 +3,8 @@
 A discovered law is a formula that a diagnosis found because no effect of the catalogue explains the recordings. A law
 of the force is cancelled along the planned motion: -law(x, v, a) is added to the command. A law of the command (a
 static map g of a single command) is inverted: the command u with g(u) = intended force is sent. Laws of a sensor, and
-laws with memory of the command, are not compensated; `explain_law_not_compensated` gives the reason.
+laws with memory of the command, are not compensated; `explain_law_not_compensated` gives the reason. Called by
+`effect_compensation` and `effect_roles`.
 """
 
 from collections.abc import Mapping
@@ -16,14 +17,14 @@ from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY_OPERATORS
 from equalizer.laws.tree import Apply, Node, Number, Variable, format_formula, iterate_nodes
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.compensation.known_forces import Law as ForceLaw
+from equalizer.tracking.compensation.known_forces import ForceLaw
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 
 MOTION_PREFIXES = ("", "v", "a")
 """Prefixes of the signals of a motion, before the letter of the axis: position, velocity, acceleration."""
 TABLE_SIZE = 2001
 """Number of commands in the table by which a command map is inverted; also samples of the cycle in
-`compute_linear_share`."""
+`compute_linear_share`. Chosen."""
 FIRST_RANGE_RATIO = 2.0
 """First range of that table, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
 _MOST_DOUBLINGS = 3
@@ -41,12 +42,13 @@ HAS_MEMORY = "it has memory of earlier commands, so no map of the present comman
 SEVERAL_SIGNALS = "it depends on several commands or on the time"
 NOT_INVERTIBLE = "the force does not rise with the command, so the map has no inverse"
 SENSOR_ERROR = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
+"""Reasons why a law is not compensated, as clauses after "because"."""
 
 
-def explain_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
-    """Explain why a law is not compensated, as a clause after "because"; empty for a law that is compensated. letters:
+def explain_law_not_compensated(law: Law, axis_letters: tuple[str, ...]) -> str:
+    """Explain why a law is not compensated, as a clause after "because"; empty for a compensated law. axis_letters:
     letters of the axes, in the order of the commands."""
-    motion_signals = {prefix + letter for letter in letters for prefix in MOTION_PREFIXES}
+    motion_signals = {prefix + letter for letter in axis_letters for prefix in MOTION_PREFIXES}
     if law.acts_on == "response":
         return SENSOR_ERROR
     if law.acts_on == "force":
@@ -60,34 +62,37 @@ def explain_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
 
 
 def compute_compensating_force(
-    law: Law, letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip: float
+    law: Law, axis_letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip_mps: float
 ) -> FloatArray:
     """(N,), in the unit of the command: the force to be added to the command, which cancels the force of the law along
-    a motion. slip: speed (m/s) below which a change of sign of a velocity is smoothed, because a force that jumps
-    cannot be played; rate_hz: sample rate of the motion."""
+    a motion. axis_letters: letters of the axes, in the order of the motion's columns; slip_mps: speed (m/s) below which
+    a change of sign of a velocity is smoothed, because a force that jumps cannot be played; rate_hz: sample rate of the
+    motion."""
     columns = {
         prefix + letter: column[:, axis]
-        for axis, letter in enumerate(letters)
+        for axis, letter in enumerate(axis_letters)
         for prefix, column in zip(MOTION_PREFIXES, (motion.position, motion.velocity, motion.acceleration), strict=True)
     }
-    return -evaluate(_smooth_signs(law, slip), columns, rate_hz)
+    return -evaluate(_smooth_signs(law, slip_mps), columns, rate_hz)
 
 
-def make_single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceLaw:
+def make_single_axis_law(law: Law, axis_letters: tuple[str, ...], axis: int) -> ForceLaw:
     """Make a function of a sinusoid along a single axis, with the other axes at rest, from a law, for
-    `compute_equivalent_impedance`. axis: index of the axis in `letters`. The parameters are ignored: the law contains
-    its own."""
+    `compute_equivalent_impedance`. axis: index of the axis in `axis_letters`. The parameters are ignored: the law
+    contains its own."""
 
     def compute_opposing_force(
-        parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+        parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
     ) -> FloatArray:
+        """Force (N,) against the law for a sinusoidal position x (N,) and velocity v (N,), over two cycles."""
         # For a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
         omega_rad_s = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
-        at_rest = np.zeros((len(x), len(letters)))
-        motion = PlannedMotion(at_rest, at_rest.copy(), at_rest.copy())
+        zero_motion = np.zeros((len(x), len(axis_letters)))
+        motion = PlannedMotion(zero_motion, zero_motion.copy(), zero_motion.copy())
         motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(omega_rad_s**2) * x
-        # The samples are two cycles: their number over the duration 2 (2 pi / omega) is the sample rate (Hz).
-        return compute_compensating_force(law, letters, motion, len(x) / 2 * omega_rad_s / (2 * np.pi), slip)
+        # `compute_equivalent_impedance` passes two cycles: the number of samples over the duration 2 (2 pi / omega) is
+        # the sample rate (Hz).
+        return compute_compensating_force(law, axis_letters, motion, len(x) / 2 * omega_rad_s / (2 * np.pi), slip_mps)
 
     return compute_opposing_force
 
@@ -104,34 +109,34 @@ def compute_linear_share(law: Law, amplitude: float) -> float:
     return float(2 * np.mean(force * wave) / amplitude)
 
 
-def invert_command_map(law: Law, intended: FloatArray, slip_n: float) -> FloatArray:
-    """(N,): the commands that a command map turns into the intended forces `intended` (N,). slip_n: force below which
-    the command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended forces
-    are 0.
+def invert_command_map(law: Law, intended_forces: FloatArray, slip_n: float) -> FloatArray:
+    """(N,): the commands that a command map turns into the intended forces `intended_forces` (N,). slip_n: force below
+    which the command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended
+    forces are 0.
 
     By linear interpolation in a table, whose range is doubled until the map reaches all intended forces. Where the map
     does not reach them (saturation), the command is that of the nearest force in the first range. Raises ValueError
     where the map decreases somewhere in the first range.
     """
-    commands, forces = _tabulate_to(law, intended)
-    table_commands = np.interp(intended, forces, commands)
-    deadband = commands[np.abs(forces) <= _DEADBAND_TOLERANCE * np.abs(forces).max()]
-    if len(deadband) < 2 or slip_n <= 0:
+    commands, forces = _tabulate_to(law, intended_forces)
+    table_commands = np.interp(intended_forces, forces, commands)
+    deadband_commands = commands[np.abs(forces) <= _DEADBAND_TOLERANCE * np.abs(forces).max()]
+    if len(deadband_commands) < 2 or slip_n <= 0:
         return np.asarray(table_commands)
     # At zero force, the command is the value in the dead band nearest to zero; with rising force it approaches the edge
     # of the dead band.
-    rest_command = float(np.clip(0.0, deadband[0], deadband[-1]))
-    deadband_edge = np.where(intended > 0, deadband[-1], deadband[0])
-    outside_deadband = np.where(intended == 0, 0.0, table_commands - deadband_edge)
+    rest_command = float(np.clip(0.0, deadband_commands[0], deadband_commands[-1]))
+    deadband_edge = np.where(intended_forces > 0, deadband_commands[-1], deadband_commands[0])
+    outside_deadband = np.where(intended_forces == 0, 0.0, table_commands - deadband_edge)
     return np.asarray(
-        rest_command + np.abs(deadband_edge - rest_command) * np.tanh(intended / slip_n) + outside_deadband
+        rest_command + np.abs(deadband_edge - rest_command) * np.tanh(intended_forces / slip_n) + outside_deadband
     )
 
 
-def _tabulate_to(law: Law, intended: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _tabulate_to(law: Law, intended_forces: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Commands and forces, (TABLE_SIZE,) each, over the smallest range in which the map reaches the intended forces;
     over the first range where it never does. Raises ValueError where the map decreases in the first range."""
-    first_range = FIRST_RANGE_RATIO * max(float(np.abs(intended).max()), np.finfo(np.float64).tiny)
+    first_range = FIRST_RANGE_RATIO * max(float(np.abs(intended_forces).max()), np.finfo(np.float64).tiny)
     tables = (_tabulate(law, first_range * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
     first_table = next(tables)
     if not _is_rising(first_table[1]):
@@ -139,7 +144,7 @@ def _tabulate_to(law: Law, intended: FloatArray) -> tuple[FloatArray, FloatArray
             f"the command map {law.text} decreases somewhere, so it has no inverse; leave it out of what is compensated"
         )
     for commands, forces in takewhile(lambda table: _is_rising(table[1]), chain((first_table,), tables)):
-        if forces[0] <= intended.min() and intended.max() <= forces[-1]:
+        if forces[0] <= intended_forces.min() and intended_forces.max() <= forces[-1]:
             return commands, forces
     return first_table
 
@@ -156,18 +161,18 @@ def _is_rising(forces: FloatArray) -> bool:
     return bool(np.isfinite(forces).all() and (np.diff(forces) >= 0).all())
 
 
-def _smooth_signs(law: Law, slip: float) -> Law:
-    """The law with sign(v) replaced by tanh(v / slip) for each velocity v, as in `known_forces`; unchanged
-    for a slip of 0."""
-    tree = _smooth_node(law.tree, slip)
+def _smooth_signs(law: Law, slip_mps: float) -> Law:
+    """The law with sign(v) replaced by tanh(v / slip_mps) for each velocity v, as in `known_forces`; unchanged where
+    slip_mps is 0."""
+    tree = _smooth_node(law.tree, slip_mps)
     return Law(format_formula(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
 
 
-def _smooth_node(node: Node, slip: float) -> Node:
+def _smooth_node(node: Node, slip_mps: float) -> Node:
     """The expression tree with the replacements of `_smooth_signs`."""
     match node:
-        case Apply("sign", (Variable(name) as velocity,)) if name.startswith("v") and slip > 0:
-            return Apply("tanh", (Apply("/", (velocity, Number(slip))),))
-        case Apply(name, parts):
-            return Apply(name, tuple(_smooth_node(part, slip) for part in parts))
+        case Apply("sign", (Variable(name) as velocity,)) if name.startswith("v") and slip_mps > 0:
+            return Apply("tanh", (Apply("/", (velocity, Number(slip_mps))),))
+        case Apply(name, arguments):
+            return Apply(name, tuple(_smooth_node(argument, slip_mps) for argument in arguments))
     return node

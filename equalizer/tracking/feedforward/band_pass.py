@@ -1,7 +1,7 @@
 """Zero-phase band-pass filtering of a finite record, in the frequency domain.
 
 The gain is 1 within the band and has raised-cosine edges outside it, because a sharp edge would ring for seconds.
-Used to compare responses within a model's band (`learning.iteration`, `study.workflows.equalizer`).
+Called by `learning.iteration`, `planned_motion`, the compensation of effects and `study.workflows.equalizer`.
 """
 
 import numpy as np
@@ -9,10 +9,11 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 LOWER_STOP_RATIO, UPPER_STOP_RATIO = 0.9, 1.06
-"""Outer ends of the edges, where the gain is zero, relative to the lower and to the upper limit of the band."""
+"""Outer ends of the edges, where the gain is zero, relative to the lower and to the upper limit of the band.
+Chosen: narrower edges would ring for longer."""
 PADDING_S = 1.0
 """Duration (s) of the zeros appended to the record, so that the end of the filtered record does not wrap around to its
-beginning."""
+beginning. Chosen."""
 
 
 def filter_to_band(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:

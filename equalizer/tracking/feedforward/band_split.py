@@ -17,7 +17,7 @@ from scipy.signal import firwin, freqz, kaiser_beta, lfilter, oaconvolve
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 STOPBAND_DB = 60.0
-"""Attenuation (dB) of the linear-phase filters in their stopband."""
+"""Attenuation (dB) of the linear-phase filters in their stopband. Chosen: 0.1 % of an amplitude remains."""
 CAUSAL_ORDER = 3
 """Order of the causal filters. An odd order gives both sides of a crossover the same slope: 12 dB per octave for 3."""
 
@@ -69,7 +69,7 @@ class LinearPhaseSplit:
     edges: BandEdges
     sample_rate_hz: float
     transition_hz: float = 2.0
-    """Width (Hz) of each crossover's transition band; the latency is inversely proportional to it."""
+    """Width (Hz) of each crossover's transition band; the latency is inversely proportional to it. Default chosen."""
 
     def __post_init__(self) -> None:
         _check_sample_rate(self.edges, self.sample_rate_hz)
@@ -99,9 +99,9 @@ class LinearPhaseSplit:
         """(3, taps): impulse responses of low, middle and high; their sum is an impulse delayed by the latency. taps =
         2 latency_samples + 1."""
         tap_count = 2 * self.latency_samples + 1
-        impulse, no_band = np.zeros(tap_count), np.zeros(tap_count)
+        impulse, zeros = np.zeros(tap_count), np.zeros(tap_count)
         impulse[self.latency_samples] = 1.0
-        low_taps = no_band if self.edges.low_hz is None else self._design_low_pass(self.edges.low_hz)
+        low_taps = zeros if self.edges.low_hz is None else self._design_low_pass(self.edges.low_hz)
         below_high_taps = impulse if self.edges.high_hz is None else self._design_low_pass(self.edges.high_hz)
         return np.stack([low_taps, below_high_taps - low_taps, impulse - below_high_taps])
 
@@ -174,12 +174,12 @@ class CausalSplit:
 
     def compute_response(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, 3): complex gains of low, middle and high; their sum is 1. frequency_hz: (lines,)."""
-        no_band = np.zeros(len(frequency_hz), complex)
-        high_gain = self._compute_gain_above(self.edges.high_hz, frequency_hz) if self.edges.high_hz else no_band
+        zeros = np.zeros(len(frequency_hz), complex)
+        high_gain = self._compute_gain_above(self.edges.high_hz, frequency_hz) if self.edges.high_hz else zeros
         low_gain = (
             (1 - high_gain) * (1 - self._compute_gain_above(self.edges.low_hz, frequency_hz))
             if self.edges.low_hz
-            else no_band
+            else zeros
         )
         return np.asarray(np.stack([low_gain, 1 - low_gain - high_gain, high_gain], axis=1))
 
@@ -219,9 +219,11 @@ class CausalSplit:
     def design_one_pole(self, edge_hz: float) -> tuple[FloatArray, FloatArray]:
         """Numerator and denominator, each (2,), of the first-order low-pass q = 1 / (1 + s / w) by the bilinear
         transform, with the frequency axis corrected so that its corner is at edge_hz (Hz). Also called by
-        `study.workflows.equalizer.controller.c_text`, which writes the filters as C."""
-        w = np.tan(np.pi * edge_hz / self.sample_rate_hz)
-        return np.array([w, w]) / (1 + w), np.array([1.0, (w - 1) / (1 + w)])
+        `study.workflows.equalizer.controller.c_source`, which writes the filters as C."""
+        warped_corner = np.tan(np.pi * edge_hz / self.sample_rate_hz)
+        return np.array([warped_corner, warped_corner]) / (1 + warped_corner), np.array(
+            [1.0, (warped_corner - 1) / (1 + warped_corner)]
+        )
 
 
 def _check_sample_rate(edges: BandEdges, sample_rate_hz: float) -> None:

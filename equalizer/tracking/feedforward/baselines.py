@@ -30,16 +30,17 @@ class Inverse:
 
 
 def compute_baseline_inverses(
-    model: IdentifiedModel, measured: FrequencyResponse, frequency_hz: FloatArray
+    model: IdentifiedModel, measured_response: FrequencyResponse, frequency_hz: FloatArray
 ) -> tuple[Inverse, ...]:
-    """All baseline inverses from the data of one place; the last is that of the identified model. frequency_hz:
-    (lines,), above zero. Raises ValueError where the reliable lines of the measured response do not cover them."""
+    """All baseline inverses from the model and the measured response of one place; the last is that of the identified
+    model. frequency_hz: (lines,), above zero. Raises ValueError where the reliable lines of the measured response do
+    not cover them."""
     return (
         make_identity_inverse(model, frequency_hz),
         make_static_gain_inverse(model, frequency_hz),
         make_acceleration_matching_inverse(model, frequency_hz),
         fit_rigid_body_inverse(model, frequency_hz),
-        invert_measured_response(measured, frequency_hz),
+        invert_measured_response(measured_response, frequency_hz),
         make_identified_inverse(model, frequency_hz),
     )
 
@@ -92,21 +93,30 @@ def fit_rigid_body_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> 
     return Inverse("rigid-body dynamics", np.asarray(inverse, dtype=complex), 3 * m * p + 2 * p)
 
 
-def invert_measured_response(measured: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
+def invert_measured_response(
+    measured_response: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT
+) -> Inverse:
     """Regularised inverse of the measured response, interpolated linearly between its reliable lines. weight: of
     |force|², (m/s² per N)². Cost: FIR filters whose length in seconds is the inverse of the smallest line spacing.
     Raises ValueError for frequencies outside the reliable lines, or without any."""
-    lines = measured.select_lines(measured.reliable)
-    lowest_hz, highest_hz = (lines.frequency_hz[0], lines.frequency_hz[-1]) if len(lines) else (np.inf, -np.inf)
-    if not len(lines) or frequency_hz.min() < lowest_hz or frequency_hz.max() > highest_hz:
+    reliable_response = measured_response.select_lines(measured_response.reliable)
+    lowest_hz, highest_hz = (
+        (reliable_response.frequency_hz[0], reliable_response.frequency_hz[-1])
+        if len(reliable_response)
+        else (np.inf, -np.inf)
+    )
+    if not len(reliable_response) or frequency_hz.min() < lowest_hz or frequency_hz.max() > highest_hz:
         raise ValueError(
             f"the measured response has reliable lines from {lowest_hz:g} to {highest_hz:g} Hz, "
             f"but {frequency_hz.min():g} to {frequency_hz.max():g} Hz is wanted"
         )
-    p, m = lines.response.shape[1:]
-    entries = [np.interp(frequency_hz, lines.frequency_hz, entry) for entry in lines.response.reshape(-1, p * m).T]
+    p, m = reliable_response.response.shape[1:]
+    entries = [
+        np.interp(frequency_hz, reliable_response.frequency_hz, entry)
+        for entry in reliable_response.response.reshape(-1, p * m).T
+    ]
     G = np.stack(entries, axis=1).reshape(-1, p, m)
-    tap_count = round(measured.sample_rate_hz / float(np.diff(lines.frequency_hz).min()))
+    tap_count = round(measured_response.sample_rate_hz / float(np.diff(reliable_response.frequency_hz).min()))
     return Inverse("raw estimate", invert_regularised(np.asarray(G, dtype=complex), weight), tap_count * p * m)
 
 

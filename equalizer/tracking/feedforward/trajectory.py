@@ -18,7 +18,7 @@ STEP_TOLERANCE = 0.01
 """Largest relative deviation of a time step from the mean step, for the rate to count as constant. Chosen."""
 RATE_TOLERANCE = 1e-5
 """Largest relative difference of a rate from a whole number of hertz at which it is rounded to it, because printed time
-stamps are rounded; also of two rates that count as equal."""
+stamps are rounded; also of two rates that count as equal. Chosen."""
 
 
 class TableError(ListedProblemsError):
@@ -36,7 +36,9 @@ class TableKind:
 
 
 TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration", "m/s^2")
+"""Desired accelerations along three axes."""
 FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
+"""Commanded forces along three axes."""
 TRANSIENT = TableKind("transient", ("time_s", "a"), "acceleration", "m/s^2")
 """Acceleration along a single direction, which is chosen at playback."""
 # The header identifies the kind of a table, so that all headers must differ.
@@ -79,8 +81,8 @@ def parse_trajectory(text: str) -> Trajectory:
     header = tuple(name.strip() for name in rows[0]) if rows else ()
     kind = next((kind for kind in TABLE_KINDS if kind.header == header), None)
     if kind is None:
-        allowed = " or ".join(",".join(kind.header) for kind in TABLE_KINDS)
-        raise TableError((f"line 1 reads '{','.join(header)}'; allowed is {allowed}",))
+        allowed_headers = " or ".join(",".join(kind.header) for kind in TABLE_KINDS)
+        raise TableError((f"line 1 reads '{','.join(header)}'; allowed is {allowed_headers}",))
     table = _read_numbers(rows[1:], kind)
     rate_hz = _find_rate_hz(table[:, 0])
     signal = Signal(table[:, 1:], rate_hz, kind.quantity, kind.unit, kind.header[1:])
@@ -101,8 +103,8 @@ def format_trajectory_csv(trajectory: Trajectory) -> str:
 
 
 def require_rate(trajectory: Trajectory, model_rate_hz: float) -> None:
-    """Check that a trajectory has the model's sample rate, `rate_hz`. Raises TableError where
-    the rates differ by more than `RATE_TOLERANCE`."""
+    """Check that a trajectory has the sample rate of a model, `model_rate_hz`. Raises TableError where the rates differ
+    by more than `RATE_TOLERANCE`."""
     table_rate_hz = trajectory.signal.sample_rate_hz
     if abs(table_rate_hz - model_rate_hz) > RATE_TOLERANCE * model_rate_hz:
         raise TableError(
@@ -137,20 +139,20 @@ def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
 def _find_rate_hz(time_s: FloatArray) -> float:
     """Sample rate (Hz) of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises TableError
     for times that do not increase and for steps that are not constant within `STEP_TOLERANCE`."""
-    steps = np.diff(time_s)
-    mean_s = float(time_s[-1] - time_s[0]) / len(steps)
-    if mean_s <= 0 or (steps <= 0).any():
-        row = int(np.argmax(steps <= 0))
+    steps_s = np.diff(time_s)
+    mean_step_s = float(time_s[-1] - time_s[0]) / len(steps_s)
+    if mean_step_s <= 0 or (steps_s <= 0).any():
+        row = int(np.argmax(steps_s <= 0))
         raise TableError((f"time_s does not grow at row {row + 2} (line {row + 3})",))
-    deviation = np.abs(steps / mean_s - 1)
+    deviation = np.abs(steps_s / mean_step_s - 1)
     if (deviation > STEP_TOLERANCE).any():
         row = int(np.argmax(deviation > STEP_TOLERANCE))
         raise TableError(
             (
-                f"time_s is not at a constant rate: the step to row {row + 2} (line {row + 3}) is {steps[row]:g} s, "
-                f"the mean step {mean_s:g} s; allowed is 1 % (write more digits, or resample)",
+                f"time_s is not at a constant rate: the step to row {row + 2} (line {row + 3}) is {steps_s[row]:g} s, "
+                f"the mean step {mean_step_s:g} s; allowed is 1 % (write more digits, or resample)",
             )
         )
-    rate_hz = 1 / mean_s
+    rate_hz = 1 / mean_step_s
     rounded_hz = round(rate_hz)
     return float(rounded_hz) if rounded_hz and abs(rate_hz - rounded_hz) <= RATE_TOLERANCE * rounded_hz else rate_hz

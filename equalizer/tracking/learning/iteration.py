@@ -9,7 +9,7 @@ initial forces would get worse. A setback is a repeat that increased the error; 
 
 Corrections are faded to zero at both ends of the record. An inverse that cannot act before the first row would respond
 to an error there with an impulse; a handle held by static friction would not move, and the impulse would grow with
-every repeat. `study.workflows.equalizer.repeat_playback` plays the forces between the steps.
+every repeat. Called by `study.workflows.equalizer.repeat_playback`, which plays the forces between the steps.
 """
 
 from collections.abc import Callable
@@ -21,19 +21,19 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 
-Invert = Callable[[FloatArray], FloatArray]
+InverseOperator = Callable[[FloatArray], FloatArray]
 """Linear inverse of the device: from reference motion (N, p) to forces (N, m), in N, with N rows in time each."""
 
 SIGNIFICANCE_SIGMA = 3.0
-"""A residual power this many standard deviations above the noise power is more than noise."""
+"""A residual power this many standard deviations above the noise power is more than noise. Chosen."""
 WORSE_RATIO, DIVERGENCE_RATIO = 1.1, 2.0
 """Ratios of a residual to the smallest so far: above the first, the next correction starts from the best forces again;
-above the second, the iteration ends as diverging."""
+above the second, the iteration ends as diverging. Chosen."""
 LOWEST_GAIN = 0.03
 """Gain, or factor left by cap and slew limit, below which the iteration ends, because a correction makes no measurable
-change."""
+change. Chosen."""
 EDGE_S = 0.03
-"""Time (s) over which corrections are faded to zero at either end of the record."""
+"""Time (s) over which corrections are faded to zero at either end of the record. Chosen."""
 
 
 class Verdict(Enum):
@@ -51,7 +51,7 @@ class Repetition:
 
     reference: FloatArray
     """(N, p), reference motion: begins and ends at rest, with time for non-causal forces before and after."""
-    invert: Invert
+    invert: InverseOperator
     sample_rate_hz: float
     band_hz: tuple[float, float]
     """Band (Hz) in which errors are computed and corrected."""
@@ -86,9 +86,9 @@ class Repetition:
     @property
     def degrees_of_freedom(self) -> float:
         """Degrees of freedom of the judged rows in the band: 2 x bandwidth x duration x channels."""
-        low, high = self.band_hz
+        low_hz, high_hz = self.band_hz
         start, stop = self.judged_rows or (0, len(self.reference))
-        return float(2 * (high - low) * (stop - start) * self.reference.shape[1] / self.sample_rate_hz)
+        return float(2 * (high_hz - low_hz) * (stop - start) * self.reference.shape[1] / self.sample_rate_hz)
 
     def find_allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
         """Largest factor on the correction, up to 1, with which forces plus correction obey cap and slew limit. Both
@@ -103,7 +103,7 @@ class Repetition:
 
     @property
     def limits(self) -> str:
-        """The limits of force and slew rate in words, for remarks; empty without limits."""
+        """Text of the limits of force and slew rate, for remarks; empty without limits."""
         cap_text = [] if self.cap_n is None else [f"the force within {self.cap_n:g} N"]
         return " and ".join(
             [*cap_text, *([] if self.slew_n_per_s is None else [f"its change within {self.slew_n_per_s:.4g} N/s"])]
@@ -155,16 +155,20 @@ class IterationState:
         )
 
 
-def start_iteration(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
-    """State before the first play. first: (N, m), initial forces (N); None = the model's inverse of the reference
-    motion. Raises ValueError where the first forces exceed the cap, or the reference motion has no part in the band."""
+def start_iteration(repetition: Repetition, initial_forces: FloatArray | None = None) -> IterationState:
+    """State before the first play. initial_forces: (N, m), N; None = the model's inverse of the reference motion.
+    Raises ValueError where the initial forces exceed the cap, or the reference motion has no part in the band."""
     if repetition.level == 0:
         low_hz, high_hz = repetition.band_hz
         raise ValueError(
             f"the wanted trajectory has no content in the band of {low_hz:g} to {high_hz:g} Hz; "
             "give a trajectory within it"
         )
-    forces = repetition.invert(repetition.reference) if first is None else np.asarray(first, dtype=np.float64)
+    forces = (
+        repetition.invert(repetition.reference)
+        if initial_forces is None
+        else np.asarray(initial_forces, dtype=np.float64)
+    )
     peak_n = float(np.linalg.norm(forces, axis=1).max())
     if repetition.cap_n is not None and peak_n > repetition.cap_n:
         raise ValueError(

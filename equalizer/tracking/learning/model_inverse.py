@@ -13,19 +13,19 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
-from equalizer.tracking.learning.iteration import Invert
+from equalizer.tracking.learning.iteration import InverseOperator
 from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
-InverseOfLength = Callable[[int], Invert]
+InverseOfLength = Callable[[int], InverseOperator]
 """Function from a number of rows to the inverse operator for records of that length."""
 
 
 def make_inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
     """Make the inverse of a model by finite-horizon LQR tracking, from rest and with a free final state, for any record
-    length. weight: R = weight I, of |u|², (m/s² per N)²."""
+    length. weight: R = weight I, of |u|², (m/s² per N)²; default as in `TrackingWeights`."""
 
-    def make_inverse_of_length(rows: int) -> Invert:
+    def make_inverse_of_length(rows: int) -> InverseOperator:
         """Inverse operator for records of `rows` rows."""
         gains = compute_stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
         return lambda reference: track(gains, reference).forces
@@ -34,8 +34,8 @@ def make_inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> Inver
 
 
 def compensate_spring(
-    invert: Invert, spring: VirtualSpring, sample_rate_hz: float, band_hz: tuple[float, float]
-) -> Invert:
+    invert: InverseOperator, spring: VirtualSpring, sample_rate_hz: float, band_hz: tuple[float, float]
+) -> InverseOperator:
     """Extend the inverse `invert` by the compensation of a virtual spring, whose force -(k x + b v) the device's loop
     adds to the commands: that force, along the planned motion (position x and velocity v integrated from the reference
     acceleration within band_hz), is subtracted. Without a spring, `invert` itself."""

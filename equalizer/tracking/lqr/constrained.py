@@ -23,7 +23,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 OVER_RELAXATION = 1.7
 """Over-relaxation of ADMM; 1.5 to 1.8 converges fastest (Boyd et al. 2011, section 3.4.3)."""
 ROUNDS_BETWEEN_TUNING = 25
-"""Number of iterations between changes of the penalty of ADMM; each change costs a Riccati recursion."""
+"""Number of iterations between changes of the penalty of ADMM; each change costs a Riccati recursion. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class CappedForces:
     """Result of `track_under_cap`: forces from rest under the cap, and the tracking error that the cap causes."""
 
     forces: FloatArray
-    """(N, m), N; the norm of each row of their sum with the further forces `already` is within the cap."""
+    """(N, m), N; the norm of each row of their sum with the further forces `already_planned` is within the cap."""
     predicted: FloatArray
     """(N, p), m/s²: the model's response to `forces`, from rest."""
     loss: TrackingLoss
@@ -65,7 +65,8 @@ class CappedForces:
 
 @dataclass(frozen=True, slots=True)
 class CapSettings:
-    """Stopping rule of ADMM: the duality gap that must be reached, and the largest number of iterations."""
+    """Stopping rule of ADMM: the duality gap that must be reached, and the largest number of iterations. Defaults
+    chosen."""
 
     gap: float = 1e-5
     """Relative duality gap at which the iteration ends."""
@@ -105,17 +106,19 @@ def track_under_cap(
     problem: TrackingProblem,
     reference: FloatArray,
     cap_n: float,
-    already: FloatArray | None = None,
+    already_planned: FloatArray | None = None,
     settings: CapSettings | None = None,
 ) -> CappedForces:
-    """Track reference (N, p), m/s², from rest. cap_n: largest norm of a row of all forces, N; already: (N, m), N,
-    further forces, which count against the cap (None = none).
+    """Track reference (N, p), m/s², from rest. cap_n: largest norm of a row of all forces, N; already_planned: (N, m),
+    N, further forces, such as those of other bands, which count against the cap (None = none).
 
-    Raises TrackingError for other shapes and an invalid cap, where `already` alone is above the cap, and where the
-    duality gap is not reached within the allowed rounds.
+    Raises TrackingError for other shapes and an invalid cap, where `already_planned` alone is above the cap, and where
+    the duality gap is not reached within the allowed rounds.
     """
     r = require_trajectory(problem, reference)
-    fixed_forces = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
+    fixed_forces = (
+        np.zeros((len(r), problem.inputs)) if already_planned is None else np.asarray(already_planned, dtype=np.float64)
+    )
     if fixed_forces.shape != (len(r), problem.inputs):
         raise TrackingError(f"already has shape {fixed_forces.shape}; these forces have ({len(r)}, {problem.inputs})")
     peaks = find_force_peaks(fixed_forces, require_cap(cap_n))
@@ -124,32 +127,34 @@ def track_under_cap(
             f"the other forces alone reach {peaks.peak_n:.3g} N at row {peaks.peak_row}, above the cap of {cap_n:g} "
             "N; lower them, or raise the cap"
         )
-    task = _CappedProblem(problem, r, fixed_forces, cap_n)
+    capped = _CappedProblem(problem, r, fixed_forces, cap_n)
     unconstrained = track(compute_stored_gains(problem, len(r)), r)
     if find_force_peaks(unconstrained.forces + fixed_forces, cap_n).is_under_cap:
-        return _make_result(task, unconstrained.forces, unconstrained.forces, 0.0, 0)
+        return _make_result(capped, unconstrained.forces, unconstrained.forces, 0.0, 0)
     return _make_result(
-        task, unconstrained.forces, *_alternate_directions(task, unconstrained.forces, settings or CapSettings())
+        capped,
+        unconstrained.forces,
+        *_alternate_directions(capped, unconstrained.forces, settings or CapSettings()),
     )
 
 
 def _alternate_directions(
-    task: _CappedProblem, initial_forces: FloatArray, settings: CapSettings
+    capped: _CappedProblem, initial_forces: FloatArray, settings: CapSettings
 ) -> tuple[FloatArray, float, int]:
     """Solve by ADMM with over-relaxation, in Boyd's notation: u from tracking, z projected on the cap, scaled
     multipliers λ / (2 penalty). Returns the best z, its relative duality gap and the number of rounds. Raises
     TrackingError where the gap is not reached."""
-    penalty = _choose_initial_penalty(task.problem)
-    gains = _compute_penalised_gains(task.problem, len(task.reference), penalty)
-    z, scaled_multipliers = task.project(initial_forces), np.zeros_like(initial_forces)
-    best_forces, best_cost, cost_bound = z, task.compute_cost(z), -np.inf
+    penalty = _choose_initial_penalty(capped.problem)
+    gains = _compute_penalised_gains(capped.problem, len(capped.reference), penalty)
+    z, scaled_multipliers = capped.project(initial_forces), np.zeros_like(initial_forces)
+    best_forces, best_cost, cost_bound = z, capped.compute_cost(z), -np.inf
     for round_count in range(1, settings.rounds + 1):
-        u = track(gains, np.hstack((task.reference, z - scaled_multipliers))).forces
-        cost_bound = max(cost_bound, task.compute_lower_bound(u, 2 * penalty * (u - z + scaled_multipliers)))
+        u = track(gains, np.hstack((capped.reference, z - scaled_multipliers))).forces
+        cost_bound = max(cost_bound, capped.compute_lower_bound(u, 2 * penalty * (u - z + scaled_multipliers)))
         relaxed_forces = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
-        previous_z, z = z, task.project(relaxed_forces + scaled_multipliers)
+        previous_z, z = z, capped.project(relaxed_forces + scaled_multipliers)
         scaled_multipliers = scaled_multipliers + relaxed_forces - z
-        cost = task.compute_cost(z)
+        cost = capped.compute_cost(z)
         if cost < best_cost:
             best_forces, best_cost = z, cost
         gap = max(0.0, (best_cost - cost_bound) / best_cost)
@@ -158,16 +163,17 @@ def _alternate_directions(
         factor = _compute_penalty_factor(u - z, z - previous_z) if round_count % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
             penalty, scaled_multipliers = penalty * factor, scaled_multipliers / factor
-            gains = _compute_penalised_gains(task.problem, len(task.reference), penalty)
+            gains = _compute_penalised_gains(capped.problem, len(capped.reference), penalty)
     raise TrackingError(
-        f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
+        f"after {settings.rounds} rounds the forces under the cap of {capped.cap_n:g} N are only known to be within "
         f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
     )
 
 
 def _compute_penalty_factor(primal_residual: FloatArray, dual_residual: FloatArray) -> float:
     """Factor on the penalty that balances the primal residual u - z and the dual residual, the change of z (Boyd et
-    al., section 3.4.1)."""
+    al., section 3.4.1): the square root of their ratio, limited to 0.2 to 5, and 1 for a ratio between 1/3 and 3. The
+    limits are chosen."""
     ratio = float(
         np.linalg.norm(primal_residual) / max(float(np.linalg.norm(dual_residual)), np.finfo(np.float64).tiny)
     )
@@ -176,7 +182,7 @@ def _compute_penalty_factor(primal_residual: FloatArray, dual_residual: FloatArr
 
 def _choose_initial_penalty(problem: TrackingProblem) -> float:
     """Initial penalty: geometric mean of the smallest force weight and the cost's curvature in the force of one tick,
-    with lower limits of 1e-6 and 1."""
+    with lower limits of 1e-6 and 1 (chosen), so that it is above zero."""
     curvature = problem.stage_cost[problem.order :, problem.order :]
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
@@ -201,26 +207,26 @@ def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArra
 
 
 def _make_result(
-    task: _CappedProblem, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
+    capped: _CappedProblem, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
 ) -> CappedForces:
     """Result for `forces` (N, m), with the loss against the forces `unconstrained` (N, m). gap, rounds: as in
     `TrackingLoss`."""
-    p, reference_norm = task.problem.outputs, float(np.linalg.norm(task.reference)) or 1.0
+    p, reference_norm = capped.problem.outputs, float(np.linalg.norm(capped.reference)) or 1.0
 
     def compute_error(tested_forces: FloatArray) -> float:
         """Relative rms tracking error of forces (N, m); the absolute norm for a reference of zeros."""
         return (
-            float(np.linalg.norm(_simulate_outputs(task.problem, tested_forces)[:, :p] - task.reference))
+            float(np.linalg.norm(_simulate_outputs(capped.problem, tested_forces)[:, :p] - capped.reference))
             / reference_norm
         )
 
     loss = TrackingLoss(
         compute_error(unconstrained),
         compute_error(forces),
-        compute_error(task.project(unconstrained)),
-        task.compute_cost(unconstrained),
-        task.compute_cost(forces),
+        compute_error(capped.project(unconstrained)),
+        capped.compute_cost(unconstrained),
+        capped.compute_cost(forces),
         gap,
         rounds,
     )
-    return CappedForces(forces, _simulate_outputs(task.problem, forces)[:, :p], loss)
+    return CappedForces(forces, _simulate_outputs(capped.problem, forces)[:, :p], loss)

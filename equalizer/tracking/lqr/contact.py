@@ -56,14 +56,14 @@ def prepare_causal_start(
     problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None
 ) -> CausalStart:
     """Prepare a recording (N,), the acceleration (m/s²) along the normal from the contact on, at the problem's sample
-    rate. padding: its time after the recording is played, in which the device comes to rest; its time before it is used
-    only for `early_deviation`. None = 0.3 s each.
+    rate. padding: `after_s` is the time after the recording in which the device comes to rest; `before_s` is used only
+    for `early_deviation`. None = 0.3 s each.
 
     Raises TrackingError where the recording has no content in the model's band, or another shape.
     """
     full_padding = padding or Padding()
-    causal = Padding(CAUSAL.before_s, full_padding.after_s)
-    _, rows_after = causal.count_rows(problem.sample_rate_hz)
+    causal_padding = Padding(CAUSAL.before_s, full_padding.after_s)
+    _, rows_after = causal_padding.count_rows(problem.sample_rate_hz)
     padded_recording = np.pad(np.asarray(recording, dtype=np.float64), (0, rows_after))
     gains = compute_stored_gains(problem, len(padded_recording))
     basis = compute_normal_basis(gains, padded_recording)
@@ -80,8 +80,12 @@ def _compute_early_deviation(problem: TrackingProblem, recording: FloatArray, pa
     """(p, p): S with zeros before the transient, during which forces may begin. recording: (N,), with its rows of rest
     after the transient."""
     rows_before, _ = padding.count_rows(problem.sample_rate_hz)
-    padded = np.pad(recording, (rows_before, 0))
-    return _compute_deviation(problem, compute_normal_basis(compute_stored_gains(problem, len(padded)), padded), padded)
+    padded_recording = np.pad(recording, (rows_before, 0))
+    return _compute_deviation(
+        problem,
+        compute_normal_basis(compute_stored_gains(problem, len(padded_recording)), padded_recording),
+        padded_recording,
+    )
 
 
 def _compute_deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:

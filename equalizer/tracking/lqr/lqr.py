@@ -19,7 +19,8 @@ without it the error is about as large as the trajectory.
 
 References: Bryson and Ho, Applied Optimal Control (1975), chapter 5; Anderson and Moore, Optimal Control: Linear
 Quadratic Methods (1990), chapter 4. The tests compute the same forces by one dense least-squares problem
-(`tests/equalizer/tracking/lqr/dense_least_squares.py`).
+(`tests/equalizer/tracking/lqr/dense_least_squares.py`). Called by the other modules of `lqr`, the equalizers in
+`feedforward` and `bands`, and `learning.model_inverse`.
 """
 
 from dataclasses import dataclass
@@ -70,7 +71,7 @@ def compute_stored_gains(
     n, m = problem.order, problem.inputs
     terminal = require_terminal_weight(problem, terminal_weight)
     P, K, H_inverse = terminal.copy(), np.empty((samples, m, n)), np.empty((samples, m, m))
-    is_accurate = riccati_kernel.run_backward_recursion(problem.joined, problem.stage_cost, P, K, H_inverse)
+    is_accurate = riccati_kernel.run_backward_recursion(problem.dynamics, problem.stage_cost, P, K, H_inverse)
     gains = Gains(K, H_inverse, P) if is_accurate else compute_backward_gains(problem, samples, terminal)
     return StoredGains(problem, gains, copy_read_only(terminal))
 
@@ -99,7 +100,9 @@ def compute_costate_feedforward(
         raise TrackingError(f"the trajectory has {len(r)} samples, but the gains are for {len(gains)}")
     v = gains.terminal_weight @ problem.make_state(final_state)
     g = np.empty((len(r), problem.inputs))
-    lqr_kernel.compute_feedforward(problem.joined, r @ problem.linear_cost, gains.gains.K, gains.gains.H_inverse, v, g)
+    lqr_kernel.compute_feedforward(
+        problem.dynamics, r @ problem.linear_cost, gains.gains.K, gains.gains.H_inverse, v, g
+    )
     return g
 
 

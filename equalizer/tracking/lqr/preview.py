@@ -18,7 +18,7 @@ from equalizer.tracking.lqr.riccati import compute_stationary_gains
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, copy_read_only, require_trajectory
 
 LINE_SPACING_HZ = 0.1
-"""Spacing of the spectral lines over which a loss is averaged."""
+"""Spacing of the spectral lines over which a loss is averaged. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

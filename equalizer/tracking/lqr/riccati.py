@@ -35,11 +35,12 @@ NOT_STATIONARY_MESSAGE = (
 """Text of the error where the algebraic Riccati equation has no stabilising solution."""
 RANK_TOLERANCE = 1e-14
 """Rank tolerance, relative to the norm of a column of the array: a column whose part orthogonal to the columns before
-it is smaller counts as linearly dependent on them, up to rounding."""
+it is smaller counts as linearly dependent on them, up to rounding. Chosen near the precision of 64-bit floats."""
 EIGENVALUE_TOLERANCE = 1e-9
-"""Tolerance for negative eigenvalues, relative to a weight's largest entry (rounding of a solved Riccati equation)."""
+"""Tolerance for negative eigenvalues, relative to a weight's largest entry (rounding of a solved Riccati equation).
+Chosen."""
 STATIONARITY_TOLERANCE = 1e-6
-"""Largest change of a stationary P in a further step of the recursion, relative to its largest entry."""
+"""Largest change of a stationary P in a further step of the recursion, relative to its largest entry. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +67,8 @@ def compute_backward_gains(problem: TrackingProblem, samples: int, terminal_weig
     """Gains for `samples` steps by the square-root recursion. terminal_weight: P_N, (n, n), weight of x_N - x_f; None =
     free final state.
 
-    Raises TrackingError where a force has no effect of its own on the cost, and for an invalid terminal weight.
+    Raises TrackingError where a force, or a combination of forces, has no effect on the cost, and for an invalid
+    terminal weight.
     """
     n, m = problem.order, problem.inputs
     S = _factorize(require_terminal_weight(problem, terminal_weight))
@@ -80,7 +82,7 @@ def compute_backward_gains(problem: TrackingProblem, samples: int, terminal_weig
         post_array = np.asarray(np.linalg.qr(pre_array, mode="r"))
         T, S = post_array[:m, :m], post_array[m:, m:]
         # |T_jj| over the norm of column j of `pre_array`: the share of the column that is orthogonal to the
-        # columns before it. Zero up to rounding: the force has no effect of its own.
+        # columns before it. Zero up to rounding: a combination of these forces has no effect on the cost.
         if not np.all(np.abs(np.diag(T)) > RANK_TOLERANCE * np.linalg.norm(pre_array[:, :m], axis=0)):
             raise TrackingError(NO_CURVATURE_MESSAGE.format(step=samples - k))
         K[k] = solve_triangular(T, post_array[:m, m:])

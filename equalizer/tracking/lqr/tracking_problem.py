@@ -26,7 +26,8 @@ class TrackingError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackingWeights:
-    """Weights of the cost. Raises TrackingError for weights that are negative, not finite, or of an invalid shape."""
+    """Weights of the cost; their defaults are chosen. Raises TrackingError for weights that are negative or not finite,
+    a corner that is not positive and finite, and an output weight that is not symmetric and positive semidefinite."""
 
     weight: float = 1e-3
     """Weight of |u|²: R = weight I, (m/s² per N)². The delivered acceleration is too low by the relative amount
@@ -87,8 +88,8 @@ class TrackingProblem:
         return int(self.B.shape[1])
 
     @cached_property
-    def joined(self) -> FloatArray:
-        """(n, n + m): [A B]."""
+    def dynamics(self) -> FloatArray:
+        """(n, n + m): [A B], so that x_{k+1} = [A B] [x_k; u_k]."""
         return copy_read_only(np.hstack((self.A, self.B)))
 
     @cached_property
@@ -174,7 +175,7 @@ def _require_output_weight(Q: FloatArray) -> FloatArray:
     Q = copy_read_only(Q)
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all() or not np.allclose(Q, Q.T, rtol=1e-12):
         raise TrackingError("output_weight must be a square symmetric matrix of finite numbers")
-    lowest = float(np.linalg.eigvalsh(Q)[0]) if Q.size else 0.0
-    if lowest < -1e-12 * float(np.abs(Q).max(initial=0.0)):
-        raise TrackingError(f"output_weight has the eigenvalue {lowest:g}; none may be negative")
+    lowest_eigenvalue = float(np.linalg.eigvalsh(Q)[0]) if Q.size else 0.0
+    if lowest_eigenvalue < -1e-12 * float(np.abs(Q).max(initial=0.0)):
+        raise TrackingError(f"output_weight has the eigenvalue {lowest_eigenvalue:g}; none may be negative")
     return Q

@@ -1,10 +1,10 @@
 """Resonances of an identified model within its band, without the spurious poles of its fit.
 
 A model of order 26 of a device with four resonances in the band has more than four pole pairs there: several pairs may
-describe a single resonance, or the noise of the measurement. The model's poles therefore only give start values:
-resonances, each with a pole pair and residues of its own, and a smooth remainder with free coefficients are fitted
-together to the model's response. `modal_interpolation` interpolates the resonances between places, after
-`mode_matching`.
+describe a single resonance, or the noise of the measurement. The model's poles therefore only give start values: a pole
+pair with residues for each resonance, and a smooth remainder with free coefficients, are fitted together to the model's
+response. Called by `modal_interpolation`, which interpolates the
+resonances between places after `mode_matching`.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 BAND_MARGIN = 0.12
-"""Distance of a resonance outside the band, relative to the band edge, up to which it is kept: its slope is inside."""
+"""Distance of a resonance outside the band, relative to the band edge, up to which it is kept: its slope is inside.
+Heuristic, like all constants here."""
 MAX_DAMPING_RATIO = 0.25
 """Damping ratio from which a pole pair no longer counts as a resonance; such parts belong to the smooth remainder."""
 MIN_SHARE = 0.04
@@ -111,10 +112,10 @@ def find_band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tup
     lines = compute_band_lines(model, band_hz)
     starts = _find_start_values(model, band_hz)
     while len(starts):
-        fitted, residues = _fit_modes(lines, starts, model.sample_rate_hz)
+        fitted_parameters, residues = _fit_modes(lines, starts, model.sample_rate_hz)
         modes = [
             _make_mode(lines, frequency_and_damping, residue, model.sample_rate_hz)
-            for frequency_and_damping, residue in zip(fitted, residues, strict=True)
+            for frequency_and_damping, residue in zip(fitted_parameters, residues, strict=True)
         ]
         is_resonance = np.array(
             [_is_resonance(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)]
@@ -145,19 +146,21 @@ def _find_start_values(model: IdentifiedModel, band_hz: tuple[float, float]) -> 
         & (natural_hz > low_hz * (1 - BAND_MARGIN))
         & (natural_hz < high_hz * (1 + BAND_MARGIN))
     )
-    merged: list[tuple[float, float, float]] = []
-    for frequency, damping, gain in sorted(
+    merged_modes: list[tuple[float, float, float]] = []
+    for mode_hz, damping, gain in sorted(
         zip(natural_hz[is_candidate], damping_ratio[is_candidate], modal_gain[is_candidate], strict=True)
     ):
-        if merged and frequency - merged[-1][0] < max(damping * frequency, merged[-1][0] * merged[-1][1]):
-            previous_frequency, previous_damping, previous_gain = merged.pop()
-            frequency, damping, gain = (
-                (previous_gain * previous_frequency + gain * frequency) / (previous_gain + gain),
+        if merged_modes and mode_hz - merged_modes[-1][0] < max(
+            damping * mode_hz, merged_modes[-1][0] * merged_modes[-1][1]
+        ):
+            previous_hz, previous_damping, previous_gain = merged_modes.pop()
+            mode_hz, damping, gain = (
+                (previous_gain * previous_hz + gain * mode_hz) / (previous_gain + gain),
                 (previous_gain * previous_damping + gain * damping) / (previous_gain + gain),
                 previous_gain + gain,
             )
-        merged.append((float(frequency), float(damping), float(gain)))
-    return np.array([(frequency, damping) for frequency, damping, _ in merged], dtype=np.float64).reshape(-1, 2)
+        merged_modes.append((float(mode_hz), float(damping), float(gain)))
+    return np.array([(mode_hz, damping) for mode_hz, damping, _ in merged_modes], dtype=np.float64).reshape(-1, 2)
 
 
 def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
@@ -191,7 +194,8 @@ def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[Fl
         orthonormal = np.linalg.qr(compute_basis(log_parameters))[0]
         return np.asarray(target - orthonormal @ (orthonormal.T @ target)).ravel()
 
-    # A lower limit of the damping keeps the first values of spurious poles off the unit circle.
+    # A lower limit of the damping ratio keeps the first values of spurious poles off the unit circle, an upper limit of
+    # 0.95 in `compute_basis` keeps the poles complex; a mode near it is no resonance (`MAX_DAMPING_RATIO`).
     log_start = np.log(np.maximum(starts, [0.0, 1e-3]))
     solution = least_squares(compute_residual, log_start.ravel(), method="lm", x_scale=0.01, max_nfev=400)
     coefficients = np.linalg.lstsq(compute_basis(solution.x), target, rcond=None)[0]

@@ -2,7 +2,8 @@
 modes and is the default.
 
 Forces are blended, not responses: where the frequency of a resonance changes with the place, the mean of two responses
-has two smaller resonances, and its inverse two notches.
+has two smaller resonances, and its inverse two notches. Called by `interpolation_choice` and
+`study.evaluation.reproduction`.
 """
 
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
@@ -19,4 +20,4 @@ def blend_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
         )
     weights = compute_place_weights(workspace.places_m, place_m)
     remarks = (weights.remark,) if weights.remark else ()
-    return ModelsAtPlace(place_m, workspace.models, tuple(float(w) for w in weights.linear), remarks)
+    return ModelsAtPlace(place_m, workspace.models, tuple(float(weight) for weight in weights.linear), remarks)

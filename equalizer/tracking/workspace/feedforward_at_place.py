@@ -16,7 +16,7 @@ from equalizer.tracking.feedforward.feedforward import (
     FeedforwardSettings,
     compute_feedforward_forces,
 )
-from equalizer.tracking.learning.iteration import Invert
+from equalizer.tracking.learning.iteration import InverseOperator
 from equalizer.tracking.learning.model_inverse import InverseOfLength, make_inverse_operator
 from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
@@ -75,7 +75,7 @@ def make_inverse_at(place_models: ModelsAtPlace, weight: float) -> InverseOfLeng
         (force_weight, make_inverse_operator(model, weight)) for force_weight, model in select_used_models(place_models)
     ]
 
-    def make_inverse_of_length(row_count: int) -> Invert:
+    def make_inverse_of_length(row_count: int) -> InverseOperator:
         """Make the inverse operator for records of `row_count` samples."""
         inverses = [(force_weight, inverse(row_count)) for force_weight, inverse in weighted_inverses]
         return lambda reference: np.asarray(

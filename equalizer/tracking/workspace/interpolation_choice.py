@@ -20,7 +20,7 @@ from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
-from equalizer.tracking.workspace.place_weights import OUTSIDE_M, compute_place_weights
+from equalizer.tracking.workspace.place_weights import HULL_TOLERANCE_M, compute_place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError, WorkspaceModels
 
 Interpolation = Literal["blended forces", "modal"]
@@ -133,10 +133,10 @@ def _choose_by_checks(
 
 
 def _check_distances(workspace: WorkspaceModels, held_out_places: Sequence[HeldOutPlace]) -> None:
-    """Raise WorkspaceError for a held-out place within `OUTSIDE_M` (m) of a model's place."""
+    """Raise WorkspaceError for a held-out place within `HULL_TOLERANCE_M` (m) of a model's place."""
     for place in held_out_places:
         distances_m = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
-        if distances_m.min() < OUTSIDE_M:
+        if distances_m.min() < HULL_TOLERANCE_M:
             raise WorkspaceError(
                 f"the place held out is that of model {int(distances_m.argmin()) + 1}; hold out one between the models"
             )
@@ -151,7 +151,7 @@ def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, Mo
         if len(workspace) < 3:
             break
         other_models = workspace.without_model(index)
-        if compute_place_weights(other_models.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
+        if compute_place_weights(other_models.places_m, workspace.places_m[index]).outside_m > HULL_TOLERANCE_M:
             continue
         try:
             modal: ModalInterpolation | None = build_modal_interpolation(other_models)

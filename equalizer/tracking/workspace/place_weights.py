@@ -3,7 +3,8 @@
 Two sets of weights are computed: barycentric coordinates on the Delaunay triangulation (piecewise linear, never
 negative), used by `blended_inverse` for forces, and cardinal functions of multiquadric radial basis functions (smooth),
 used by `modal_interpolation` for the parameters of resonances. A place outside the convex hull of the points is
-replaced by the nearest place inside.
+replaced by the nearest place inside. Also called by `interpolation_choice` and
+`study.workflows.equalizer.playback_models`, which check how far a place lies outside.
 """
 
 from dataclasses import dataclass
@@ -19,18 +20,19 @@ from equalizer.tracking.workspace.workspace_models import Place
 MIN_SPREAD_RATIO = 0.05
 """Spread of the points in a principal direction, relative to the largest (ratio of singular values), below which that
 direction is ignored: otherwise the triangulation of hand-placed points, which lie on a line or surface only nearly,
-would have slivers that join distant points."""
-OUTSIDE_M = 1e-3
-"""Distance to the points' convex hull, in m, up to which a place counts as inside."""
+would have slivers that join distant points. Chosen."""
+HULL_TOLERANCE_M = 1e-3
+"""Distance to the points' convex hull, in m, up to which a place counts as inside. Chosen."""
 SUM_EQUATION_FACTOR = 1e6
 """Factor of the equation sum(w) = 1 in the least-squares search for the nearest point of the hull; the other equations
-are distances of order 1."""
+are distances of order 1. Chosen: the sum is then 1 within rounding."""
 
 MULTIQUADRIC_SHAPE = 0.35
 """Shape parameter epsilon of the multiquadrics sqrt(1 + (epsilon r)²), times the median distance between nearest
-neighbours: the smaller, the closer they are to parabolas."""
+neighbours: the smaller, the closer they are to parabolas. Chosen."""
 NEGLIGIBLE_WEIGHT = 1e-6
-"""Linear weights below this are set to zero, because forces are computed for each point with a weight above zero."""
+"""Linear weights below this are set to zero, because forces are computed for each point with a weight above zero.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +49,8 @@ class PlaceWeights:
 
     @property
     def remark(self) -> str | None:
-        """Sentence for the user about a place more than `OUTSIDE_M` outside the hull; else None."""
-        if self.outside_m <= OUTSIDE_M:
+        """Sentence for the user about a place more than `HULL_TOLERANCE_M` outside the hull; else None."""
+        if self.outside_m <= HULL_TOLERANCE_M:
             return None
         return (
             f"the place is {1e3 * self.outside_m:.1f} mm outside the points where models were identified: "
@@ -57,9 +59,9 @@ class PlaceWeights:
 
 
 def compute_place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWeights:
-    """Weights of points_m (points, 3), all different, at place_m (3,), both in m. Points nearly on a line or in a plane
-    are interpolated in that line or plane. A single point gets the weight 1, everywhere. Inverse-distance weights are
-    not used, because interpolation with them has zero slope at every point."""
+    """Compute the weights of points_m (points, 3), all different, at place_m (3,), both in m. Points nearly on a line
+    or in a plane are interpolated in that line or plane. A single point has the weight 1 at every place.
+    Inverse-distance weights are not used, because interpolation with them has zero slope at every point."""
     point_positions_m = np.asarray(points_m, dtype=np.float64)
     place_position_m = np.asarray(place_m, dtype=np.float64)
     if len(point_positions_m) == 1:
@@ -75,8 +77,8 @@ def compute_place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> 
         principal_directions @ (place_position_m - centre_m) / radius_m,
     )
     nearest_place = _find_nearest_in_hull(projected_points, projected_place)
-    nearest_m = nearest_place @ principal_directions * radius_m + centre_m
-    outside_m = float(np.linalg.norm(place_position_m - nearest_m))
+    nearest_place_m = nearest_place @ principal_directions * radius_m + centre_m
+    outside_m = float(np.linalg.norm(place_position_m - nearest_place_m))
     return PlaceWeights(
         _compute_linear_weights(projected_points, nearest_place),
         _compute_smooth_weights(projected_points, nearest_place),
@@ -84,14 +86,15 @@ def compute_place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> 
     )
 
 
-def _find_principal_directions(offsets: FloatArray) -> FloatArray:
-    """(dimensions, 3): principal directions of the offsets (points, 3), m, by singular value decomposition. Directions
-    with little spread (`MIN_SPREAD_RATIO`) are left out, unless two points would coincide, or nearly, without them."""
-    _, spreads, directions = np.linalg.svd(offsets, full_matrices=False)
+def _find_principal_directions(offsets_m: FloatArray) -> FloatArray:
+    """(dimensions, 3): principal directions of offsets_m (points, 3) by singular value decomposition. Directions
+    with little spread (`MIN_SPREAD_RATIO`) are left out, unless without them the smallest distance between two points
+    would fall below half; directions with a spread of zero, within rounding (1e-9), always are."""
+    _, spreads, directions = np.linalg.svd(offsets_m, full_matrices=False)
     rank = int((spreads > MIN_SPREAD_RATIO * spreads[0]).sum())
     full_rank = int((spreads > 1e-9 * spreads[0]).sum())
-    full_distance = _compute_smallest_distance(offsets)
-    while rank < full_rank and _compute_smallest_distance(offsets @ directions[:rank].T) < 0.5 * full_distance:
+    full_rank_distance_m = _compute_smallest_distance(offsets_m)
+    while rank < full_rank and _compute_smallest_distance(offsets_m @ directions[:rank].T) < 0.5 * full_rank_distance_m:
         rank += 1
     return np.asarray(directions[:rank])
 
@@ -103,22 +106,25 @@ def _compute_smallest_distance(points: FloatArray) -> float:
 
 
 def _find_nearest_in_hull(points: FloatArray, place: FloatArray) -> FloatArray:
-    """(dimensions,): the place itself, or the nearest point of the convex hull: the least |sum w_i p_i - place| with
+    """(dimensions,): the place if it is inside, else the nearest point of the convex hull: least |sum w_i p_i - place|,
     w_i >= 0 and sum w_i = 1, by non-negative least squares (scipy's `nnls`). Coordinates are scaled to order 1."""
-    equations = np.vstack([points.T, np.full(len(points), SUM_EQUATION_FACTOR)])
-    weights, _ = nnls(equations, np.append(place, SUM_EQUATION_FACTOR))
+    equation_matrix = np.vstack([points.T, np.full(len(points), SUM_EQUATION_FACTOR)])
+    weights, _ = nnls(equation_matrix, np.append(place, SUM_EQUATION_FACTOR))
     return np.asarray(weights @ points / weights.sum())
 
 
 def _compute_linear_weights(points: FloatArray, place: FloatArray) -> FloatArray:
     """(points,): barycentric coordinates of the place in its simplex of the Delaunay triangulation; between the two
     neighbours in one dimension."""
-    point_count, dimensions = points.shape
-    if dimensions == 1:
-        ascending = np.argsort(points[:, 0])
-        sorted_positions = points[ascending, 0]
+    point_count, dimension_count = points.shape
+    if dimension_count == 1:
+        sorting_order = np.argsort(points[:, 0])
+        sorted_positions = points[sorting_order, 0]
         weights = np.array(
-            [np.interp(place[0], sorted_positions, unit_values) for unit_values in np.eye(point_count)[:, ascending]]
+            [
+                np.interp(place[0], sorted_positions, unit_values)
+                for unit_values in np.eye(point_count)[:, sorting_order]
+            ]
         )
         weights[weights < NEGLIGIBLE_WEIGHT] = 0.0
         return np.asarray(weights / weights.sum())
@@ -128,8 +134,10 @@ def _compute_linear_weights(points: FloatArray, place: FloatArray) -> FloatArray
         # The place is outside the hull by rounding: a step of a millionth towards the centre is inside.
         place = place + 1e-6 * (points.mean(axis=0) - place)
         simplex_index = int(triangulation.find_simplex(place, tol=1e-6))
-    transform = triangulation.transform[simplex_index]
-    first_coordinates = np.clip(transform[:dimensions] @ (place - transform[dimensions]), 0.0, 1.0)
+    affine_transform = triangulation.transform[simplex_index]
+    first_coordinates = np.clip(
+        affine_transform[:dimension_count] @ (place - affine_transform[dimension_count]), 0.0, 1.0
+    )
     barycentric = np.append(first_coordinates, max(0.0, 1.0 - first_coordinates.sum()))
     barycentric[barycentric < NEGLIGIBLE_WEIGHT] = 0.0
     all_weights = np.zeros(point_count)

@@ -43,16 +43,16 @@ class Calibration:
     sensitivity), in g."""
 
     def to_acceleration(self, raw: FloatArray) -> FloatArray:
-        """Acceleration (n, 3) or (3,) in m/s², gravity included, of raw values of the same shape."""
+        """Convert raw values (n, 3) or (3,) to accelerations of the same shape, m/s², gravity included."""
         transposed = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
         return np.asarray(transposed.T, dtype=np.float64)
 
     @property
     def cross_axis(self) -> float:
         """Largest cross-axis sensitivity of a channel, relative to its sensitivity to its own axis."""
-        main_axis = np.abs(np.diag(self.sensitivity))
+        main_sensitivity = np.abs(np.diag(self.sensitivity))
         cross_terms = np.abs(self.sensitivity - np.diag(np.diag(self.sensitivity)))
-        return float((cross_terms / main_axis[:, None]).max())
+        return float((cross_terms / main_sensitivity[:, None]).max())
 
 
 def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
@@ -64,14 +64,16 @@ def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
     """
     if len(positions) != len(POSITIONS) or any(len(samples) < 2 for samples in positions):
         raise ValueError(f"{len(POSITIONS)} positions are needed, each with two samples or more")
-    means = np.array([np.mean(samples, axis=0) for samples in positions])
+    mean_readings = np.array([np.mean(samples, axis=0) for samples in positions])
     design_matrix = np.hstack((GRAVITY_MPS2 * UP_DIRECTIONS, np.ones((len(UP_DIRECTIONS), 1))))
-    solution = np.linalg.lstsq(design_matrix, means, rcond=None)[0]
-    sensitivity, bias = solution[:3].T, solution[3]
+    fitted_rows = np.linalg.lstsq(design_matrix, mean_readings, rcond=None)[0]
+    sensitivity, bias = fitted_rows[:3].T, fitted_rows[3]
     largest_sensitivity = float(np.linalg.norm(sensitivity, 2))
     if not largest_sensitivity > 0:
         raise ValueError("no channel responds to gravity: check the wiring")
-    residuals_g = np.linalg.norm(means - design_matrix @ solution, axis=1) / (largest_sensitivity * GRAVITY_MPS2)
+    residuals_g = np.linalg.norm(mean_readings - design_matrix @ fitted_rows, axis=1) / (
+        largest_sensitivity * GRAVITY_MPS2
+    )
     worst_position = int(np.argmax(residuals_g))
     if residuals_g[worst_position] > MAX_RESIDUAL_G:
         raise ValueError(

@@ -42,31 +42,41 @@ def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
     """Fit the device's clock to the host's: a line below all arrivals. device_s (n,), strictly rising: times of the
     samples by the device's clock (s); arrived_s (n,): their times of arrival by the host's clock (s).
 
-    Raises ValueError for fewer than two samples, device times that do not rise, or arrivals that are not finite.
+    Raises ValueError for fewer than two samples, device times that do not rise or are NaN, or arrivals that are not
+    finite.
     """
-    device, arrived = np.asarray(device_s, dtype=float), np.asarray(arrived_s, dtype=float)
-    if len(device) < 2 or not (np.diff(device) > 0).all() or not np.isfinite(arrived).all():
+    device_times_s, arrival_times_s = np.asarray(device_s, dtype=float), np.asarray(arrived_s, dtype=float)
+    if len(device_times_s) < 2 or not (np.diff(device_times_s) > 0).all() or not np.isfinite(arrival_times_s).all():
         raise ValueError("a clock needs two samples or more, with device times that rise")
     # Both intervals since the first sample are nearly equal; their difference is fitted, for numerical precision.
-    excess_delay_s = (arrived - arrived[0]) - (device - device[0])
-    hull = _find_lower_hull(device - device[0], excess_delay_s)
-    mean_device_s = float(np.mean(device - device[0]))
-    edge_end = int(np.searchsorted(device[hull] - device[0], mean_device_s).clip(1, len(hull) - 1))
-    start, end = hull[edge_end - 1], hull[edge_end]
-    slope = float((excess_delay_s[end] - excess_delay_s[start]) / (device[end] - device[start]))
-    at_host_s = float(arrived[0] + excess_delay_s[start] + (device[start] - device[0]))
-    fit = ClockFit(float(device[start]), at_host_s, 1.0 + slope, 0.0)
-    return ClockFit(fit.at_device_s, at_host_s, fit.rate, float((arrived - fit.to_host_s(device)).max()))
+    excess_delay_s = (arrival_times_s - arrival_times_s[0]) - (device_times_s - device_times_s[0])
+    hull_indices = _find_lower_hull(device_times_s - device_times_s[0], excess_delay_s)
+    mean_device_s = float(np.mean(device_times_s - device_times_s[0]))
+    edge_end_corner = int(
+        np.searchsorted(device_times_s[hull_indices] - device_times_s[0], mean_device_s).clip(1, len(hull_indices) - 1)
+    )
+    start_index, end_index = hull_indices[edge_end_corner - 1], hull_indices[edge_end_corner]
+    slope = float(
+        (excess_delay_s[end_index] - excess_delay_s[start_index])
+        / (device_times_s[end_index] - device_times_s[start_index])
+    )
+    at_host_s = float(
+        arrival_times_s[0] + excess_delay_s[start_index] + (device_times_s[start_index] - device_times_s[0])
+    )
+    fit = ClockFit(float(device_times_s[start_index]), at_host_s, 1.0 + slope, 0.0)
+    return ClockFit(
+        fit.at_device_s, at_host_s, fit.rate, float((arrival_times_s - fit.to_host_s(device_times_s)).max())
+    )
 
 
 def _find_lower_hull(x: FloatArray, y: FloatArray) -> list[int]:
     """Find the corners of the lower convex hull of points whose x rises (monotone chain): indices in rising order."""
-    hull: list[int] = []
+    corner_indices: list[int] = []
     for index in range(len(x)):
-        while len(hull) > 1 and _is_above_chord(x, y, hull[-2], hull[-1], index):
-            hull.pop()
-        hull.append(index)
-    return hull
+        while len(corner_indices) > 1 and _is_above_chord(x, y, corner_indices[-2], corner_indices[-1], index):
+            corner_indices.pop()
+        corner_indices.append(index)
+    return corner_indices
 
 
 def _is_above_chord(x: FloatArray, y: FloatArray, first: int, middle: int, last: int) -> bool:

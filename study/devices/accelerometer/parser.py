@@ -1,5 +1,5 @@
-"""Parser of the accelerometer's byte stream, which may be interrupted, incomplete or garbled: gives the samples of the
-accepted packets, in order. Used by `serial_reader.SerialSource`.
+"""Parser of the accelerometer's byte stream, which may be interrupted, incomplete or garbled: it returns the samples of
+the accepted packets, in order. Used by `serial_reader.SerialSource`.
 
 A packet is searched at every byte, so that a garbled packet hides none of its neighbours. Arbitrary bytes have a
 correct checksum once in 2^16 = 65 536 times. Therefore a packet with a correct checksum is accepted at once only where
@@ -44,7 +44,7 @@ PACKET_DTYPE = np.dtype(
 
 
 def compute_crc(rows: Bytes) -> npt.NDArray[np.uint16]:
-    """(n,): CRC-16/CCITT-FALSE of each row of bytes (n, k), byte by byte with a table."""
+    """Compute the CRC-16/CCITT-FALSE (n,) of each row of bytes (n, k), byte by byte with a table."""
     crc = np.full(len(rows), CRC_INITIAL, dtype=np.uint16)
     for column in rows.T:
         crc = (crc << 8) ^ _CRC_TABLE[(crc >> 8) ^ column]
@@ -52,7 +52,7 @@ def compute_crc(rows: Bytes) -> npt.NDArray[np.uint16]:
 
 
 def _make_crc_table() -> npt.NDArray[np.uint16]:
-    """The table `_CRC_TABLE`: eight steps of the shift register for each value of a byte, most significant bit
+    """Make the table `_CRC_TABLE`: eight steps of the shift register for each value of a byte, most significant bit
     first."""
     table = np.arange(256, dtype=np.uint32) << 8
     for _ in range(8):
@@ -66,18 +66,19 @@ _CRC_TABLE = _make_crc_table()
 
 LONGEST_SILENCE_US = 10_000_000
 """Longest time (µs) between two packets of one clock. After a longer silence the relation to the host's clock is
-estimated anew, as after a restart."""
+estimated anew, as after a restart. Chosen."""
 
 SHORTEST_PERIOD_US = 50
-"""Shortest sample period (µs) of any board: a gap in the numbers that is too large for the time passed shows another
-clock, that is, a restart."""
+"""Shortest sample period (µs) of any board, chosen: a gap in the numbers that is too large for the time passed shows
+another clock, that is, a restart."""
 
 EXPECTED_WITHIN_US, JITTER_SHARE, PERIOD_SHARE = 1_000_000, 0.25, 0.01
 """A packet is accepted at once if its time stamp is less than EXPECTED_WITHIN_US (µs) after the last packet, and agrees
-with its sequence number at the mean period, within JITTER_SHARE of a period plus PERIOD_SHARE of the time passed."""
+with its sequence number at the mean period, within JITTER_SHARE of a period plus PERIOD_SHARE of the time passed.
+Chosen: wide enough for the jitter of a board's timer, and so narrow that arbitrary bytes hardly ever agree."""
 
 PERIOD_GAIN = 0.1
-"""Weight of a new period in the exponential mean of the periods."""
+"""Weight of a new period in the exponential mean of the periods. Chosen."""
 
 CONFIRMING_PACKETS = 2
 """Number of earlier doubtful packets that a packet with an unexpected number or time must follow to be accepted
@@ -103,48 +104,48 @@ class _CandidatePacket(NamedTuple):
 
 
 class PacketParser:
-    """Parser of a board's byte stream: `feed` takes the bytes as they arrive, and returns the samples of complete
-    packets that are accepted ("count", below). Bytes of other packets are skipped and counted as spoiled."""
+    """Parser of a board's byte stream: `feed` takes the bytes as they arrive, and returns the samples of the packets
+    that are accepted. Bytes of other packets are skipped and counted as spoiled."""
 
     def __init__(self) -> None:
         self._remainder: Bytes = np.zeros(0, dtype=np.uint8)
-        self._last: Packets | None = None
-        """The newest packet that counts, shape (1,)."""
-        self._unconfirmed: list[_CandidatePacket] = []
+        self._last_packet: Packets | None = None
+        """The newest accepted packet, shape (1,)."""
+        self._doubtful_packets: list[_CandidatePacket] = []
         """Packets after it with an unexpected number or time, which later packets must confirm."""
         self._period_us = math.nan
         """Mean sample period (µs) by the board's clock; NaN before the first is known."""
         self._sequence, self._time_us = 0, 0
-        """Number and time (µs) of the newest packet that counts, without the wrap-around of the counters."""
+        """Number and time (µs) of the newest accepted packet, without the wrap-around of the counters."""
         self._received_bytes = self._used_bytes = self._shared_bytes = 0
-        """Bytes received; bytes up to the end of the newest packet that counts; bytes shared by two such packets."""
+        """Bytes received; bytes up to the end of the newest accepted packet; bytes shared by two such packets."""
         self.counts = PacketCounts()
 
     def feed(self, data: bytes) -> Samples:
-        """Samples of the packets that are accepted with these bytes; updates `counts`."""
+        """Parse further bytes: return the samples of the packets that are accepted with them, and update `counts`."""
         stream = np.concatenate((self._remainder, np.frombuffer(data, dtype=np.uint8)))
         self._received_bytes += len(data)
-        starts, last = _find_packets(stream), self._last
+        starts, last_packet = _find_packet_starts(stream), self._last_packet
         packets, starts = _read_packets(stream, starts), starts + (self._received_bytes - len(stream))
-        if last is not None and self._accept_in_order(last, starts, packets):
+        if last_packet is not None and self._accept_in_order(last_packet, starts, packets):
             restarted = np.zeros(len(packets), dtype=np.int64)
         else:
             packets, restarted = self._choose_packets(starts, packets)
-        self._last = packets[-1:].copy() if len(packets) else last
+        self._last_packet = packets[-1:].copy() if len(packets) else last_packet
         # Up to 15 bytes at the end may be the beginning of a packet: they are kept for the next call.
         self._remainder = stream[max(0, len(stream) - (PACKET_SIZE - 1)) :].copy()
-        return self._make_samples(last, packets, restarted)
+        return self._make_samples(last_packet, packets, restarted)
 
-    def _accept_in_order(self, last: Packets, starts: Indices, packets: Packets) -> bool:
+    def _accept_in_order(self, last_packet: Packets, starts: Indices, packets: Packets) -> bool:
         """Accept all packets if they are the expected ones without overlap (the usual, fast case): updates the mean
-        period and the end of the used bytes. Returns False, and changes nothing, for any other packets. last: the
-        newest accepted packet, (1,); starts: (n,), index of the packets' first bytes in all bytes received."""
+        period and the end of the used bytes. Returns False, and changes nothing, for any other packets. last_packet:
+        the newest accepted packet, (1,); starts: (n,), index of the packets' first bytes in all bytes received."""
         follows_bytes = np.diff(starts, prepend=self._used_bytes - PACKET_SIZE) >= PACKET_SIZE
-        if self._unconfirmed or not (follows_bytes & _is_expected(last, packets, self._period_us)).all():
+        if self._doubtful_packets or not (follows_bytes & _is_expected(last_packet, packets, self._period_us)).all():
             return False
         if len(packets):
-            steps, times = _compute_increments(last, packets)
-            self._period_us += PERIOD_GAIN * (float(times.sum() / steps.sum()) - self._period_us)
+            steps, steps_us = _compute_increments(last_packet, packets)
+            self._period_us += PERIOD_GAIN * (float(steps_us.sum() / steps.sum()) - self._period_us)
             self._used_bytes = int(starts[-1]) + PACKET_SIZE
         return True
 
@@ -153,118 +154,128 @@ class PacketParser:
         the firmware restarted before the packet, else 0. An expected packet may share bytes with its predecessor: if
         the last bytes of the predecessor were lost and the next packet begins with the same values, its checksum is
         still correct."""
-        chosen, restarted, last = [packets[:0]], [0] * 0, self._last
-        for k, start in enumerate(starts.tolist()):
-            candidate = _CandidatePacket(packets[k : k + 1].copy(), start)
-            is_expected = last is not None and _is_expected(last, candidate.packet, self._period_us).all()
-            if not is_expected and (start < self._used_bytes or _is_repeat(last, candidate.packet)):
+        accepted_blocks, restarted, last_packet = [packets[:0]], [0] * 0, self._last_packet
+        for packet_index, start in enumerate(starts.tolist()):
+            candidate = _CandidatePacket(packets[packet_index : packet_index + 1].copy(), start)
+            is_expected = last_packet is not None and _is_expected(last_packet, candidate.packet, self._period_us).all()
+            if not is_expected and (start < self._used_bytes or _is_repeat(last_packet, candidate.packet)):
                 continue
             if is_expected:
-                accepted_packets = [*self._select_between(last, candidate), candidate]
+                accepted_packets = [*self._select_packets_between(last_packet, candidate), candidate]
             else:
-                accepted_packets = self._find_chain(candidate, 1 if last is None else CONFIRMING_PACKETS)
+                accepted_packets = self._find_chain(candidate, 1 if last_packet is None else CONFIRMING_PACKETS)
             if not accepted_packets:
-                self._unconfirmed = [*self._unconfirmed[1 - MAX_UNCONFIRMED :], candidate]
+                self._doubtful_packets = [*self._doubtful_packets[1 - MAX_UNCONFIRMED :], candidate]
                 continue
-            for accepted in accepted_packets:
-                restarted.append(int(last is not None and not _can_follow(last, accepted.packet).all()))
-                chosen.append(accepted.packet)
-                last = accepted.packet
-                self._shared_bytes += max(0, self._used_bytes - accepted.start)
-                self._used_bytes = accepted.start + PACKET_SIZE
-            self._unconfirmed = []
-        return np.concatenate(chosen), np.array(restarted, dtype=np.int64)
+            for accepted_packet in accepted_packets:
+                restarted.append(
+                    int(last_packet is not None and not _can_follow(last_packet, accepted_packet.packet).all())
+                )
+                accepted_blocks.append(accepted_packet.packet)
+                last_packet = accepted_packet.packet
+                self._shared_bytes += max(0, self._used_bytes - accepted_packet.start)
+                self._used_bytes = accepted_packet.start + PACKET_SIZE
+            self._doubtful_packets = []
+        return np.concatenate(accepted_blocks), np.array(restarted, dtype=np.int64)
 
-    def _select_between(self, last: Packets | None, candidate: _CandidatePacket) -> list[_CandidatePacket]:
-        """The doubtful packets whose bytes, numbers and times lie between the last accepted packet and `candidate`: the
-        board stamped or sent them late, so they are accepted too."""
-        confirmed, used_end = [candidate][:0], self._used_bytes
-        for unconfirmed in self._unconfirmed:
-            lies_between = unconfirmed.start >= used_end and unconfirmed.start + PACKET_SIZE <= candidate.start
-            if last is None or not lies_between or not _can_follow(last, unconfirmed.packet).all():
+    def _select_packets_between(
+        self, last_packet: Packets | None, candidate: _CandidatePacket
+    ) -> list[_CandidatePacket]:
+        """Select the doubtful packets whose bytes, numbers and times lie between the last accepted packet and
+        `candidate`: the board stamped or sent them late, so they are accepted too. Empty without a last packet."""
+        confirmed_packets, used_end = [candidate][:0], self._used_bytes
+        for doubtful in self._doubtful_packets:
+            lies_between = doubtful.start >= used_end and doubtful.start + PACKET_SIZE <= candidate.start
+            if last_packet is None or not lies_between or not _can_follow(last_packet, doubtful.packet).all():
                 continue
-            if _can_follow(unconfirmed.packet, candidate.packet).all():
-                confirmed.append(unconfirmed)
-                last, used_end = unconfirmed.packet, unconfirmed.start + PACKET_SIZE
-        return confirmed
+            if _can_follow(doubtful.packet, candidate.packet).all():
+                confirmed_packets.append(doubtful)
+                last_packet, used_end = doubtful.packet, doubtful.start + PACKET_SIZE
+        return confirmed_packets
 
     def _find_chain(self, candidate: _CandidatePacket, predecessor_count: int) -> list[_CandidatePacket]:
-        """A chain of `predecessor_count` doubtful packets and `candidate`, in which each packet can follow its
+        """Find a chain of `predecessor_count` doubtful packets and `candidate`, in which each packet can follow its
         predecessor; empty if there is none. Sets the mean period from its last two packets."""
-        for predecessors in combinations(self._unconfirmed[::-1], predecessor_count):
+        for predecessors in combinations(self._doubtful_packets[::-1], predecessor_count):
             chain = [*predecessors[::-1], candidate]
             if all(_can_follow(packet.packet, next_packet.packet).all() for packet, next_packet in pairwise(chain)):
-                steps, times = _compute_increments(chain[-2].packet, candidate.packet)
-                self._period_us = float(times[0] / steps[0])
+                steps, steps_us = _compute_increments(chain[-2].packet, candidate.packet)
+                self._period_us = float(steps_us[0] / steps[0])
                 return chain
         return []
 
-    def _make_samples(self, last: Packets | None, packets: Packets, restarted: npt.NDArray[np.int64]) -> Samples:
-        """Samples of these packets, with number and time (µs) unwrapped; updates `counts`. last: the packet before
-        these, (1,), None at the start of the stream; restarted: (n,), as from `_choose_packets`. At a restart of the
-        firmware number and time increase by 1, because the number of packets lost meanwhile is not known."""
-        previous = self.counts
-        if last is None and len(packets):
-            last = packets[:1]
-            self._sequence, self._time_us = int(last["sequence"][0]) - 1, int(last["time_us"][0]) - 1
-            steps, times = _compute_increments(last, packets)
-            steps[0] = times[0] = 1
+    def _make_samples(self, last_packet: Packets | None, packets: Packets, restarted: npt.NDArray[np.int64]) -> Samples:
+        """Convert packets to samples, with number and time (µs) unwrapped, and update `counts`. last_packet: the packet
+        before these, (1,), None at the start of the stream; restarted: (n,), from `_choose_packets`. At a restart of
+        the firmware number and time increase by 1, because the number of packets lost meanwhile is not known."""
+        previous_counts = self.counts
+        if last_packet is None and len(packets):
+            last_packet = packets[:1]
+            self._sequence, self._time_us = int(last_packet["sequence"][0]) - 1, int(last_packet["time_us"][0]) - 1
+            steps, steps_us = _compute_increments(last_packet, packets)
+            steps[0] = steps_us[0] = 1
         else:
-            steps, times = _compute_increments(last, packets) if last is not None else (np.zeros(0, np.int64),) * 2
-        steps, times = np.where(restarted, 1, steps), np.where(restarted, 1, times)
-        sequence, time_us = self._sequence + np.cumsum(steps), self._time_us + np.cumsum(times)
+            steps, steps_us = (
+                _compute_increments(last_packet, packets) if last_packet is not None else (np.zeros(0, np.int64),) * 2
+            )
+        steps, steps_us = np.where(restarted, 1, steps), np.where(restarted, 1, steps_us)
+        sequence, time_us = self._sequence + np.cumsum(steps), self._time_us + np.cumsum(steps_us)
         if len(packets):
             self._sequence, self._time_us = int(sequence[-1]), int(time_us[-1])
         self.counts = PacketCounts(
-            packets=previous.packets + len(packets),
-            lost=previous.lost + int((steps - 1).sum()),
+            packets=previous_counts.packets + len(packets),
+            lost=previous_counts.lost + int((steps - 1).sum()),
             spoiled_bytes=max(
-                previous.spoiled_bytes, self._count_decided_bytes() - PACKET_SIZE * (previous.packets + len(packets))
+                previous_counts.spoiled_bytes,
+                self._count_decided_bytes() - PACKET_SIZE * (previous_counts.packets + len(packets)),
             ),
-            restarts=previous.restarts + int(restarted.sum()),
+            restarts=previous_counts.restarts + int(restarted.sum()),
         )
-        return Samples(sequence, time_us, packets["raw"], previous.restarts + np.cumsum(restarted))
+        return Samples(sequence, time_us, packets["raw"], previous_counts.restarts + np.cumsum(restarted))
 
     def _count_decided_bytes(self) -> int:
-        """Number of bytes whose use is decided: no later byte can make them part of a further packet. Bytes of two
+        """Count the bytes whose use is decided: no later byte can make them part of a further packet. Bytes of two
         overlapping packets count twice; bytes of doubtful packets do not count yet."""
         decided_end = max(self._used_bytes, self._received_bytes - len(self._remainder))
         return (
             decided_end
             + self._shared_bytes
-            - sum(min(PACKET_SIZE, max(0, decided_end - unconfirmed.start)) for unconfirmed in self._unconfirmed)
+            - sum(min(PACKET_SIZE, max(0, decided_end - doubtful.start)) for doubtful in self._doubtful_packets)
         )
 
 
-def _compute_increments(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n,) each: increase of the number and of the time (µs) from each packet's predecessor, modulo the counters."""
-    consecutive_packets = np.concatenate((last, packets))
-    numbers, times = consecutive_packets["sequence"].astype(np.int64), consecutive_packets["time_us"].astype(np.int64)
-    return np.diff(numbers) % 2**16, np.diff(times) % 2**32
+def _compute_increments(last_packet: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Compute, (n,) each, the increase of the number and of the time (µs) from each packet's predecessor, modulo the
+    counters."""
+    consecutive = np.concatenate((last_packet, packets))
+    numbers, times_us = consecutive["sequence"].astype(np.int64), consecutive["time_us"].astype(np.int64)
+    return np.diff(numbers) % 2**16, np.diff(times_us) % 2**32
 
 
-def _can_follow(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
+def _can_follow(last_packet: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
     """(n,): whether each packet may be a later one of the same clock as its predecessor. A time stamp may be late by
     less than a period, so that for consecutive numbers only the order of the times is tested."""
-    steps, times = _compute_increments(last, packets)
-    return (steps > 0) & (steps < 2**15) & (times > SHORTEST_PERIOD_US * (steps - 1)) & (times < LONGEST_SILENCE_US)
+    steps, steps_us = _compute_increments(last_packet, packets)
+    return (
+        (steps > 0) & (steps < 2**15) & (steps_us > SHORTEST_PERIOD_US * (steps - 1)) & (steps_us < LONGEST_SILENCE_US)
+    )
 
 
-def _is_repeat(last: Packets | None, packet: Packets) -> bool:
+def _is_repeat(last_packet: Packets | None, packet: Packets) -> bool:
     """Whether the packet equals the last byte by byte; False without a last one."""
-    return last is not None and packet.tobytes() == last.tobytes()
+    return last_packet is not None and packet.tobytes() == last_packet.tobytes()
 
 
-def _is_expected(last: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
+def _is_expected(last_packet: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
     """(n,): whether number and time of each packet are expected after its predecessor, at the mean period (see
     `EXPECTED_WITHIN_US`). False for a period of NaN."""
-    steps, times = _compute_increments(last, packets)
-    matches_rate = np.abs(times - period_us * steps) <= period_us * (JITTER_SHARE + PERIOD_SHARE * steps)
-    return matches_rate & (times < EXPECTED_WITHIN_US) & _can_follow(last, packets)
+    steps, steps_us = _compute_increments(last_packet, packets)
+    matches_rate = np.abs(steps_us - period_us * steps) <= period_us * (JITTER_SHARE + PERIOD_SHARE * steps)
+    return matches_rate & (steps_us < EXPECTED_WITHIN_US) & _can_follow(last_packet, packets)
 
 
-def _find_packets(stream: Bytes) -> Indices:
-    """(n,): positions in the stream at which packets with a correct checksum begin."""
+def _find_packet_starts(stream: Bytes) -> Indices:
+    """Find the positions (n,) in the stream at which packets with a correct checksum begin."""
     candidate_count = len(stream) - PACKET_SIZE + 1
     if candidate_count <= 0:
         return np.zeros(0, dtype=np.intp)
@@ -272,12 +283,12 @@ def _find_packets(stream: Bytes) -> Indices:
         (stream[:candidate_count] == SYNC[0]) & (stream[1 : candidate_count + 1] == SYNC[1])
     )
     packets = _read_packets(stream, starts)
-    checked = packets.view(np.uint8).reshape(-1, PACKET_SIZE)[:, CRC_BYTES]
-    valid_starts: Indices = starts[compute_crc(checked) == packets["crc"]]
+    checked_bytes = packets.view(np.uint8).reshape(-1, PACKET_SIZE)[:, CRC_BYTES]
+    valid_starts: Indices = starts[compute_crc(checked_bytes) == packets["crc"]]
     return valid_starts
 
 
 def _read_packets(stream: Bytes, starts: Indices) -> Packets:
-    """(n,): packets of `PACKET_SIZE` bytes that begin at these positions, (n,), of the stream."""
+    """Read the packets (n,) of `PACKET_SIZE` bytes that begin at these positions (n,) of the stream."""
     packets: Packets = stream[starts[:, None] + np.arange(PACKET_SIZE)].reshape(-1).view(PACKET_DTYPE)
     return packets

@@ -18,7 +18,7 @@ class Samples:
     sequence: npt.NDArray[np.int64]
     """(n,), number of each sample; continued without a jump where the board's counter wraps or restarts."""
     time_us: npt.NDArray[np.int64]
-    """(n,), time of each sample by the board's clock (us), continued likewise."""
+    """(n,), time of each sample by the board's clock (µs); continued without a jump where its counter wraps."""
     raw: npt.NDArray[np.uint16] | npt.NDArray[np.float64]
     """(n, 3): counts of 16 bits from a board, volts from a data-acquisition device."""
     restarts: npt.NDArray[np.int64]

@@ -24,11 +24,11 @@ REST_S = 2.0
 """Duration of the recording in each position (s): at 2 kHz 4000 samples, whose mean has a noise below 1 mg."""
 
 SETTLE_S = 0.3
-"""Time (s) after a change of position in which samples may still belong to the old one; they are discarded."""
+"""Time (s) after a change of position in which samples may still belong to the old one; they are discarded. Chosen."""
 
 BACKLOG_SAMPLES, DRAIN_S = 200, 2.0
 """More than BACKLOG_SAMPLES samples in a single read come from a buffer and are old. They are discarded too, for at
-most DRAIN_S (s) after `SETTLE_S`."""
+most DRAIN_S (s) after `SETTLE_S`. Chosen: 200 samples are 0.1 s at 2 kHz."""
 
 RANGE_G = 3.0
 """Guaranteed range of the ADXL335, in g (data sheet: ±3 g minimum); beyond it, a channel counts as clipped."""
@@ -51,14 +51,17 @@ def calibrate_on_table(path: str, baud: int, await_position: AwaitPosition, rest
 
 
 def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
-    """The [accelerometer] table for the laboratory's settings file. path: port of the sensor; baud: rate of a serial
-    line (bit/s). Its raw_range holds the raw values for `RANGE_G` along any direction; counts are limited to 16
+    """Format the [accelerometer] table for the laboratory's settings file. path: port of the sensor; baud: rate of a
+    serial line (bit/s). Its raw_range holds the raw values for `RANGE_G` along any direction; counts are limited to 16
     bits."""
-    half_range = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
-    lowest, highest = float((calibration.bias - half_range).min()), float((calibration.bias + half_range).max())
-    count_range = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
-    raw_range = _format_toml_numbers(np.array([lowest, highest])) if has_volt_samples(path) else count_range
-    rows = ", ".join(_format_toml_numbers(row) for row in calibration.sensitivity)
+    half_range_raw = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
+    lowest_raw, highest_raw = (
+        float((calibration.bias - half_range_raw).min()),
+        float((calibration.bias + half_range_raw).max()),
+    )
+    count_range = f"[{max(0, round(lowest_raw))}, {min(65_535, round(highest_raw))}]"
+    raw_range = _format_toml_numbers(np.array([lowest_raw, highest_raw])) if has_volt_samples(path) else count_range
+    sensitivity_rows = ", ".join(_format_toml_numbers(row) for row in calibration.sensitivity)
     noise = ", ".join(f"{value:.3f}" for value in calibration.noise_mps2)
     return "\n".join(
         (
@@ -68,14 +71,14 @@ def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> s
             f'port = "{path}"',
             f"baud = {baud}",
             f"bias = {_format_toml_numbers(calibration.bias)}",
-            f"sensitivity = [{rows}]",
+            f"sensitivity = [{sensitivity_rows}]",
             f"raw_range = {raw_range}",
         )
     )
 
 
 def _record_positions(source: SampleSource, await_position: AwaitPosition, rest_s: float) -> tuple[FloatArray, ...]:
-    """Raw samples, (n, 3) for each of `POSITIONS`; rest_s: time per position (s)."""
+    """Record raw samples, (n, 3) for each of `POSITIONS`. rest_s: time per position (s)."""
     recordings: list[FloatArray] = []
     for position in POSITIONS:
         x, y, z = recordings[-1].mean(axis=0).tolist() if recordings else (0.0, 0.0, 0.0)
@@ -85,7 +88,7 @@ def _record_positions(source: SampleSource, await_position: AwaitPosition, rest_
 
 
 def _record_position(source: SampleSource, rest_s: float) -> FloatArray:
-    """Raw samples (n, 3) of one position, recorded for rest_s (s). Raises `DeviceError` where fewer than two arrive."""
+    """Record raw samples (n, 3) of one position for rest_s (s). Raises `DeviceError` where fewer than two arrive."""
     settled_at_s = time.monotonic() + SETTLE_S
     now_s, sample_count = time.monotonic(), 0
     # Discard samples of the previous position: some are in the line's buffer, and where that is full, the board
@@ -93,13 +96,13 @@ def _record_position(source: SampleSource, rest_s: float) -> FloatArray:
     while now_s < settled_at_s or (sample_count > BACKLOG_SAMPLES and now_s < settled_at_s + DRAIN_S):
         old_samples, now_s = source.read()
         sample_count = len(old_samples)
-    spoiled_bytes, blocks = source.counts.spoiled_bytes, [np.zeros((0, 3))]
+    initial_spoiled_bytes, sample_blocks = source.counts.spoiled_bytes, [np.zeros((0, 3))]
     end_s = time.monotonic() + rest_s
     while time.monotonic() < end_s:
-        blocks.append(source.read()[0].raw.astype(float))
-    samples = np.concatenate(blocks)
+        sample_blocks.append(source.read()[0].raw.astype(float))
+    samples = np.concatenate(sample_blocks)
     if len(samples) < 2:
-        raise make_silence_error(rest_s, source.counts.spoiled_bytes - spoiled_bytes)
+        raise make_silence_error(rest_s, source.counts.spoiled_bytes - initial_spoiled_bytes)
     return samples
 
 

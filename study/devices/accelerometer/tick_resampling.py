@@ -17,7 +17,8 @@ from study.devices.accelerometer.clock_fit import ClockFit, fit_clock
 from study.devices.accelerometer.history import ArrivedSamples
 
 CORNER_RATIO = 0.42
-"""Corner frequency of the low-pass (-6 dB), relative to the lower of both rates."""
+"""Corner frequency of the low-pass (-6 dB), relative to the lower of both rates; chosen with `HALF_LENGTH_PERIODS` and
+`KAISER_BETA`."""
 
 HALF_LENGTH_PERIODS = 16
 """Half the length of the low-pass's impulse response, in periods of the lower rate; chosen with `CORNER_RATIO` and
@@ -33,14 +34,15 @@ near a longer gap get NaN."""
 
 SHORTEST_FIT_S = 1.0
 """Shortest time span of arrivals (s) to which a clock is fitted: over this time a delay of 0.1 ms is an error of 100
-ppm in its rate."""
+ppm in its rate. Chosen."""
 
 ARRIVALS_PER_S = 50.0
 """Largest number of arrivals per second to which the clock is fitted: the least delayed arrival of each interval,
 because a delay contains no information about the clock."""
 
 CHUNK_TICKS = 4096
-"""Approximate number of ticks that are resampled in a single array operation, which limits the memory needed."""
+"""Approximate number of ticks that are resampled in a single array operation, which limits the memory needed.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,9 +75,9 @@ def fit_and_resample(
         if is_sample.sum() > largest_count:
             main_fit, largest_count = fit, int(is_sample.sum())
     has_host_time = np.isfinite(host_s)
-    order = np.argsort(host_s[has_host_time], kind="stable")
+    time_order = np.argsort(host_s[has_host_time], kind="stable")
     return ResampledValues(
-        resample(host_s[has_host_time][order], values[has_host_time][order], tick_s, rate_hz), main_fit
+        resample(host_s[has_host_time][time_order], values[has_host_time][time_order], tick_s, rate_hz), main_fit
     )
 
 
@@ -87,42 +89,45 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     if len(sample_s) < 2:
         return resampled
     period_s = float(np.median(np.diff(sample_s)))
-    lower_hz = min(rate_hz, 1.0 / period_s)
-    half_s = HALF_LENGTH_PERIODS / lower_hz
-    is_covered = _has_no_gap(sample_s, tick_s, half_s, LONGEST_GAP_PERIODS / lower_hz)
+    lower_rate_hz = min(rate_hz, 1.0 / period_s)
+    half_length_s = HALF_LENGTH_PERIODS / lower_rate_hz
+    is_covered = _has_no_gap(sample_s, tick_s, half_length_s, LONGEST_GAP_PERIODS / lower_rate_hz)
     # The spacing of the samples varies: each is weighted by the time interval that it represents.
     spacing_s = np.gradient(sample_s)
     # Right half of a Kaiser window of 4097 points, fine enough for linear interpolation at each distance from the tick.
     window = np.kaiser(4097, KAISER_BETA)[2048:]
     # The filter covers 2 half_s / period_s samples on average; the tenth more allows for an irregular spacing.
-    offsets = np.arange(-1, 2 + int(np.ceil(2.2 * half_s / period_s)))
+    offsets = np.arange(-1, 2 + int(np.ceil(2.2 * half_length_s / period_s)))
     for tick_chunk in np.array_split(np.flatnonzero(is_covered), max(1, len(tick_s) // CHUNK_TICKS)):
-        first_sample = np.searchsorted(sample_s, tick_s[tick_chunk] - half_s)
+        first_sample = np.searchsorted(sample_s, tick_s[tick_chunk] - half_length_s)
         sample_index = (first_sample[:, None] + offsets).clip(0, len(sample_s) - 1)
         distance_s = sample_s[sample_index] - tick_s[tick_chunk, None]
-        is_outside = (np.abs(distance_s) >= half_s) | (first_sample[:, None] + offsets != sample_index)
-        weights = np.sinc(2 * CORNER_RATIO * lower_hz * distance_s)
+        is_outside = (np.abs(distance_s) >= half_length_s) | (first_sample[:, None] + offsets != sample_index)
+        weights = np.sinc(2 * CORNER_RATIO * lower_rate_hz * distance_s)
         weights *= (
-            np.interp(np.abs(distance_s), np.linspace(0.0, half_s, len(window)), window) * spacing_s[sample_index]
+            np.interp(np.abs(distance_s), np.linspace(0.0, half_length_s, len(window)), window)
+            * spacing_s[sample_index]
         )
         weights[is_outside] = 0.0
         resampled[tick_chunk] = np.einsum("kn,knc->kc", weights, values[sample_index]) / weights.sum(axis=1)[:, None]
     return resampled
 
 
-def _has_no_gap(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: float) -> np.ndarray:
+def _has_no_gap(sample_s: FloatArray, tick_s: FloatArray, half_length_s: float, longest_gap_s: float) -> np.ndarray:
     """Whether the samples within half_s (s) of each tick have no gap longer than longest_s (s), (k,); the distance of
     the first or last sample from the end of that interval counts as a gap."""
-    in_range = (tick_s - half_s >= sample_s[0] - longest_s) & (tick_s + half_s <= sample_s[-1] + longest_s)
-    gaps = np.flatnonzero(np.diff(sample_s) > longest_s)
-    gap_starts_s, gap_ends_s = sample_s[gaps] - half_s, sample_s[gaps + 1] + half_s
+    in_range = (tick_s - half_length_s >= sample_s[0] - longest_gap_s) & (
+        tick_s + half_length_s <= sample_s[-1] + longest_gap_s
+    )
+    gap_indices = np.flatnonzero(np.diff(sample_s) > longest_gap_s)
+    gap_starts_s, gap_ends_s = sample_s[gap_indices] - half_length_s, sample_s[gap_indices + 1] + half_length_s
     in_gap = np.searchsorted(gap_starts_s, tick_s, "right") > np.searchsorted(gap_ends_s, tick_s, "right")
     return np.asarray(in_range & ~in_gap)
 
 
 def _select_least_delayed(device_s: FloatArray, arrived_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Select the least delayed arrival in each interval of 1 / `ARRIVALS_PER_S`: device times and host times (s)."""
-    bins = ((device_s - device_s[0]) * ARRIVALS_PER_S).astype(np.int64)
-    order = np.lexsort((arrived_s - device_s, bins))
-    selected = np.sort(order[np.unique(bins[order], return_index=True)[1]])
-    return device_s[selected], arrived_s[selected]
+    interval_numbers = ((device_s - device_s[0]) * ARRIVALS_PER_S).astype(np.int64)
+    delay_order = np.lexsort((arrived_s - device_s, interval_numbers))
+    selected_indices = np.sort(delay_order[np.unique(interval_numbers[delay_order], return_index=True)[1]])
+    return device_s[selected_indices], arrived_s[selected_indices]

@@ -42,7 +42,8 @@ RUNNING, FINISHED, GAP = 0, -1, -2
 the last, or the rig is gone. GAP: no tick was run, because the previous one was longer ago than LONGEST_GAP_S."""
 
 SPIN_S = 0.00015
-"""Time (s) before a tick at which the sleep ends and polling of the clock begins, because a sleep ends late."""
+"""Time (s) before a tick at which the sleep ends and polling of the clock begins, because a sleep ends late. Chosen: a
+longer time occupies the processor for longer."""
 
 TICK_TOLERANCE = 1e-6
 """Tolerance (ticks): a time that rounding puts just before a tick counts as that tick."""
@@ -59,14 +60,16 @@ SENSE_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE)
 WRITE_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, VECTOR_TYPE)
 SENSE, WRITE = types.FunctionType(SENSE_SIGNATURE), types.FunctionType(WRITE_SIGNATURE)
 TICK, PUBLISH, RECORD_MISSED = map(types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISSED_TICKS_SIGNATURE))
-_RIG = types.Tuple((CALLS, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
-"""Types of the grouped arguments of `_run_tick`. _RIG: the rig's calls, cells and samples; _GOVERNOR: the governor's
-arrays (`CompiledTicks`); _LOOP_STATE: flags (`loop_state`), last reading, and the ring of newest readings."""
-_GOVERNOR = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE))  # type: ignore[no-untyped-call]
-_LOOP_STATE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
-_RUN_DUE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG, _GOVERNOR, _LOOP_STATE, types.int64)
+_RIG_TYPE = types.Tuple((CALLS, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
+"""Types of the grouped arguments of `_run_tick`. _RIG_TYPE: the rig's calls, cells and samples; _GOVERNOR_TYPE: the
+governor's arrays (`CompiledTicks`); _LOOP_STATE_TYPE: cells of the loop, last reading, ring of newest readings."""
+_GOVERNOR_TYPE = types.Tuple(  # type: ignore[no-untyped-call]
+    (VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE)
+)
+_LOOP_STATE_TYPE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
+_RUN_DUE_SIGNATURE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG_TYPE, _GOVERNOR_TYPE, _LOOP_STATE_TYPE, types.int64)
 """Signature of the entry point `run_due`; that of `attend` follows."""
-_ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, RECORD_MISSED, _RIG, _GOVERNOR, _LOOP_STATE)
+_ATTEND_SIGNATURE = types.int64(SENSE, WRITE, TICK, PUBLISH, RECORD_MISSED, _RIG_TYPE, _GOVERNOR_TYPE, _LOOP_STATE_TYPE)
 
 
 @njit_inline
@@ -77,50 +80,50 @@ def _run_tick(  # noqa: PLR0913 - compiled code takes function pointers one by o
     telemetry.
 
     Returns `RUNNING`, `FINISHED` where the force is off and stays off or the rig is gone, or the driver's error code.
-    The flags `DECIDING` and `WRITING` show the thread that watches the loop where a tick hangs.
+    From the cells DECIDING and WRITING, the thread that monitors the loop finds where a tick hangs.
     """
     calls, cells, samples = rig
     # `_missed_reading`, the reading of a missed tick, is used in `_attend_tick` only.
     state, settings, loop, buffer, force, ring, _missed_reading = governor
-    flags, reading, readings = loop_state
-    code = sense(calls, cells, samples, reading)
-    if code != 0:
-        return int(code)
-    if flags[RIG_GONE] != 0.0:
+    loop_cells, reading, readings = loop_state
+    return_code = sense(calls, cells, samples, reading)
+    if return_code != 0:
+        return int(return_code)
+    if loop_cells[RIG_GONE] != 0.0:
         return FINISHED
-    if flags[STAMPS] != 0.0:
+    if loop_cells[STAMPS] != 0.0:
         state[READING_TIME_S] = read_clock_s(calls)
-    flags[DECIDING] = 1.0
+    loop_cells[DECIDING] = 1.0
     is_finished = govern(state, settings, loop, buffer, reading, force)
-    flags[WRITING] = 1.0
-    ring_row = int(flags[READING_COUNT]) % READING_ROWS
+    loop_cells[WRITING] = 1.0
+    ring_row = int(loop_cells[READING_COUNT]) % READING_ROWS
     for i in range(READING_SIZE):
         readings[ring_row, i] = reading[i]
-    code = write(calls, cells, force)
-    flags[WRITING] = 0.0
-    if code != 0:
-        return int(code)
-    flags[DECIDING] = 0.0
+    return_code = write(calls, cells, force)
+    loop_cells[WRITING] = 0.0
+    if return_code != 0:
+        return int(return_code)
+    loop_cells[DECIDING] = 0.0
     publish(state, settings, ring, reading)
     if is_finished:
         return FINISHED
-    flags[READING_COUNT] += 1.0
+    loop_cells[READING_COUNT] += 1.0
     return RUNNING
 
 
 @njit_inline
-def _compute_due_s(flags: FloatArray, tick: float) -> float:
-    """Time (s) at which a tick is due, counted from the start, so that delays do not accumulate."""
-    return float(flags[STARTED_S] + tick / flags[RATE_HZ])
+def _compute_due_s(loop_cells: FloatArray, tick: float) -> float:
+    """Compute the time (s) at which a tick is due, counted from the start, so that delays do not accumulate."""
+    return float(loop_cells[STARTED_S] + tick / loop_cells[RATE_HZ])
 
 
 @njit_inline
-def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
+def _wait_for_tick(calls: Any, loop_cells: FloatArray) -> float:
     """Sleep, then poll the clock, until the next tick is due. Returns the time (s)."""
-    flags[DUE_S] = _compute_due_s(flags, flags[LAST_TICK] + 1.0)
-    sleep_until(calls, flags[DUE_S] - SPIN_S)
+    loop_cells[DUE_S] = _compute_due_s(loop_cells, loop_cells[LAST_TICK] + 1.0)
+    sleep_until(calls, loop_cells[DUE_S] - SPIN_S)
     time_s = read_clock_s(calls)
-    while time_s < flags[DUE_S]:
+    while time_s < loop_cells[DUE_S]:
         time_s = read_clock_s(calls)
     return float(time_s)
 
@@ -128,8 +131,8 @@ def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
 @njit_inline
 def _must_return(governor: Any, loop_state: Any) -> bool:
     """Whether `attend` has to return: the thread is needed, the rig is gone, or no force acts any more."""
-    flags = loop_state[0]
-    return bool(flags[THREAD_NEEDED] != 0.0 or flags[RIG_GONE] != 0.0 or governor[0][PHASE] == IDLE)
+    loop_cells = loop_state[0]
+    return bool(loop_cells[THREAD_NEEDED] != 0.0 or loop_cells[RIG_GONE] != 0.0 or governor[0][PHASE] == IDLE)
 
 
 @njit_inline
@@ -137,63 +140,65 @@ def _attend_tick(  # noqa: PLR0913 - as above
     sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
     """Wait for the next tick, record the ticks that were missed meanwhile, run the due tick, and record how late it
-    ended. Returns a code as `attend`."""
-    calls, flags, state, code = rig[0], loop_state[0], governor[0], RUNNING
-    begin_s = _wait_for_tick(calls, flags)
-    if flags[RIG_GONE] != 0.0 or state[PHASE] == IDLE:
+    ended. Returns one of the return codes above."""
+    calls, loop_cells, state, return_code = rig[0], loop_state[0], governor[0], RUNNING
+    begin_s = _wait_for_tick(calls, loop_cells)
+    if loop_cells[RIG_GONE] != 0.0 or state[PHASE] == IDLE:
         return FINISHED
-    gap_s, flags[LAST_S] = begin_s - flags[LAST_S], begin_s
-    if gap_s > flags[LONGEST_GAP_S]:
+    gap_s, loop_cells[LAST_S] = begin_s - loop_cells[LAST_S], begin_s
+    if gap_s > loop_cells[LONGEST_GAP_S]:
         return GAP
-    due_tick = int((begin_s - flags[STARTED_S]) * flags[RATE_HZ] + TICK_TOLERANCE)
-    missed_count = due_tick - int(flags[LAST_TICK]) - 1
+    due_tick = int((begin_s - loop_cells[STARTED_S]) * loop_cells[RATE_HZ] + TICK_TOLERANCE)
+    missed_count = due_tick - int(loop_cells[LAST_TICK]) - 1
     if missed_count > 0:
         record_missed(state, governor[3], governor[6], missed_count)
     if missed_count >= 0:
-        code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
-    flags[LAST_TICK] = due_tick
-    if code <= RUNNING:
+        return_code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
+    loop_cells[LAST_TICK] = due_tick
+    if return_code <= RUNNING:
         end_s = read_clock_s(calls)
-        state[LATE] += end_s > _compute_due_s(flags, due_tick + 1.0)
-        state[LATEST_S] = max(state[LATEST_S], end_s - flags[DUE_S])
-    return code
+        state[LATE] += end_s > _compute_due_s(loop_cells, due_tick + 1.0)
+        state[LATEST_S] = max(state[LATEST_S], end_s - loop_cells[DUE_S])
+    return return_code
 
 
 def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     """Compile `run_due` and `attend`. sources_fingerprint: of the source files that the compiled code includes,
     captured so that a change invalidates numba's cache."""
 
-    @njit(_RUN_DUE, cache=True, nogil=True, error_model="numpy")
+    @njit(_RUN_DUE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any, ticks: int
     ) -> int:
-        """Run at most `ticks` ticks without waiting, fewer if the force is off for good before or a tick fails.
+        """Run at most `ticks` ticks without waiting, fewer if the force is permanently off before or a tick fails.
         Returns `RUNNING`, `FINISHED`, or the driver's error code."""
         _ = sources_fingerprint
-        code = RUNNING
+        return_code = RUNNING
         for _tick_number in range(ticks):
-            code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
-            if code != RUNNING or loop_state[0][RIG_GONE] != 0.0:
+            return_code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
+            if return_code != RUNNING or loop_state[0][RIG_GONE] != 0.0:
                 break
-        return code
+        return return_code
 
-    @njit(_ATTEND, cache=True, nogil=True, error_model="numpy")
+    @njit(_ATTEND_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def attend(  # noqa: PLR0913 - as above
         sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
     ) -> int:
-        """Run ticks as they become due, until the force is off for good, a tick fails, or the thread is needed for
+        """Run ticks as they become due, until the force is permanently off, a tick fails, or the thread is needed for
         other work. To be called only where the address at `study.devices.native.SLEEP` is not 0.
 
         After an error code (above zero) the caller has to count the lateness of that tick.
         """
         _ = sources_fingerprint
-        code = RUNNING
-        while code == RUNNING and not _must_return(governor, loop_state):
-            code = _attend_tick(sense, write, govern, publish, record_missed, rig, governor, loop_state)
-        return code
+        return_code = RUNNING
+        while return_code == RUNNING and not _must_return(governor, loop_state):
+            return_code = _attend_tick(sense, write, govern, publish, record_missed, rig, governor, loop_state)
+        return return_code
 
     return run_due, attend
 
 
-_DEVICES = Path(__file__).parents[1]
-run_due, attend = _compile_entry_points(fingerprint(_DEVICES / "governor", _DEVICES / "rig.py", _DEVICES / "native.py"))
+_DEVICES_FOLDER = Path(__file__).parents[1]
+run_due, attend = _compile_entry_points(
+    fingerprint(_DEVICES_FOLDER / "governor", _DEVICES_FOLDER / "rig.py", _DEVICES_FOLDER / "native.py")
+)

@@ -109,7 +109,7 @@ class CompiledTicks:
         return None
 
     def _list_governor_arrays(self) -> tuple[FloatArray, ...]:
-        """List the governor's arrays in the order of `compiled_drive._GOVERNOR`, at each call anew: the governor
+        """List the governor's arrays in the order of `compiled_drive._GOVERNOR_TYPE`, at each call anew: the governor
         replaces some for each stimulus."""
         governor = self._governor
         return (

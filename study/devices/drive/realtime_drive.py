@@ -1,6 +1,6 @@
 """Control ticks in real time: a thread runs them as they become due. Used by `study.devices.safe.SafeDevice`.
 
-Theory of operation. Tick k is due at t_0 + k T (T = 1 ms). In each tick the loop senses (position, acceleration),
+Theory of operation. Tick k is due at t_0 + k / rate (1 kHz). In each tick the loop senses (position, acceleration),
 computes the force within its limits (`governor.govern`) and writes it, in this order: no force is written that was not
 computed from this tick's reading. The due time is counted from the start, not from the last tick, so that delays do not
 add up. The loop sleeps until `SPIN_S` before the due time, then polls the clock, because a sleep alone ends late.
@@ -53,14 +53,14 @@ ms."""
 class _Request:
     """A request for a reading: deadline (s, by the drive's clock), and whether the reading was taken."""
 
-    def __init__(self, until_s: float) -> None:
-        self.until_s = until_s
+    def __init__(self, deadline_s: float) -> None:
+        self.deadline_s = deadline_s
         self.taken = threading.Event()
 
 
 class ReadingRequests:
-    """Requests for a reading while nothing moves, a single one at a time: callers that ask meanwhile get the same
-    reading."""
+    """Requests for a reading while nothing moves, one at a time: callers that request one before it is taken share
+    it."""
 
     def __init__(self, clock: Clock, wake: Callable[[], None]) -> None:
         """clock: of the drive; wake: makes the loop's thread check `is_pending`."""
@@ -77,7 +77,7 @@ class ReadingRequests:
             if request is None or request.taken.is_set():
                 self._request = request = _Request(self._clock.now_s() + READING_TIMEOUT_S)
         self._wake()
-        return request.taken.wait(min(READING_TIMEOUT_S, max(0.0, request.until_s - self._clock.now_s())))
+        return request.taken.wait(min(READING_TIMEOUT_S, max(0.0, request.deadline_s - self._clock.now_s())))
 
     @property
     def is_pending(self) -> bool:
@@ -91,19 +91,20 @@ class ReadingRequests:
 
 
 SIMULATED_INTERVAL_S = 0.003
-"""Interval (s) between two calls of `run_due_ticks` for a simulated rig, which no person feels, so that it may wait."""
+"""Interval (s) between two calls of `run_due_ticks` for a simulated rig, whose ticks may be late. Chosen."""
 
 LATE_S = 0.1
-"""Time without a tick (s) after which a real rig's loop counts as hanging. A busy computer is late by some 10 ms."""
+"""Time without a tick (s) after which a real rig's loop counts as hanging. Chosen: a busy computer is late by some 10
+ms."""
 
 GRACE_S = 0.02
-"""Time (s) that a seemingly late loop gets to continue, because after a suspension of the process it looks late too."""
+"""Time (s) allowed to a late loop to continue, because it is also late after a suspension of the process. Chosen."""
 
 STOP_WAIT_S = 0.005
-"""Longest wait of an emergency stop for the loop to write the zero force (s)."""
+"""Longest wait of an emergency stop for the loop to write the zero force (s). Chosen: five ticks at 1 kHz."""
 
 THREAD_TIMEOUT_S = 0.5
-"""Longest wait for the loop's thread (s), so that a driver that hangs does not block the program."""
+"""Longest wait for the loop's thread (s), so that a driver that hangs does not block the program. Chosen."""
 
 LOCK_RETRY_S = 0.01
 """Interval (s) at which the begin of a stimulus repeats its request for the lock, which compiled ticks otherwise
@@ -135,7 +136,7 @@ class RealtimeDrive:
         self._loop_state[RATE_HZ] = rate_hz
         self._loop_state[LONGEST_GAP_S] = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
         self._lock = threading.Lock()
-        self._awake = threading.Event()
+        self._wake_event = threading.Event()
         self._reading_requests = ReadingRequests(clock, wake=self._wake)
         self._closing = False
         self._thread = threading.Thread(target=self._run_ticks, name="haptic loop", daemon=True)
@@ -159,7 +160,7 @@ class RealtimeDrive:
             self._loop_state[STARTED_S] = self._loop_state[LAST_S] = now_s = self._clock.now_s()
             self._governor.set_begin_time(now_s)
             self._loop_state[LAST_TICK] = 0.0
-            self._awake.set()
+            self._wake_event.set()
             return True
         finally:
             self._lock.release()
@@ -203,18 +204,18 @@ class RealtimeDrive:
         self._thread.join(THREAD_TIMEOUT_S)
 
     def _wake(self) -> None:
-        """Make the loop's thread leave compiled code and its wait, and look for work."""
+        """Make the loop's thread leave compiled code or its wait, and check what is to be done."""
         self._loop_state[THREAD_NEEDED] = 1.0
-        self._awake.set()
+        self._wake_event.set()
 
     def run_due_ticks(self, now_s: float) -> None:
         """Run the ticks that are due at now_s; while nothing moves, take a requested reading instead. After a gap
         without control longer than LONGEST_GAP_S (suspended process or computer), drop the force at once."""
         with self._lock:
             if not self._governor.moving:
-                self._awake.clear()
+                self._wake_event.clear()
                 if self._closing:
-                    self._awake.set()
+                    self._wake_event.set()
                 elif self._reading_requests.is_pending:
                     self._runner.read_sensors()
                     self._reading_requests.mark_taken()
@@ -238,7 +239,7 @@ class RealtimeDrive:
                 self._reading_requests.mark_taken()
 
     def _compute_due_time_s(self, tick: int) -> float:
-        """Due time of a tick, by the drive's clock (s)."""
+        """Compute the due time of a tick, by the drive's clock (s)."""
         return float(self._loop_state[STARTED_S] + tick / self._loop_state[RATE_HZ])
 
     def _count_lateness(self, tick: int, turn_due_s: float) -> None:
@@ -261,7 +262,7 @@ class RealtimeDrive:
         """Loop of the thread: run ticks while a stimulus is in progress, otherwise wait for work."""
         while not self._closing:
             try:
-                self._awake.wait()
+                self._wake_event.wait()
                 if self._governor.moving:
                     if self._attend_compiled():
                         continue

@@ -1,6 +1,7 @@
 """Converts the rows that the control loop recorded to a `Recording` with the counters of the safety layer.
 
-The accelerations of an accelerometer with its own clock are inserted here, resampled to the ticks of the rows.
+The accelerations of an accelerometer with its own clock are inserted here, resampled to the ticks of the rows. Called
+by `study.devices.safe` when a stimulus or a sequence of commands has ended.
 """
 
 from dataclasses import replace
@@ -19,11 +20,12 @@ COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) fo
 (m/s²). The command is the written force; the excitation is the stimulus alone, without spring and damper."""
 
 
-def record_held_stimulus(
+def make_stimulus_recording(
     governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None = None
 ) -> PlaybackResult:
-    """Recording of a held stimulus: the end of its steady part, in whole loops unless a loop is longer than the ring.
-    None where not even that much was recorded. own_clock_sensor: an accelerometer with its own clock, if any."""
+    """Make the recording of a held stimulus: the end of its steady part, in whole loops; of a loop longer than the
+    ring, the content of the ring. The recording is None where fewer rows were recorded. own_clock_sensor: an
+    accelerometer with its own clock, if any."""
     rows, loop = governor.copy_rows(), governor.steady
     loop_rows = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
     recorded_rows = len(rows) // loop_rows * loop_rows
@@ -35,11 +37,11 @@ def record_held_stimulus(
     return _make_result(rows, health, info, (segment,))
 
 
-def record_commands(
+def make_commands_recording(
     governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None = None
 ) -> PlaybackResult:
-    """Recording of commands that were played once; None after a fault or where they ended early. It has no segments:
-    the caller knows them."""
+    """Make the recording of commands that were played once; it is None after a fault, or where they ended early. It has
+    no segments: the caller adds them. own_clock_sensor: an accelerometer with its own clock, if any."""
     rows = governor.copy_rows()
     if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
         return PlaybackResult(
@@ -53,10 +55,12 @@ def _insert_acceleration(
 ) -> tuple[FloatArray, Health]:
     """Insert the acceleration at the tick of each row, missed ticks included, and its counters. rows: the newest rows
     of the governor."""
-    due_s = governor.compute_row_times()
-    due_s = due_s[len(due_s) - len(rows) :]
+    due_times_s = governor.compute_row_times()
+    due_times_s = due_times_s[len(due_times_s) - len(rows) :]
     sensor_data = (
-        own_clock_sensor.sensed(governor.began_s, due_s, info.sample_rate_hz) if own_clock_sensor is not None else None
+        own_clock_sensor.sensed(governor.began_s, due_times_s, info.sample_rate_hz)
+        if own_clock_sensor is not None
+        else None
     )
     if sensor_data is None:
         return rows, governor.collect_health()
@@ -66,20 +70,20 @@ def _insert_acceleration(
 
 
 def _make_result(rows: FloatArray, health: Health, info: DeviceInfo, segments: tuple[Segment, ...]) -> PlaybackResult:
-    """Recording of rows (n, ROW_SIZE); the true acceleration only of a simulated device."""
+    """Make the result from rows (n, ROW_SIZE); it contains the true acceleration only for a simulated device."""
     rate_hz = info.sample_rate_hz
-    acceleration = ("acceleration", "m/s^2", ("ax", "ay", "az"))
-    force = ("force", "N", ("fx", "fy", "fz"))
-    truth = rows[:, TRUTH]
+    acceleration_axes = ("acceleration", "m/s^2", ("ax", "ay", "az"))
+    force_axes = ("force", "N", ("fx", "fy", "fz"))
+    true_acceleration = rows[:, TRUTH]
     return PlaybackResult(
         recording=Recording(
             device=info.name,
-            command=Signal(rows[:, COMMAND], rate_hz, *force),
-            response=Signal(rows[:, ACCELERATION], rate_hz, *acceleration),
+            command=Signal(rows[:, COMMAND], rate_hz, *force_axes),
+            response=Signal(rows[:, ACCELERATION], rate_hz, *acceleration_axes),
             position=Signal(rows[:, POSITION], rate_hz, "position", "m", ("x", "y", "z")),
-            excitation=Signal(rows[:, EXCITATION], rate_hz, *force),
+            excitation=Signal(rows[:, EXCITATION], rate_hz, *force_axes),
             segments=segments,
         ),
         health=health,
-        truth=Signal(truth, rate_hz, *acceleration) if info.simulated else None,
+        truth=Signal(true_acceleration, rate_hz, *acceleration_axes) if info.simulated else None,
     )

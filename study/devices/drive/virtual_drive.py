@@ -1,6 +1,6 @@
 """Control ticks in virtual time: when the program sleeps, the ticks that fall due in that time are run at once.
 
-Used for simulated devices, so that a session runs as fast as the computer allows.
+Used by `study.devices.safe` for simulated devices, so that a session runs as fast as the computer allows.
 """
 
 from collections.abc import Callable
@@ -19,19 +19,19 @@ class VirtualDrive:
         self._clock = clock
         self._rate_hz = rate_hz
         self._started_s = 0.0
-        self._run = 0
+        self._completed_ticks = 0
         self._closed = False
-        clock.listen(self._pump)
+        clock.listen(self._run_due_ticks)
 
     def start(self, begin_stimulus: Callable[[], None]) -> bool:
-        """Call `begin_stimulus`, which prepares the governor; from then on ticks fall due. Returns False, without a
-        begin, where a stimulus is in progress or the drive is closed."""
+        """Call `begin_stimulus`, which prepares the governor; from then on ticks fall due. Returns False, without
+        calling it, where a stimulus is in progress or the drive is closed."""
         if self._runner.moving or self._closed:
             return False
         begin_stimulus()
         self._started_s = self._clock.now_s()
         self._governor.set_begin_time(self._started_s)
-        self._run = 0
+        self._completed_ticks = 0
         return True
 
     def check(self) -> None:
@@ -50,17 +50,17 @@ class VirtualDrive:
         """Run no more ticks when the clock advances."""
         if not self._closed:
             self._closed = True
-            self._clock.forget(self._pump)
+            self._clock.forget(self._run_due_ticks)
 
-    def _pump(self, now_s: float) -> None:
+    def _run_due_ticks(self, now_s: float) -> None:
         """Run the ticks that have become due by now_s (s)."""
         if self._governor.moving:
             due_ticks = count_due_ticks(now_s - self._started_s, self._rate_hz)
-            self._runner.run(due_ticks - self._run)
-            self._run = due_ticks
+            self._runner.run(due_ticks - self._completed_ticks)
+            self._completed_ticks = due_ticks
 
 
 def count_due_ticks(elapsed_s: float, rate_hz: float) -> int:
-    """Number of ticks that are due after elapsed_s. A time that rounding puts just before a tick counts as that
-    tick."""
+    """Count the ticks that are due elapsed_s (s) after the start. rate_hz: ticks per second. A time less than 1e-6 of a
+    tick before a tick counts as that tick, because of rounding."""
     return int(elapsed_s * rate_hz + 1e-6)

@@ -1,7 +1,8 @@
 """Acceptance record of a device: tested with no hand on the handle, with an operator's name, void after any change.
 
 Without a valid record, a real device cannot be opened with a hand on the handle. The tests are `force_limit_check`; the
-record is acceptance.json.
+record is acceptance.json. Written by `study.devices.opening.accept_device`, checked by `open_rig` at every opening of a
+device with a hand on the handle.
 """
 
 import json
@@ -31,14 +32,15 @@ class Acceptance:
     accepted_on: str
     """ISO 8601 date."""
     force_n: float
-    """Force (N) that was held when the loop was stopped on purpose, and the cap of the test of the force limit."""
+    """Force (N) that was held when the commands were paused for the test of the watchdog, and the cap of the test of
+    the force limit."""
     gone_after_s: float
     """Time (s) from the last command until the device reported its force as off."""
     asked_n: float = 0.0
     """Force (N) commanded of each layer, above the cap of `force_n`; 0 where this was not tested, as before November
     2026."""
     most_given_n: float = 0.0
-    """Largest force (N) that the device reported meanwhile."""
+    """Largest force (N) that the device reported during the test of the force limit."""
     baseline: str = ""
     """File name of the recording, in the same folder, with which the daily check compares; empty where none was
     made."""
@@ -46,15 +48,15 @@ class Acceptance:
     """SHA-256 of that file."""
 
 
-def acceptance_file() -> Path:
-    """Path of acceptance.json, in the folder of the lab's settings. The file need not exist."""
+def locate_acceptance_file() -> Path:
+    """Return the path of acceptance.json, in the folder of the lab's settings. The file need not exist."""
     return locate_lab_file().with_name("acceptance.json")
 
 
 def write_acceptance(acceptance: Acceptance) -> Path:
     """Write acceptance.json, replacing an older acceptance; its folder is made if missing. Returns the path. Raises
     OSError where the file cannot be written."""
-    path = acceptance_file()
+    path = locate_acceptance_file()
     path.parent.mkdir(parents=True, exist_ok=True)
     new_path = path.with_suffix(".new")
     new_path.write_text(json.dumps({"format": FORMAT, "version": VERSION, **asdict(acceptance)}, indent=2) + "\n")
@@ -63,33 +65,34 @@ def write_acceptance(acceptance: Acceptance) -> Path:
 
 
 def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
-    """Name and SHA-256 of the accepted baseline, empty where none was made. Raises `DeviceError` where this device, in
-    its present configuration, was not accepted, or the acceptance has expired."""
-    path = acceptance_file()
+    """Check that this device is accepted on the day `today` (UTC). Returns file name and SHA-256 of the accepted
+    baseline, both empty where none was made. Raises `DeviceError` where this device, with its present serial number,
+    firmware and SDK, was not accepted, or where `today` is before the acceptance or after its validity."""
+    path = locate_acceptance_file()
     try:
         document = json.loads(path.read_text("utf-8"))
         accepted_on = date.fromisoformat(document["accepted_on"])
         accepted_device = (document["format"], document["version"], document["device"], document["details"])
         baseline = (str(document.get("baseline", "")), str(document.get("baseline_sha256", "")))
     except FileNotFoundError:
-        raise _lock_error(info, f"There is no acceptance of it ({path})") from None
+        raise _make_lock_error(info, f"There is no acceptance of it ({path})") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _lock_error(info, f"{path} is no acceptance ({type(error).__name__})") from error
+        raise _make_lock_error(info, f"{path} is no acceptance ({type(error).__name__})") from error
     if accepted_device != (FORMAT, VERSION, info.name, info.details):
-        raise _lock_error(
+        raise _make_lock_error(
             info,
             f"Another was accepted ({accepted_device[2]}, {accepted_device[3]}); this is {info.name}, {info.details}",
         )
     if not accepted_on <= today <= accepted_on + VALID_FOR:
-        raise _lock_error(info, f"It was accepted on {accepted_on}; that holds for {VALID_FOR.days} days")
+        raise _make_lock_error(info, f"It was accepted on {accepted_on}; that holds for {VALID_FOR.days} days")
     return baseline
 
 
-def _lock_error(info: DeviceInfo, reason: str) -> DeviceError:
-    """Error for a device that must not be opened with a hand on the handle."""
-    option = info.name.replace(".", "")
+def _make_lock_error(info: DeviceInfo, reason: str) -> DeviceError:
+    """Make the error for a device that must not be opened with a hand on the handle. reason: a clause, no full stop."""
+    device_option = info.name.replace(".", "")
     return DeviceError(
         f"The {info.name} is locked for hands",
         f"{reason}.",
-        f"With no hand on the handle: hapteq doctor --device {option} --accept 'NAME OF THE OPERATOR'.",
+        f"With no hand on the handle: hapteq doctor --device {device_option} --accept 'NAME OF THE OPERATOR'.",
     )

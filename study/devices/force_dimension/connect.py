@@ -1,7 +1,7 @@
 """Connect to a Force Dimension device: open it, check power and calibration, arm the watchdog, enable forces.
 
 Each failure is a `DeviceError` that states the cause and the remedy. If opening fails, the device is closed again;
-after `open_model`, closing is the caller's task. Called by `rigs` (sessions), `findings` (`hapteq doctor`) and
+after `open_model`, closing is the caller's task. Called by `open_rig` (sessions), `findings` (`hapteq doctor`) and
 `linkage`.
 """
 

@@ -16,7 +16,8 @@ class DeviceModel:
     system_types: tuple[int, ...]
     """Values of dhdGetSystemType for this model (SDK 3.17.5)."""
     max_force_n: float
-    """Largest continuous force along any direction at the centre (N). Source: the table of devices in CHAI3D."""
+    """Largest continuous force along any direction at the centre (N). Source: table of devices in the library
+    CHAI3D."""
     effective_mass_kg: float
     """Effective mass at the handle, from which the stiffness of the centring spring is computed. The vendor publishes
     none: the values are assumptions, from the simulated omega.3 and the heavier wrists of the other models. The

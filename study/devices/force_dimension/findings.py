@@ -14,7 +14,7 @@ from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, locate_lab_file, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
-from study.devices.force_dimension.rigs import read_info
+from study.devices.force_dimension.open_rig import read_info
 from study.devices.force_dimension.usb import PERMISSION_ADVICE, find_usb_devices
 from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError

@@ -14,7 +14,7 @@ from study.devices.force_dimension.library import Library, LibraryError
 
 REPEATED_READING, SCALED_FORCE = 1, 2
 """Return values of success with a notice. dhdGetPosition returns REPEATED_READING where it repeats an earlier reading;
-dhdSetForce returns SCALED_FORCE where the device cannot give that force and gives less of it, in the same direction."""
+dhdSetForce returns SCALED_FORCE where the device cannot exert that force and exerts less, in the same direction."""
 
 WATCHDOG_UNIT_S = 125e-6
 """Unit of dhdSetWatchdog's and dhdGetWatchdog's argument (s)."""
@@ -54,7 +54,7 @@ hand."""
 
 
 def describe_off_cause(cause: int) -> str:
-    """Text for a cause by which the device's force is off, as in `Status.off_cause` or `OFF_CAUSES`."""
+    """Describe the cause by which the device's force is off. cause: a code of `OFF_CAUSES`, or any other."""
     return OFF_CAUSES.get(cause, "the device does not say why")
 
 
@@ -71,7 +71,7 @@ class Status:
 
     @property
     def off_reason(self) -> str:
-        """The cause as text. Brakes that are on while the device reports forces as on are a cause of their own."""
+        """Cause for which no force acts, as text; `BRAKED_CAUSE` where the forces are on but the brakes are on too."""
         return describe_off_cause(BRAKED_CAUSE if self.force_on and self.braking else self.off_cause)
 
     @property
@@ -91,31 +91,32 @@ class Handle:
         self._open = True
 
     def read_position_m(self) -> tuple[float, float, float]:
-        """Position of the handle (m), x, y, z, in the device's axes."""
+        """Read the position of the handle (m), x, y, z, in the device's axes."""
         return self._read_vector("dhdGetPosition")
 
     def read_velocity_mps(self) -> tuple[float, float, float]:
-        """Velocity of the handle (m/s), x, y, z, as the library estimates it over its last 20 ms."""
+        """Read the velocity of the handle (m/s), x, y, z, which the library estimates over the last 20 ms."""
         return self._read_vector("dhdGetLinearVelocity")
 
     def set_force(self, x_n: float, y_n: float, z_n: float) -> bool:
-        """Set the force (N). Returns whether the device gives less of it. May be called from any thread."""
+        """Set the force (N). Returns whether the device exerts less than it. May be called from any thread."""
         return (
             self.library.check_return_value("dhdSetForce", self._set_force(x_n, y_n, z_n, self.number)) == SCALED_FORCE
         )
 
     def read_force_n(self) -> tuple[float, float, float]:
-        """Force (N), x, y, z, that the device reports to give now."""
+        """Read the force (N), x, y, z, that the device reports as acting now."""
         return self._read_vector("dhdGetForce")
 
-    def _read_vector(self, function: str) -> tuple[float, float, float]:
-        """Three numbers from a function of the library that writes x, y and z."""
+    def _read_vector(self, function_name: str) -> tuple[float, float, float]:
+        """Call a function of the library that writes three numbers x, y and z. function: its name."""
         x, y, z = c_double(), c_double(), c_double()
-        self.library.call(function, byref(x), byref(y), byref(z), self.number)
+        self.library.call(function_name, byref(x), byref(y), byref(z), self.number)
         return x.value, y.value, z.value
 
     def read_status(self) -> Status:
-        """State of the device: powered, calibrated, force on, braking, and why the force is off."""
+        """Read the state of the device: powered, calibrated, force on, braking, and the cause of a force that is
+        off."""
         status_array = (c_int * STATUS_ARRAY_SIZE)()
         self.library.call("dhdGetStatus", status_array, self.number)
         return Status(
@@ -127,21 +128,21 @@ class Handle:
         )
 
     def read_system_type(self) -> int:
-        """The library's number of the device's model."""
+        """Read the library's number of the device's model."""
         return self.library.call("dhdGetSystemType", self.number)
 
     def read_system_name(self) -> str:
-        """The library's name of the device's model; "unnamed" where it has none."""
+        """Read the library's name of the device's model; "unnamed" where it has none."""
         return (self.library.get_function("dhdGetSystemName")(self.number) or b"unnamed").decode("utf-8", "replace")
 
     def read_serial_number(self) -> int:
-        """Serial number; `UNKNOWN_SERIAL` where the library writes none."""
+        """Read the serial number; `UNKNOWN_SERIAL` where the library writes none."""
         serial_number = c_ushort(UNKNOWN_SERIAL)
         self.library.call("dhdGetSerialNumber", byref(serial_number), self.number)
         return serial_number.value
 
     def read_firmware_version(self) -> float:
-        """Version of the firmware; NaN where the library writes none."""
+        """Read the version of the firmware; NaN where the library writes none."""
         version = c_double(math.nan)
         self.library.call("dhdGetVersion", byref(version), self.number)
         return version.value
@@ -153,36 +154,37 @@ class Handle:
         self.set_force(0.0, 0.0, 0.0)
 
     def compensate_gravity(self, effector_mass_kg: float | None) -> None:
-        """Switch gravity compensation on. effector_mass_kg: mass of the end effector; None leaves the library's own."""
+        """Switch gravity compensation on. effector_mass_kg: mass of the end effector; None keeps the library's
+        default."""
         if effector_mass_kg is not None:
             self.library.call("dhdSetEffectorMass", effector_mass_kg, self.number)
         self.library.call("dhdSetGravityCompensation", 1, self.number)
 
-    def limit_force(self, newtons: float) -> None:
-        """Set the library's own cap on the norm of the force (N)."""
-        self.library.call("dhdSetMaxForce", newtons, self.number)
+    def limit_force(self, cap_n: float) -> None:
+        """Set the cap of the library on the norm of the force (N)."""
+        self.library.call("dhdSetMaxForce", cap_n, self.number)
 
     def disable_time_guard(self) -> None:
         """Switch off the minimum interval between readings, so that every call takes a new reading: by default the
-        library repeats a reading that is only a moment old, and the 1 kHz loop keeps its own time."""
+        library repeats a reading that is younger than this interval, and the 1 kHz loop already sets the interval."""
         self.library.call("dhdEnableExpertMode")
         self.library.call("dhdSetTimeGuard", 0, self.number)
 
-    def arm_watchdog(self, seconds: float) -> float:
-        """Arm the device's watchdog, which switches the force off when no command follows in time. seconds: at most
-        0.0318 (255 units). Returns the timeout that the device reports (s); 0 where it has no watchdog: a force then
+    def arm_watchdog(self, timeout_s: float) -> float:
+        """Arm the device's watchdog, which switches the force off when no command follows in time. timeout_s: at most
+        0.0318 s (255 units). Returns the timeout that the device reports (s); 0 where it has no watchdog: a force then
         stays on."""
         self.library.call("dhdEnableExpertMode")
-        units = c_ubyte()
+        timeout_units = c_ubyte()
         try:
-            self.library.call("dhdSetWatchdog", round(seconds / WATCHDOG_UNIT_S), self.number)
-            self.library.call("dhdGetWatchdog", byref(units), self.number)
+            self.library.call("dhdSetWatchdog", round(timeout_s / WATCHDOG_UNIT_S), self.number)
+            self.library.call("dhdGetWatchdog", byref(timeout_units), self.number)
         except LibraryError:
             return 0.0
-        return units.value * WATCHDOG_UNIT_S
+        return timeout_units.value * WATCHDOG_UNIT_S
 
     def calibrate(self, timeout_s: float) -> None:
-        """Wait, for timeout_s at most, until the handle was put to its rest position, and take that as reference.
+        """Wait, for timeout_s at most, until the handle is in its rest position, and take that as reference.
         Raises `LibraryError` after the timeout."""
         self.library.call("dhdReset", self.number)
         self.library.call("dhdWaitForReset", round(1000 * timeout_s), self.number)

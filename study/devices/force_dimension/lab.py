@@ -65,9 +65,10 @@ class LabSettings:
     """Content of the lab's settings file; every key is optional."""
 
     effector_mass_kg: float | None = Field(default=None, gt=0, le=2)
-    """Mass that the gravity compensation carries (kg): handle and sensor. None: the model's own."""
+    """Mass for the gravity compensation (kg): handle and sensor. None: that of `DeviceModel.effector_mass_kg`."""
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
-    """Mass that the centring spring moves, at the handle (kg). None: the assumption in the table of models."""
+    """Effective mass at the handle, from which the stiffness of the centring spring is computed (kg). None: that of
+    `DeviceModel.effective_mass_kg`."""
     accelerometer: SensorSettings | None = None
     """None: no acceleration is measured."""
     pulse: PulseSettings | None = None
@@ -75,8 +76,8 @@ class LabSettings:
 
 
 def locate_lab_file() -> Path:
-    """Path of the settings file: from the environment variable HAPTEQ_DEVICE_FILE, else ~/.config/hapteq/device.toml.
-    The file need not exist."""
+    """Return the path of the settings file: from the environment variable HAPTEQ_DEVICE_FILE, else
+    ~/.config/hapteq/device.toml. The file need not exist."""
     environment_path = os.environ.get(LAB_FILE_VARIABLE)
     return Path(environment_path) if environment_path else Path.home() / ".config" / "hapteq" / "device.toml"
 
@@ -102,7 +103,7 @@ def read_lab() -> LabSettings:
         ) from error
 
 
-def write_sensor_table(table: str) -> Path:
+def write_sensor_table(sensor_table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
     previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written, or the new
     content is not valid."""
@@ -110,7 +111,7 @@ def write_sensor_table(table: str) -> Path:
     path = locate_lab_file()
     try:
         previous_text = path.read_text("utf-8") if path.exists() else ""
-        text = _replace_sensor_table(previous_text, table)
+        text = _replace_sensor_table(previous_text, sensor_table)
         TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
         path.parent.mkdir(parents=True, exist_ok=True)
         new_path = path.with_name(f"{path.name}.new")
@@ -127,20 +128,20 @@ def write_sensor_table(table: str) -> Path:
     return path
 
 
-def _replace_sensor_table(text: str, table: str) -> str:
-    """The text of the file with its [accelerometer] table removed, up to the next header, and the new one appended."""
-    lines, kept_lines, skipping = text.splitlines(), [], False
+def _replace_sensor_table(text: str, sensor_table: str) -> str:
+    """Return the text of the file without its [accelerometer] table (up to the next header), the new one appended."""
+    lines, kept_lines, in_sensor_table = text.splitlines(), [], False
     for line in lines:
         if TABLE_HEADER.fullmatch(line):
-            skipping = line.split("#")[0].strip() == "[accelerometer]"
-        if not skipping:
+            in_sensor_table = line.split("#")[0].strip() == "[accelerometer]"
+        if not in_sensor_table:
             kept_lines.append(line)
     other_text = "\n".join(kept_lines).rstrip()
-    return f"{other_text}\n\n{table.rstrip()}\n" if other_text else f"{table.rstrip()}\n"
+    return f"{other_text}\n\n{sensor_table.rstrip()}\n" if other_text else f"{sensor_table.rstrip()}\n"
 
 
 def _make_lab_file_error(path: Path, reason: str) -> DeviceError:
-    """Error for a settings file that cannot be read or is not valid. reason: a clause without a full stop."""
+    """Make the error for a settings file that cannot be read or is not valid. reason: a clause without a full stop."""
     return DeviceError(
         "The settings of the device cannot be used",
         f"{path}: {reason}.",

@@ -21,7 +21,7 @@ from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import read_lab
 from study.devices.force_dimension.library import GEOMETRY_ERROR, LibraryError
-from study.devices.force_dimension.rigs import read_info
+from study.devices.force_dimension.open_rig import read_info
 from study.errors import DeviceError
 
 Result = TypeVar("Result")
@@ -49,13 +49,13 @@ class VendorLinkage:
         self._library, self._number = handle.library, handle.number
 
     def compute_reading_at(self, position_m: FloatArray) -> LinkageReading | None:
-        """Joint angles (rad), Jacobian, inertia (kg) and holding force (N) at a position (3,), m; None out of reach.
-        Raises `DeviceError`."""
-        return self._ask_library(self._read_at, position_m)
+        """Compute joint angles (rad), Jacobian (m/rad), inertia (kg) and holding force (N) at a position (3,), m; None
+        out of reach. Raises `DeviceError`."""
+        return self._call_library(self._read_linkage, position_m)
 
     def compute_angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """Joint angles (3,), rad, at a position (3,), m; None out of reach. Raises `DeviceError`."""
-        return self._ask_library(
+        """Compute the joint angles (3,), rad, at a position (3,), m; None out of reach. Raises `DeviceError`."""
+        return self._call_library(
             lambda handle_position_m: self._compute_joint_angles(self._compute_encoder_counts(handle_position_m)),
             position_m,
         )
@@ -84,13 +84,13 @@ class VendorLinkage:
         )
 
     def _compute_displacement(self, reading: LinkageReading, angles: FloatArray) -> float:
-        """Distance (m) from the reading's position to that of the joint angles (3,), rad, linearized: |J (angles - q)|.
-        Values of the Jacobian that are not finite are replaced (NaN by zero); they are refused later, with an error
-        that names them."""
+        """Compute the distance (m) from the reading's position to that of the joint angles (3,), rad, linearized: |J
+        (angles - q)|. Values of the Jacobian that are not finite are replaced (NaN by zero); they are refused later,
+        with an error that names them."""
         jacobian = np.nan_to_num(reading.jacobian)
         return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
-    def _ask_library(
+    def _call_library(
         self, read_library: Callable[[FloatArray], Result | None], position_m: FloatArray
     ) -> Result | None:
         """Call `read_library` for a position (3,), m; None where the library reports it as out of reach. Raises
@@ -103,29 +103,29 @@ class VendorLinkage:
             raise make_device_error(self._model.name, error) from error
 
     def _compute_encoder_counts(self, position_m: FloatArray) -> list[c_int]:
-        """Encoder counts of the base's three joints at a position (m)."""
-        counts = [c_int() for _ in range(3)]
+        """Compute the encoder counts of the base's three joints at a position (3,), m."""
+        encoder_counts = [c_int() for _ in range(3)]
         x, y, z = (float(coordinate) for coordinate in position_m)
-        self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, counts), self._number)
-        return counts
+        self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, encoder_counts), self._number)
+        return encoder_counts
 
     def _compute_joint_angles(self, counts: list[c_int]) -> FloatArray:
-        """Joint angles (3,), rad, for encoder counts."""
+        """Compute the joint angles (3,), rad, of encoder counts."""
         return self._read_position("dhdDeltaEncodersToJointAngles", *counts)
 
-    def _read_at(self, position_m: FloatArray) -> LinkageReading | None:
-        """Reading at a position (3,), m; None where that of its encoder counts differs by more than
+    def _read_linkage(self, position_m: FloatArray) -> LinkageReading | None:
+        """Compute the reading at a position (3,), m; None where the position of its encoder counts differs by more than
         `REACH_TOLERANCE_M`. The holding force is NaN where the Jacobian is not finite."""
-        counts = self._compute_encoder_counts(position_m)
-        encoder_position_m = self._read_position("dhdDeltaEncoderToPosition", *counts)
+        encoder_counts = self._compute_encoder_counts(position_m)
+        encoder_position_m = self._read_position("dhdDeltaEncoderToPosition", *encoder_counts)
         if not float(np.linalg.norm(encoder_position_m - position_m)) <= REACH_TOLERANCE_M:
             return None
-        base_angles = self._compute_joint_angles(counts)
+        base_angles = self._compute_joint_angles(encoder_counts)
         jacobian_values, inertia_values = (c_double * 9)(), (c_double * 36)()
         self._library.call(
             "dhdDeltaJointAnglesToJacobian", *(float(angle) for angle in base_angles), jacobian_values, self._number
         )
-        # The joints of a wrist, which follow the base's three, keep their present angles.
+        # For the joints of a wrist, which follow the base's three in the array, the present angles are used.
         joint_angles, gravity_torques = (c_double * JOINT_COUNT)(), (c_double * JOINT_COUNT)()
         self._library.call("dhdGetJointAngles", joint_angles, self._number)
         joint_angles[:3] = [float(angle) for angle in base_angles]
@@ -143,18 +143,18 @@ class VendorLinkage:
             np.array(position_m), base_angles, jacobian, np.array(inertia_values).reshape(6, 6)[:3, :3], gravity_force_n
         )
 
-    def _read_position(self, name: str, *counts: c_int) -> FloatArray:
-        """The three numbers that a function of the library computes from three encoder counts: a position (m) or joint
-        angles (rad)."""
+    def _read_position(self, function_name: str, *counts: c_int) -> FloatArray:
+        """Call a function of the library that computes three numbers from three encoder counts: a position (m) or joint
+        angles (rad). name: that of the function."""
         values = [c_double() for _ in range(3)]
-        self._library.call(name, *counts, *map(byref, values), self._number)
+        self._library.call(function_name, *counts, *map(byref, values), self._number)
         return np.array([value.value for value in values])
 
 
 @contextlib.contextmanager
 def open_vendor_linkage(name: str) -> Iterator[VendorLinkage]:
-    """Context with the linkage of an open, braked device of this name (`MODELS`), disconnected at the end. Raises
-    `DeviceError`, also for a device that is not calibrated."""
+    """Context manager that yields the linkage of an open, braked device of this name (`MODELS`), disconnected at the
+    end. Raises `DeviceError` where the device cannot be opened, is not calibrated, or the library fails."""
     model, library = MODELS[name], load_library()
     handle = open_model(library, model)
     try:

@@ -57,9 +57,11 @@ def _list_folders(computer: Computer) -> Iterator[Path]:
     environ = computer.environ
     roots = [Path(environ[name]) for name in SDK_VARIABLES if environ.get(name)]
     if computer.system == "win32":
-        for variable, vendor in WINDOWS_FOLDERS:
+        for variable, vendor_folder in WINDOWS_FOLDERS:
             if environ.get(variable):
-                roots += sorted((Path(environ[variable]) / vendor).glob("sdk-*"), key=_parse_version, reverse=True)
+                roots += sorted(
+                    (Path(environ[variable]) / vendor_folder).glob("sdk-*"), key=_parse_version, reverse=True
+                )
         yield from (root / "bin" for root in roots)
         return
     system, compiler = ("mac", "clang") if computer.system == "darwin" else ("lin", "gcc")

@@ -3,8 +3,8 @@
 The compiled functions of `tick_io` do the reading and writing; this class owns their memory cells, the threads and the
 errors. In addition to the safety layer, `tick_io` never sends a force whose norm is above the cap or NaN. Any failure
 is raised as a `DeviceError`: the safety layer then writes a zero force, and if that fails too, the device's watchdog
-switches the force off. Made by `rigs`; the acceptance test (`force_limit_check`) also calls `force_on`, `given_n`,
-`given_past_this_n` and `withhold`.
+switches the force off. Made by `open_rig`; the acceptance test (`force_limit_check`) also calls `force_on`, `given_n`,
+`given_past_this_n` and `withhold`, whose names its protocols define.
 """
 
 import contextlib
@@ -27,14 +27,14 @@ from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Compil
 from study.errors import DeviceError
 
 ZERO_INTERVAL_SHARE = 0.25
-"""Interval between two zero forces while nothing is played, as a share of the watchdog's timeout."""
+"""Interval between two zero forces while nothing is played, as a share of the watchdog's timeout. Chosen."""
 
 JOIN_TIMEOUT_S = 0.5
 """Longest wait (s) for the thread that repeats zeros to end: half of what a caller waits for a device to close."""
 
 
 class Accelerometer(Protocol):
-    """Interface of an acceleration sensor at the handle that is read by a thread of its own, such as
+    """Interface of an acceleration sensor at the handle that is read by a separate thread, such as
     `study.devices.accelerometer.sensor.Accelerometer`. One with an attribute `samples` is also read by compiled
     code."""
 
@@ -102,10 +102,10 @@ class ForceDimensionRig:
         """Reading, shape (READING_SIZE,), with the newest acceleration; NaN without a fresh sample. Raises
         `DeviceError` where the device fails or only repeats its position."""
         reading = np.empty(READING_SIZE)
-        self._raise_for(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
+        self._raise_for_code(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
         if self._uncompiled_accelerometer is not None:
-            reading[ACCELERATION], clipped = self._uncompiled_accelerometer.read_latest()
-            reading[SENSOR_CLIPPED] = float(clipped)
+            reading[ACCELERATION], is_clipped = self._uncompiled_accelerometer.read_latest()
+            reading[SENSOR_CLIPPED] = float(is_clipped)
         return reading
 
     def buttons(self) -> frozenset[int]:
@@ -116,7 +116,7 @@ class ForceDimensionRig:
     def write(self, force_n: FloatArray) -> None:
         """Command a force (3,), N. A zero force is sent even after a failure. Raises `study.errors.DeviceError` after a
         failure, and for a force above the cap or NaN, in place of which a zero is sent."""
-        self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
+        self._raise_for_code(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
         """Accelerations at past ticks, as `study.devices.rig.AsynchronousAccelerometer.sensed`; None without an
@@ -135,7 +135,7 @@ class ForceDimensionRig:
         try:
             return self._handle.read_status().force_on
         except LibraryError as error:
-            raise self._fail(f"The library says: {error}") from error
+            raise self._record_failure(f"The library says: {error}") from error
 
     def given_n(self) -> float:
         """Norm of the horizontal force (N) that the device reports at this moment; the vertical force is left out,
@@ -143,7 +143,7 @@ class ForceDimensionRig:
         try:
             x, y, _ = self._handle.read_force_n()
         except LibraryError as error:
-            raise self._fail(f"The library says: {error}") from error
+            raise self._record_failure(f"The library says: {error}") from error
         return math.hypot(x, y)
 
     def given_past_this_n(self, asked_n: float) -> float:
@@ -155,7 +155,7 @@ class ForceDimensionRig:
                 self._handle.set_force(asked_n, 0.0, 0.0)
                 return self.given_n()
             except LibraryError as error:
-                raise self._fail(f"The library says: {error}") from error
+                raise self._record_failure(f"The library says: {error}") from error
             finally:
                 with contextlib.suppress(LibraryError):
                     self._handle.set_force(0.0, 0.0, 0.0)
@@ -197,18 +197,20 @@ class ForceDimensionRig:
                 if code:
                     self._get_error(code)
 
-    def _raise_for(self, code: int) -> None:
-        """Raise the error of a code of `tick_io` other than 0."""
+    def _raise_for_code(self, code: int) -> None:
+        """Raise the error of a code of `tick_io`; do nothing for 0."""
         if code:
             raise self._get_error(code)
 
     def _get_error(self, code: int) -> DeviceError:
-        """The error of a code; the first failure is kept. Must be called in the thread that got the code, because the
-        library stores its last error per thread."""
-        return self._failure or self._fail(self._describe_failure(int(self._cells[loop_cells.FAILED]) or code))
+        """Return the error of a code; the first failure is kept. Must be called in the thread that got the code,
+        because the library stores its last error per thread."""
+        return self._failure or self._record_failure(
+            self._describe_failure(int(self._cells[loop_cells.FAILED]) or code)
+        )
 
     def _describe_failure(self, code: int) -> str:
-        """Description of a failure, without a full stop. code: as in `loop_cells`; LIBRARY_ERROR plus the index of a
+        """Describe a failure, without a full stop. code: as in `loop_cells`; LIBRARY_ERROR plus the index of a
         function for an error of the library."""
         function_index = code - loop_cells.LIBRARY_ERROR
         if 0 <= function_index < len(loop_cells.LIBRARY):
@@ -224,7 +226,7 @@ class ForceDimensionRig:
             loop_cells.FORCE_MISMATCH: "It repeatedly reports another force than the one that it was sent",
         }[code]
 
-    def _fail(self, reason: str) -> DeviceError:
+    def _record_failure(self, reason: str) -> DeviceError:
         """Record a failure and return its error. Only the first failure is kept: later calls return the same error."""
         if self._failure is None:
             self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.RAISED_IN_PYTHON

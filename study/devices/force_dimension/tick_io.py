@@ -63,21 +63,21 @@ from study.devices.governor.govern import VECTOR_TYPE
 from study.devices.native import Addresses, acquire, call_int, read_clock_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
-LOOKS_OF, LOOKS_AT = 42.0, (0.0, 8.0, 18.0, 29.0)
-"""Of every `LOOKS_OF` ticks those at which status, buttons and reported force are read (95 Hz at 1 kHz, faster than a
-person presses). Unevenly spaced, so that a periodic stimulus is not always sampled at the same phases."""
+STATUS_CYCLE_TICKS, STATUS_CHECK_TICKS = 42.0, (0.0, 8.0, 18.0, 29.0)
+"""Of every `STATUS_CYCLE_TICKS` ticks those at which status, buttons and reported force are read (95 Hz at 1 kHz,
+faster than a person presses). Unevenly spaced, so that a periodic stimulus is not always sampled at the same phases."""
 
-STALE_FOR, STALE_SHARE = 50, 0.5
+MAX_STALE_READINGS, STALE_SHARE = 50, 0.5
 """Limits on readings that only repeat an earlier one: this many in a row, or as many in excess of this share of all
 readings (`count_beyond_share`), switch the force off. At 1 kHz half of the time after which a loop counts as lost."""
 
-SCALED_FOR, SCALED_SHARE = 5, 0.02
+MAX_SCALED_FORCES, SCALED_SHARE = 5, 0.02
 """The same limits for forces that the device reduced, which its answer reports: the participant then does not feel the
 recorded force. The share detects a force of which only the peaks are reduced, for some milliseconds in each period."""
 
-ROUNDING = 1 + 1e-9
+ROUNDING_FACTOR = 1 + 1e-9
 """Factor on the cap that allows for rounding."""
-REST_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, types.float64, VECTOR_TYPE)
+REPEAT_ZERO_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, types.float64, VECTOR_TYPE)
 """Signature of the compiled function that repeats the zero force between stimuli."""
 LOCK_S = 0.002
 """Longest wait for the lock (s), ten times the duration of a write: a longer wait means that a call hangs."""
@@ -87,18 +87,18 @@ LOCK_S = 0.002
 def _sense_acceleration(samples: FloatArray, time_s: float, reading: FloatArray) -> None:
     """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.read_zeroed`
     does in Python."""
-    count = samples[0, SAMPLE_COUNT]
-    while count > 0.0:
-        row = 1 + int(count - 1.0) % RING_SIZE
+    sample_count = samples[0, SAMPLE_COUNT]
+    while sample_count > 0.0:
+        row = 1 + int(sample_count - 1.0) % RING_SIZE
         is_recent = not time_s - samples[row, ARRIVAL_S] > MAX_AGE_S
         for i in range(3):
             value = samples[row, SENSED_MPS2 + i] - samples[0, REST_MPS2 + i]
             reading[ACCELERATION.start + i] = value if is_recent else math.nan
         reading[SENSOR_CLIPPED] = 1.0 if is_recent and samples[row, IS_CLIPPED] != 0.0 else 0.0
-        newer = samples[0, SAMPLE_COUNT]
-        if newer - count < RING_SIZE - 1:
+        newer_count = samples[0, SAMPLE_COUNT]
+        if newer_count - sample_count < RING_SIZE - 1:
             break
-        count = newer
+        sample_count = newer_count
 
 
 @njit_inline
@@ -110,16 +110,16 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
         reading[i] = math.nan
     address = reading.ctypes.data
     arguments = (np.int64(address), np.int64(address + 8), np.int64(address + 16), np.int32(cells[NUMBER]))
-    answer = call_int(calls[POSITION], arguments)
-    if not is_success(answer):
+    return_value = call_int(calls[POSITION], arguments)
+    if not is_success(return_value):
         return record_library_failure(cells, POSITION)
-    if cells[READ_COUNT] % LOOKS_OF in LOOKS_AT:
+    if cells[READ_COUNT] % STATUS_CYCLE_TICKS in STATUS_CHECK_TICKS:
         code = check_status(calls, cells)
         if code != 0:
             return code
     cells[READ_COUNT] += 1.0
-    cells[REPEAT_COUNT] = count_beyond_share(cells[REPEAT_COUNT], answer == REPEATED_READING, STALE_SHARE)
-    if cells[REPEAT_COUNT] >= STALE_FOR * (1.0 - STALE_SHARE):
+    cells[REPEAT_COUNT] = count_beyond_share(cells[REPEAT_COUNT], return_value == REPEATED_READING, STALE_SHARE)
+    if cells[REPEAT_COUNT] >= MAX_STALE_READINGS * (1.0 - STALE_SHARE):
         return record_failure(cells, STALE_READINGS)
     reading[SENSOR_CLIPPED] = 0.0
     if samples.shape[0] > 1:
@@ -135,12 +135,12 @@ def _is_watchdog_expired(calls: Addresses, cells: FloatArray) -> bool:
 
 @njit_inline
 def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float) -> int:
-    """Call dhdSetForce (N). Returns its answer."""
+    """Call dhdSetForce (N). Returns its return value."""
     return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[NUMBER]))))
 
 
 @njit_inline
-def _wake_device(calls: Addresses, cells: FloatArray) -> int:
+def _reenable_forces(calls: Addresses, cells: FloatArray) -> int:
     """Enable forces after a pause longer than the watchdog's timeout. Returns an error code where the forces are off
     for another cause, or a force acted; a pause after a zero (nothing was played, or the computer slept) is no
     error."""
@@ -172,21 +172,20 @@ def _brake(calls: Addresses, cells: FloatArray) -> None:
 def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     """Send a force. The caller must hold the lock."""
     if _is_watchdog_expired(calls, cells):
-        code = _wake_device(calls, cells)
+        code = _reenable_forces(calls, cells)
         if code != 0:
             return code
     x, y, z = force[0], force[1], force[2]
-    began_s = read_clock_s(
-        calls
-    )  # the watchdog counts from the arrival of the force, which may be long before the call ends
-    answer = _set_force(calls, cells, x, y, z)
-    if not is_success(answer):
+    # The watchdog counts from the arrival of the force, which may be long before the call ends.
+    began_s = read_clock_s(calls)
+    return_value = _set_force(calls, cells, x, y, z)
+    if not is_success(return_value):
         return record_library_failure(cells, FORCE)
     cells[SENT_S] = began_s
     record_sent_force(cells, x, y, z)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
-    cells[SCALED_COUNT] = count_beyond_share(cells[SCALED_COUNT], answer != 0, SCALED_SHARE)
-    if cells[SCALED_COUNT] >= SCALED_FOR * (1.0 - SCALED_SHARE):
+    cells[SCALED_COUNT] = count_beyond_share(cells[SCALED_COUNT], return_value != 0, SCALED_SHARE)
+    if cells[SCALED_COUNT] >= MAX_SCALED_FORCES * (1.0 - SCALED_SHARE):
         return record_failure(cells, FORCE_SCALED_DOWN)
     return 0
 
@@ -213,26 +212,27 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
 
 @njit_inline
 def _write_zero(calls: Addresses, cells: FloatArray) -> int:
-    """Send a zero force in any case: neither a lock that is not free nor an earlier failure prevents it. It does not
-    enable the forces of a braked device."""
+    """Send a zero force, even if the lock is not free or after an earlier failure; nothing after a confirmed release.
+    It does not enable the forces of a braked device."""
     if cells[RELEASE_CONFIRMED] != 0.0:
         return 0
-    got = acquire(calls, LOCK_S)
+    is_locked = acquire(calls, LOCK_S)
     code = _send_zero(calls, cells)
-    if got:
+    if is_locked:
         release(calls)
     return code
 
 
 @njit_inline
 def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
-    """Write a force (3,), N: a zero in any case, another only within the cap, without a failure, and under the lock."""
+    """Write a force (3,), N: a zero force always; another only within the cap, without a failure, and under the lock.
+    Nothing is written before the time WITHHELD_UNTIL_S."""
     if read_clock_s(calls) < cells[WITHHELD_UNTIL_S]:
         return 0
     norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
     if norm == 0.0:
         return _write_zero(calls, cells)
-    if not norm <= cells[CAP_N] * ROUNDING:
+    if not norm <= cells[CAP_N] * ROUNDING_FACTOR:
         code = _write_zero(calls, cells)
         if cells[FAILED] == 0.0:
             cells[REFUSED_N] = norm
@@ -247,14 +247,14 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 
 @njit_inline
-def _repeat_zero(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
+def _repeat_zero(calls: Addresses, cells: FloatArray, interval_s: float, force: FloatArray) -> int:
     """Repeat the zero force while nothing is played, and brake where the device does not take it. The lock is held
     without the interpreter, so that the loop's next force waits for it no longer than `LOCK_S`."""
     if not acquire(calls, LOCK_S):
         return 0
     code = 0
-    resting = cells[SENT_ZERO] != 0.0 and read_clock_s(calls) - cells[SENT_S] >= every_s
-    if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
+    is_repeat_due = cells[SENT_ZERO] != 0.0 and read_clock_s(calls) - cells[SENT_S] >= interval_s
+    if is_repeat_due and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
         code = _send_force(calls, cells, force)
         if code == 0:
             code = check_zero_force(calls, cells)
@@ -264,36 +264,36 @@ def _repeat_zero(calls: Addresses, cells: FloatArray, every_s: float, force: Flo
     return code
 
 
-def _entry_points(sources: int) -> tuple[Any, Any, Any]:
+def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any, Any]:
     """Compile the entry points. sources: fingerprint, captured so that a change invalidates the cache."""
 
     @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
-        _ = sources
+        _ = sources_fingerprint
         return _sense(calls, cells, samples, reading)
 
     @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def write_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
-        _ = sources
+        _ = sources_fingerprint
         return _write(calls, cells, force)
 
-    @njit(REST_SIGNATURE, cache=True, nogil=True, error_model="numpy")
-    def repeat_zero_once(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
-        _ = sources
-        return _repeat_zero(calls, cells, every_s, force)
+    @njit(REPEAT_ZERO_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def repeat_zero_once(calls: Addresses, cells: FloatArray, interval_s: float, force: FloatArray) -> int:
+        _ = sources_fingerprint
+        return _repeat_zero(calls, cells, interval_s, force)
 
     return sense_once, write_once, repeat_zero_once
 
 
-_DEVICES = Path(__file__).parents[1]
-sense_once, write_once, repeat_zero_once = _entry_points(
+_DEVICES_FOLDER = Path(__file__).parents[1]
+sense_once, write_once, repeat_zero_once = _compile_entry_points(
     fingerprint(
         Path(__file__).parent,
         *(
-            _DEVICES / name
+            _DEVICES_FOLDER / name
             for name in ("rig.py", "native.py", "accelerometer/newest_sample.py", "governor/compiling.py")
         ),
     )
 )
-"""`sense_once` and `write_once` as defined in `study.devices.rig.CompiledIo`; `repeat_zero_once(calls, cells, every_s,
-zero)` repeats the zero force where the last force was a zero, every_s (s) or longer ago."""
+"""`sense_once` and `write_once` as defined in `study.devices.rig.CompiledIo`; `repeat_zero_once(calls, cells,
+interval_s, zero)` repeats the zero force where the last force was a zero, interval_s (s) or longer ago."""

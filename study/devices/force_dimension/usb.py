@@ -32,21 +32,21 @@ class UsbDevice:
 
 
 def find_usb_devices(
-    devices: Path = Path("/sys/bus/usb/devices"), nodes: Path = Path("/dev/bus/usb")
+    devices_folder: Path = Path("/sys/bus/usb/devices"), device_files_folder: Path = Path("/dev/bus/usb")
 ) -> tuple[UsbDevice, ...] | None:
     """List the Force Dimension devices that are plugged in; None where this system cannot list them (not Linux).
-    devices: folder with one folder per USB device. nodes: folder of the device files, BUS/NUMBER with three digits
-    each."""
-    if not devices.is_dir():
+    devices_folder: contains one folder per USB device. device_files_folder: contains the device files, BUS/NUMBER with
+    three digits each."""
+    if not devices_folder.is_dir():
         return None
     usb_devices = []
-    for folder in sorted(devices.iterdir()):
+    for folder in sorted(devices_folder.iterdir()):
         if _read_attribute(folder / "idVendor") != VENDOR_ID:
             continue
-        bus, number = _read_attribute(folder / "busnum"), _read_attribute(folder / "devnum")
-        node = nodes / bus.zfill(3) / number.zfill(3)
+        bus_number, device_number = _read_attribute(folder / "busnum"), _read_attribute(folder / "devnum")
+        device_file = device_files_folder / bus_number.zfill(3) / device_number.zfill(3)
         usb_devices.append(
-            UsbDevice(_read_attribute(folder / "product") or "unnamed", os.access(node, os.R_OK | os.W_OK))
+            UsbDevice(_read_attribute(folder / "product") or "unnamed", os.access(device_file, os.R_OK | os.W_OK))
         )
     return tuple(usb_devices)
 

@@ -10,16 +10,17 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import njit_inline
 
 OVERFLOW_FORCE_N = 1e100
-"""Component or norm (N) from which squares of components may overflow; such a force becomes zero."""
+"""Component or norm (N) from which a force becomes zero. Chosen: squares of smaller components do not overflow."""
 
 LIMIT_FACTOR, EXCESS_FACTOR = 1 - 1e-12, 1 + 1e-9
-"""Factors on a limit. Forces are limited to LIMIT_FACTOR times the limit, so that rounding cannot exceed it. A force
-counts as limited only beyond EXCESS_FACTOR times the limit, so that a stimulus exactly at its cap does not count."""
+"""Factors on a limit, chosen. Forces are limited to LIMIT_FACTOR times the limit, so that rounding cannot exceed it. A
+force counts as limited only beyond EXCESS_FACTOR times the limit, so that a stimulus exactly at its cap does not
+count."""
 
 
 @njit_inline
 def compute_norm(x: float, y: float, z: float) -> float:
-    """Euclidean norm of the vector (x, y, z)."""
+    """Compute the Euclidean norm of the vector (x, y, z)."""
     return math.sqrt(x * x + y * y + z * z)
 
 
@@ -30,7 +31,7 @@ def is_bounded(vector: FloatArray, bound: float) -> bool:
 
 
 @njit_inline
-def clear(force: FloatArray) -> None:
+def clear_force(force: FloatArray) -> None:
     """Set a force (3,) to zero."""
     for i in range(3):
         force[i] = 0.0
@@ -38,8 +39,8 @@ def clear(force: FloatArray) -> None:
 
 @njit_inline
 def compute_limiting_factor(norm_n: float, cap_n: float) -> float:
-    """Factor that limits a force of this norm (N) to the cap (N): 1 up to the cap, then cap / norm. 0 where either is
-    not a number, the cap is not positive, or the norm is not below `OVERFLOW_FORCE_N`."""
+    """Compute the factor that limits a force of this norm (N) to the cap (N): 1 up to the cap, then cap / norm. 0 where
+    either is not a number, the cap is not positive, or the norm is not below `OVERFLOW_FORCE_N`."""
     if not (cap_n > 0.0 and norm_n < OVERFLOW_FORCE_N):
         return 0.0
     return 1.0 if norm_n <= cap_n * LIMIT_FACTOR else cap_n * LIMIT_FACTOR / norm_n
@@ -51,7 +52,7 @@ def confine(force: FloatArray, cap_n: float) -> bool:
     `OVERFLOW_FORCE_N`, or the cap is not positive: then returns False. Else returns whether the force exceeded the cap
     by more than rounding."""
     if not (is_bounded(force, OVERFLOW_FORCE_N) and cap_n > 0.0):
-        clear(force)
+        clear_force(force)
         return False
     norm_n = compute_norm(force[0], force[1], force[2])
     if norm_n > cap_n * LIMIT_FACTOR:

@@ -20,9 +20,9 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import fingerprint, njit_inline
-from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear, compute_norm, confine, is_bounded
+from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear_force, compute_norm, confine, is_bounded
 from study.devices.governor.feedback import add_feedback
-from study.devices.governor.plausibility import fault_of_reading
+from study.devices.governor.plausibility import find_reading_fault
 from study.devices.governor.telemetry_row import write_row
 from study.devices.rig import SENSOR_CLIPPED
 
@@ -40,10 +40,12 @@ from study.devices.governor.cells import (
 # isort: on
 
 IMPLAUSIBLE_STIMULUS_N = 1e6
-"""A stimulus with a component of this magnitude (N) or more is treated like NaN."""
+"""A stimulus with a component of this magnitude (N) or more is treated like NaN. Chosen far above any device's
+force."""
 
 MIN_ELAPSED_TICKS = 1e-3
-"""Smallest interval between two readings (ticks), used where a time stamp did not advance or is not a number."""
+"""Smallest interval between two readings (ticks), used where a time stamp did not advance or is not a number.
+Chosen."""
 
 VECTOR_TYPE, MATRIX_TYPE = types.float64[::1], types.float64[:, ::1]
 """numba types of contiguous arrays with one and two dimensions."""
@@ -56,7 +58,8 @@ MISSED_TICKS_SIGNATURE = types.void(VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE, types
 
 @njit_inline
 def _start_safety_fade(state: FloatArray, fault: int) -> None:
-    """Begin the fade of the last force to zero, which needs neither sensor nor program. The first fault is kept."""
+    """Begin the fade of the last force to zero, which depends on neither readings nor requests. The first fault is
+    kept."""
     state[PHASE] = LETTING_GO
     state[LET_GO_START] = state[TICK]
     for i in range(3):
@@ -67,7 +70,7 @@ def _start_safety_fade(state: FloatArray, fault: int) -> None:
 
 @njit_inline
 def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None:
-    """End the stimulus: by request, at its length, without a sign of life (watchdog), or after the longest time."""
+    """End the stimulus: by request, at its length, without a keep-alive (watchdog), or after the longest time."""
     tick = state[TICK]
     if state[KEEP_ALIVE] != 0.0:
         state[KEEP_ALIVE] = 0.0
@@ -83,7 +86,7 @@ def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None
 
 @njit_inline
 def _update_phase(state: FloatArray, settings: FloatArray) -> None:
-    """Change the phase by requests (stop before let-go before release) and by time."""
+    """Change the phase by requests (in the order of precedence stop, let-go, release) and by time."""
     phase = state[PHASE]
     if state[STOP_REQUEST] != 0.0:
         if phase != IDLE and state[FAULT] == NO_FAULT:
@@ -101,22 +104,22 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
 
 
 @njit_inline
-def _compute_fade_gain(ticks: float, length: float, raised_cosine: float) -> float:
-    """Gain of a fade-in, from 0 at 0 ticks to 1 at `length` ticks: linear, or (1 - cos(pi ticks / length)) / 2 where
-    raised_cosine is not 0."""
-    if ticks >= length:
+def _compute_fade_gain(ticks: float, fade_ticks: float, raised_cosine: float) -> float:
+    """Compute the gain of a fade-in, from 0 at 0 ticks to 1 at `length` ticks: linear, or (1 - cos(pi ticks / length))
+    / 2 where raised_cosine is not 0."""
+    if ticks >= fade_ticks:
         return 1.0
     if ticks <= 0:
         return 0.0
     if raised_cosine != 0.0:
-        return 0.5 - 0.5 * math.cos(math.pi * ticks / length)
-    return ticks / length
+        return 0.5 - 0.5 * math.cos(math.pi * ticks / fade_ticks)
+    return ticks / fade_ticks
 
 
 @njit_inline
 def _compute_gains(state: FloatArray) -> tuple[float, float]:
-    """Gains (0 to 1) of stimulus and of spring and damper at this tick. A release during a fade-in starts from the gain
-    reached."""
+    """Compute the gains (0 to 1) of stimulus and of spring and damper at this tick. A release during a fade-in starts
+    from the gain reached."""
     tick, raised_cosine = state[TICK], state[RAISED_COSINE]
     if state[PHASE] == PLAYING:
         state[STIMULUS_GAIN] = _compute_fade_gain(tick, state[FADE_IN], raised_cosine)
@@ -128,7 +131,8 @@ def _compute_gains(state: FloatArray) -> tuple[float, float]:
 
 @njit_inline
 def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
-    """Set the time since the last reading (ticks); by the time stamps of the readings where there are any."""
+    """Set the time since the last reading (ticks, at least `MIN_ELAPSED_TICKS`): from the time stamps of the readings
+    where both have one, else from the number of ticks."""
     elapsed_ticks = state[TICK] - state[LAST_READING_TICK]
     if state[READING_TIME_S] > 0.0 and state[LAST_READING_TIME_S] > 0.0:
         elapsed_ticks = (state[READING_TIME_S] - state[LAST_READING_TIME_S]) / settings[TICK_S]
@@ -158,14 +162,14 @@ def _compute_force(
     """Fill force (3,), N: stimulus, spring and damper within all limits. An implausible stimulus or reading is a fault:
     it starts the safety fade instead."""
     tick = int(state[TICK])
-    clear(force)
+    clear_force(force)
     if 0 <= tick < state[LENGTH]:
         onset_ticks = int(state[ONSET_TICKS])
         row = tick if tick < onset_ticks else onset_ticks + (tick - onset_ticks) % (loop.shape[0] - onset_ticks)
         for i in range(3):
             force[i] = loop[row, i]
     _update_elapsed(state, settings)
-    fault = fault_of_reading(state, settings, reading) if is_bounded(force, IMPLAUSIBLE_STIMULUS_N) else NOT_A_NUMBER
+    fault = find_reading_fault(state, settings, reading) if is_bounded(force, IMPLAUSIBLE_STIMULUS_N) else NOT_A_NUMBER
     if fault != NO_FAULT:
         _start_safety_fade(state, fault)
         return
@@ -206,28 +210,28 @@ def _record_row(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> N
         state[RECORDED_ROWS] += 1
 
 
-def _compile_publish(sources: int) -> Any:
-    """Compile `publish`. sources: fingerprint, captured so that a change invalidates the cache."""
+def _compile_publish(sources_fingerprint: int) -> Any:
+    """Compile `publish`. sources_fingerprint: captured so that a change of a source invalidates numba's cache."""
 
     @njit(PUBLISH_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def publish(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
         """Write the row of a tick into the telemetry ring, after its force was written; nothing for a ring without
         rows."""
-        _ = sources
+        _ = sources_fingerprint
         if ring.shape[0] > 1:
             write_row(state, settings, ring, reading)
 
     return publish
 
 
-def _compile_tick(sources: int) -> tuple[Any, Any]:
-    """Compile `tick` and `record_missed_ticks`. sources: as in `_compile_publish`."""
+def _compile_tick(sources_fingerprint: int) -> tuple[Any, Any]:
+    """Compile `tick` and `record_missed_ticks`. sources_fingerprint: see `_compile_publish`."""
 
     @njit(MISSED_TICKS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def record_missed_ticks(state: FloatArray, buffer: FloatArray, missed_reading: FloatArray, ticks: int) -> None:
         """Record missed ticks: their rows contain the last force, and `missed_reading` (NaN) as the reading."""
-        _ = sources
-        for _k in range(ticks):
+        _ = sources_fingerprint
+        for _tick_number in range(ticks):
             _record_row(state, buffer, missed_reading)
             state[TICK] += 1.0
             state[TICKS] += 1.0
@@ -241,14 +245,14 @@ def _compile_tick(sources: int) -> tuple[Any, Any]:
         """Compute the force of one tick. Returns whether the force is off and stays off. state (STATE_SIZE,), buffer
         (rows, ROW_SIZE): changed in place; settings (SETTINGS_SIZE,); loop (n, 3), N: the stimulus; reading
         (READING_SIZE,): from the rig's `sense`; force (3,), N: the result, written in place."""
-        _ = sources
+        _ = sources_fingerprint
         _update_phase(state, settings)
         if state[PHASE] in (PLAYING, RELEASING):
             _compute_force(state, settings, loop, reading, force)
         if state[PHASE] == LETTING_GO:
             _apply_safety_fade(state, settings, force)
         if state[PHASE] == IDLE:
-            clear(force)
+            clear_force(force)
         confine(force, settings[TOTAL_CAP])
         for i in range(3):
             state[FORCE + i] = force[i]

@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from protocols.definition.plausibility import PlausibilitySettings
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health
 from study.devices.governor import cells, govern
-from study.devices.governor.plausibility import MOVING_BELOW_HZ
+from study.devices.governor.plausibility import MOTION_CORNER_HZ
 from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
@@ -251,7 +251,7 @@ def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz
     packed[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
     packed[cells.MAX_ACCELERATION] = bounds.acceleration_mps2
     packed[cells.ACCELERATION_SMOOTHING] = 1.0 - math.exp(-1.0 / (ACCELERATION_TIME_CONSTANT_S * rate_hz))
-    packed[cells.STIMULUS_SMOOTHING] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
+    packed[cells.STIMULUS_SMOOTHING] = 1.0 - math.exp(-2 * math.pi * MOTION_CORNER_HZ / rate_hz)
     packed[cells.RESOLUTION] = bounds.resolution_m
     packed[cells.FRICTION] = bounds.friction_n
     packed[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)

@@ -3,7 +3,7 @@
 Spring and damper turn a false position into force, so that an implausible reading releases the force. A reading is
 stale if it does not change although the force must have moved even a firmly gripped handle, which is simulated as
 m a + b v + k x = F after dry friction. Bounds and their reasons: `protocols.definition.plausibility`. A false reading
-within them causes at most the feedback's force limit.
+within them causes at most the feedback's force limit. Called by `govern` at every tick.
 """
 
 import math
@@ -54,43 +54,46 @@ from study.devices.governor.cells import (
 from study.devices.governor.compiling import njit_inline
 from study.devices.governor.confine import compute_norm, is_bounded
 
-IMPLAUSIBLE_M = 0.5
-"""A reading (m) with a component beyond this is treated as invalid, like NaN."""
+MAX_COMPONENT_M = 0.5
+"""A reading with a component (m) of this magnitude or more is treated as invalid, like NaN. Chosen: the
+upper bound of the workspace's radius in `protocols.definition.plausibility`."""
 
 GRIPPED_KG, GRIPPED_N_S_PER_M, GRIPPED_N_PER_M = 1.0, 60.0, 3000.0
 """Mass, damping and stiffness of a handle in a hard grip; a real handle moves no less. A whole arm has 0.55 kg,
 6.5 N s/m, 135 N/m (Sci. Rep. srep18004), a hard grip some 20 times that stiffness."""
 
-AXIS_TIMES, AXIS_STRETCHES = 4.0, 2
-"""Length of the stretches over which a single axis is tested, in units of `STALE_TICKS`, and number of successive
-stretches, in each of which a motion must be expected, that make it stale. They are longer than for the whole position
-because friction of the linkage can hold one axis while the others move."""
+AXIS_STRETCH_RATIO, AXIS_STRETCH_COUNT = 4.0, 2
+"""Length of the stretches of time over which a single axis is tested, in units of `STALE_TICKS`, and number of
+successive stretches, each with an expected motion, after which an unchanged axis is stale. Chosen: longer than for the
+whole position, because friction of the linkage can hold one axis while the others move."""
 
-MOVING_BELOW_HZ = 80.0
-"""Corner frequency of the two first-order low-passes before the expected motion. Faster forces move a gripped handle by
-less than the resolution; the friction model, computed at the loop rate, would turn them into a drift that does not
-occur."""
+MOTION_CORNER_HZ = 80.0
+"""Corner frequency (Hz) of the two first-order low-passes before the expected motion. Faster forces move a gripped
+handle by less than the resolution; the friction model, computed at the loop rate, would turn them into a drift that
+does not occur."""
 
-STEPS_OF_RESOLUTION = 2.0
+QUANTISATION_STEPS = 2.0
 """Largest effect of quantisation, in units of the resolution, on the second difference of three readings, each wrong by
 half a step. Also the expected motion from which an unchanged reading is stale."""
 
 
 @njit_inline
-def _move_gripped(state: FloatArray, tick_s: float, force_n: float, cell_indices: tuple[int, int, int, int]) -> None:
-    """Integrate the gripped handle along one axis over a tick (semi-implicit Euler), and extend its range. force_n: N.
-    cell_indices: of position (m), velocity (m/s), least and greatest position in `state`."""
-    position, speed, low, high = cell_indices
+def _integrate_gripped_handle(
+    state: FloatArray, tick_s: float, force_n: float, cell_indices: tuple[int, int, int, int]
+) -> None:
+    """Integrate the gripped handle along one axis over a tick (semi-implicit Euler), and extend its range. tick_s: s;
+    force_n: N. cell_indices: of position (m), velocity (m/s), least and greatest position in `state`."""
+    position, velocity, lowest, highest = cell_indices
     net_force_n = force_n - GRIPPED_N_PER_M * state[position]
-    net_force_n -= GRIPPED_N_S_PER_M * state[speed]
-    state[speed] += tick_s / GRIPPED_KG * net_force_n
-    state[position] += tick_s * state[speed]
-    state[low] = min(state[low], state[position])
-    state[high] = max(state[high], state[position])
+    net_force_n -= GRIPPED_N_S_PER_M * state[velocity]
+    state[velocity] += tick_s / GRIPPED_KG * net_force_n
+    state[position] += tick_s * state[velocity]
+    state[lowest] = min(state[lowest], state[position])
+    state[highest] = max(state[highest], state[position])
 
 
 @njit_inline
-def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
+def _update_expected_motion(state: FloatArray, settings: FloatArray) -> None:
     """Update the motion that the stimulus must have caused in a gripped handle over the last tick. Static forces are
     left out: a hand at rest balances them. Dry friction follows the play operator (Prandtl): the force that moves the
     handle changes only where the stimulus differs from it by more than the friction."""
@@ -105,19 +108,19 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     y = state[TWICE_SMOOTHED_STIMULUS + 1] - state[MOVING_FORCE + 1]
     z = state[TWICE_SMOOTHED_STIMULUS + 2] - state[MOVING_FORCE + 2]
     difference_n = compute_norm(x, y, z)
-    share = 1.0 - settings[FRICTION] / difference_n if difference_n > settings[FRICTION] else 0.0
-    state[MOVING_FORCE] += share * x
-    state[MOVING_FORCE + 1] += share * y
-    state[MOVING_FORCE + 2] += share * z
+    moved_share = 1.0 - settings[FRICTION] / difference_n if difference_n > settings[FRICTION] else 0.0
+    state[MOVING_FORCE] += moved_share * x
+    state[MOVING_FORCE + 1] += moved_share * y
+    state[MOVING_FORCE + 2] += moved_share * z
     for i in range(3):
         cell_indices = EXPECTED_POSITION + i, EXPECTED_SPEED + i, RANGE_LOW + i, RANGE_HIGH + i
-        _move_gripped(state, settings[TICK_S], state[MOVING_FORCE + i], cell_indices)
+        _integrate_gripped_handle(state, settings[TICK_S], state[MOVING_FORCE + i], cell_indices)
 
 
 @njit_inline
-def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
-    """Whether the reading differs by half the resolution or more from the reference, the last reading that had changed.
-    If so, it becomes the new reference, and the expected range starts anew."""
+def _update_reference(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
+    """Make the reading the new reference, and restart the expected range, if it differs by half the resolution or more
+    from the reference, the last reading that had changed, or the reference is NaN. Returns whether this is so."""
     distance_m = compute_norm(
         reading[0] - state[REFERENCE_POSITION],
         reading[1] - state[REFERENCE_POSITION + 1],
@@ -135,47 +138,53 @@ def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -
 @njit_inline
 def _must_have_moved(state: FloatArray, settings: FloatArray, distance_m: float) -> bool:
     """Whether the spring's force has been reduced so far, since the last change, that even a gripped handle must have
-    moved by `distance_m` (m): by more than friction + stiffness of the grip * way."""
+    moved by `distance_m` (m): by more than friction + stiffness of the grip * distance."""
     released_n = (state[FEEDBACK_REDUCTION] - state[REDUCTION_AT_CHANGE]) * state[FEEDBACK_FORCE]
     return bool(released_n > settings[FRICTION] + GRIPPED_N_PER_M * distance_m)
 
 
 @njit_inline
 def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
-    """Whether the position has not changed for `STALE_TICKS`, although a gripped handle must have moved."""
-    if _has_changed(state, settings, reading):
+    """Whether the position has not changed for `STALE_TICKS`, although a gripped handle must have moved. Updates the
+    reference and the count of unchanged ticks."""
+    if _update_reference(state, settings, reading):
         state[UNCHANGED_TICKS] = 0.0
         return False
     state[UNCHANGED_TICKS] += 1.0
-    expected = max(
+    expected_range_m = max(
         state[RANGE_HIGH] - state[RANGE_LOW],
         state[RANGE_HIGH + 1] - state[RANGE_LOW + 1],
         state[RANGE_HIGH + 2] - state[RANGE_LOW + 2],
     )
-    distance_m = STEPS_OF_RESOLUTION * settings[RESOLUTION]
+    distance_m = QUANTISATION_STEPS * settings[RESOLUTION]
     return bool(
         state[UNCHANGED_TICKS] >= settings[STALE_TICKS]
-        and (expected > distance_m or _must_have_moved(state, settings, distance_m))
+        and (expected_range_m > distance_m or _must_have_moved(state, settings, distance_m))
     )
 
 
 @njit_inline
-def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
-    """As `_expect_motion` for axis i by itself, with the full friction on its component of the force."""
+def _update_expected_axis_motion(state: FloatArray, settings: FloatArray, i: int) -> None:
+    """Update the motion expected along axis i alone, as `_update_expected_motion` does for all axes, with the full
+    friction on its component of the force."""
     difference_n = state[TWICE_SMOOTHED_STIMULUS + i] - state[AXIS_FORCE + i]
     if abs(difference_n) > settings[FRICTION]:
         state[AXIS_FORCE + i] += difference_n - math.copysign(settings[FRICTION], difference_n)
     cell_indices = AXIS_EXPECTED + i, AXIS_SPEED + i, AXIS_LOW + i, AXIS_HIGH + i
-    _move_gripped(state, settings[TICK_S], state[AXIS_FORCE + i], cell_indices)
+    _integrate_gripped_handle(state, settings[TICK_S], state[AXIS_FORCE + i], cell_indices)
 
 
 @njit_inline
 def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading of a single axis is stale: unchanged although its component of the force must have moved
     it."""
-    stale, stretch_ticks, half_resolution = False, AXIS_TIMES * settings[STALE_TICKS], 0.5 * settings[RESOLUTION]
+    is_stale, stretch_ticks, half_resolution = (
+        False,
+        AXIS_STRETCH_RATIO * settings[STALE_TICKS],
+        0.5 * settings[RESOLUTION],
+    )
     for i in range(3):
-        _expect_along_axis(state, settings, i)
+        _update_expected_axis_motion(state, settings, i)
         if abs(reading[i] - state[AXIS_REFERENCE + i]) >= half_resolution:
             state[AXIS_REFERENCE + i], state[AXIS_UNCHANGED_TICKS + i] = reading[i], 0.0
             state[AXIS_LOW + i] = state[AXIS_HIGH + i] = state[AXIS_EXPECTED + i]
@@ -183,49 +192,52 @@ def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray)
         state[AXIS_UNCHANGED_TICKS + i] += 1.0
         if state[AXIS_UNCHANGED_TICKS + i] % stretch_ticks != 0.0:
             continue
-        if state[AXIS_HIGH + i] - state[AXIS_LOW + i] <= STEPS_OF_RESOLUTION * settings[RESOLUTION]:
+        if state[AXIS_HIGH + i] - state[AXIS_LOW + i] <= QUANTISATION_STEPS * settings[RESOLUTION]:
             state[AXIS_UNCHANGED_TICKS + i] = 0.0
-        stale = stale or state[AXIS_UNCHANGED_TICKS + i] >= AXIS_STRETCHES * stretch_ticks
+        is_stale = is_stale or state[AXIS_UNCHANGED_TICKS + i] >= AXIS_STRETCH_COUNT * stretch_ticks
         state[AXIS_LOW + i] = state[AXIS_HIGH + i] = state[AXIS_EXPECTED + i]
-    return stale
+    return is_stale
 
 
 @njit_inline
 def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: float) -> bool:
     """Whether the low-passed acceleration of the readings exceeds its bound. x, y, z: the latest step, in m per
     tick."""
-    last = state[LAST_STEP]
-    if not math.isnan(last):  # NaN before the second reading
-        change = compute_norm(x - last, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
-        change = max(0.0, change - STEPS_OF_RESOLUTION * settings[RESOLUTION])
-        acceleration = change / (settings[TICK_S] * settings[TICK_S])
-        state[SMOOTHED_ACCELERATION] += settings[ACCELERATION_SMOOTHING] * (acceleration - state[SMOOTHED_ACCELERATION])
+    last_x = state[LAST_STEP]
+    if not math.isnan(last_x):  # NaN before the second reading
+        step_change_m = compute_norm(x - last_x, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
+        step_change_m = max(0.0, step_change_m - QUANTISATION_STEPS * settings[RESOLUTION])
+        acceleration_mps2 = step_change_m / (settings[TICK_S] * settings[TICK_S])
+        state[SMOOTHED_ACCELERATION] += settings[ACCELERATION_SMOOTHING] * (
+            acceleration_mps2 - state[SMOOTHED_ACCELERATION]
+        )
     state[LAST_STEP], state[LAST_STEP + 1], state[LAST_STEP + 2] = x, y, z
     return bool(state[SMOOTHED_ACCELERATION] > settings[MAX_ACCELERATION])
 
 
 @njit_inline
-def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
-    """NO_FAULT, or the code of the fault for which the force must be released. reading: (3,), m. `state` holds the last
-    position and the ticks since then (LAST_POSITION, ELAPSED_TICKS)."""
-    if not is_bounded(reading, IMPLAUSIBLE_M):
+def find_reading_fault(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
+    """Find the fault of a reading: its code, for which the force must be released, or NO_FAULT. reading: its first
+    three numbers are the position, m. `state` holds the last position (LAST_POSITION; NaN before the first reading) and
+    the ticks since then (ELAPSED_TICKS)."""
+    if not is_bounded(reading, MAX_COMPONENT_M):
         return NOT_A_NUMBER
     if not compute_norm(reading[0], reading[1], reading[2]) <= settings[WORKSPACE_RADIUS]:
         return OUTSIDE
     last_x = state[LAST_POSITION]
     if math.isnan(last_x):  # the first reading
-        _has_changed(state, settings, reading)
+        _update_reference(state, settings, reading)
         for i in range(3):
             state[AXIS_REFERENCE + i] = reading[i]
         return NO_FAULT
     x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
-    # Driver and loop have separate clocks: successive samples of the driver may seem to be less than a tick apart.
+    # Driver and loop have separate clocks: time stamps of successive samples may be less than a tick apart.
     ticks = max(1.0, state[ELAPSED_TICKS])
     step_m = compute_norm(x, y, z)
     if not (step_m <= settings[LONGEST_JUMP] and step_m <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):
         return JUMPED
     if _is_shaken(state, settings, x / ticks, y / ticks, z / ticks):
         return SHAKEN
-    _expect_motion(state, settings)
+    _update_expected_motion(state, settings)
     axis_stale = _is_axis_stale(state, settings, reading)
     return STALE if _is_stale(state, settings, reading) or axis_stale else NO_FAULT

@@ -1,4 +1,4 @@
-"""Writes the row of a tick into the telemetry ring, in place of the oldest row.
+"""Writes the row of a tick into the telemetry ring, in place of the oldest row. Called by `govern.publish`.
 
 The loop is the only writer and never waits; readers (`study.devices.telemetry`) only read. A row that is being written
 is recognised by its index and its checksum, on any processor: the method does not depend on the order of the stores.
@@ -46,11 +46,11 @@ from study.devices.governor.compiling import njit_inline
 def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
     """Write the row of a tick into the ring; called after `tick`, which has advanced TICK already. ring (1 + rows,
     RING_WIDTH): a header, then the rows. Time in s, position in m, acceleration in m/s², forces in N."""
-    count = ring[0, RING_COUNT]
-    row = ring[1 + int(count) % (ring.shape[0] - 1)]
+    row_count = ring[0, RING_COUNT]
+    row = ring[1 + int(row_count) % (ring.shape[0] - 1)]
     # The excitation and the velocity are computed in these two phases only.
-    aims = state[PHASE] in (PLAYING, RELEASING)
-    row[RING_INDEX] = count
+    is_force_computed = state[PHASE] in (PLAYING, RELEASING)
+    row[RING_INDEX] = row_count
     row[RING_TIME_S] = state[READING_TIME_S]
     if not state[READING_TIME_S] > 0.0:
         row[RING_TIME_S] = state[BEGIN_TIME_S] + (state[TICK] - state[FIRST_TICK]) * settings[TICK_S]
@@ -59,12 +59,12 @@ def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading
         row[RING_POSITION + i] = reading[i]
         row[RING_ACCELERATION + i] = reading[3 + i]
         row[RING_APPLIED + i] = state[FORCE + i]
-        row[RING_COMMANDED + i] = state[EXCITATION + i] if aims else 0.0
-        row[RING_VELOCITY + i] = state[VELOCITY + i] if aims else math.nan
+        row[RING_COMMANDED + i] = state[EXCITATION + i] if is_force_computed else 0.0
+        row[RING_VELOCITY + i] = state[VELOCITY + i] if is_force_computed else math.nan
     row[RING_PHASE], row[RING_FAULT], row[RING_MISSED] = state[PHASE], state[FAULT], state[MISSED]
     bits = row.view(np.int64)
-    check = np.int64(0)
+    checksum = np.int64(0)
     for i in range(RING_CHECK):
-        check += (bits[i] ^ (bits[i] >> RING_FOLD)) * RING_FACTORS[i]
-    bits[RING_CHECK] = check
-    ring[0, RING_COUNT] = count + 1.0
+        checksum += (bits[i] ^ (bits[i] >> RING_FOLD)) * RING_FACTORS[i]
+    bits[RING_CHECK] = checksum
+    ring[0, RING_COUNT] = row_count + 1.0

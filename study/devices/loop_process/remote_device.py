@@ -14,25 +14,21 @@ from typing import Any
 
 from equalizer.signals.signal import Signal
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, PlaybackResult
-from study.devices.loop_process.line import CLOSE_TIMEOUT_S, Call, Line, LoopGoneError
+from study.devices.loop_process.call_pipe import CLOSE_TIMEOUT_S, Call, CallPipe, LoopGoneError
 from study.devices.loop_process.start import LoopProcess
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 OPENING_TIMEOUT_S = 180.0
-"""Timeout (s) for starting the process, compiling where necessary, and opening the device."""
-
+"""Timeout (s) for starting the process, compiling where necessary, and opening the device. Chosen."""
 ANSWER_TIMEOUT_S = 3.0
-"""Timeout for an answer (s), longer than the delays of a busy computer and than the safety layer's own timeouts: 0.1 s
-for a loop that hangs, 0.1 s for writing a zero force, 1 s after the fades for a device that does not become still."""
-
+"""Timeout for an answer (s). Chosen: longer than the delays of a busy computer and the safety layer's timeouts (0.1 s
+for a hanging loop, 0.1 s for a zero force, 1 s after the fades for a device that does not become still)."""
 STOP_TIMEOUT_S = 0.5
-"""Timeout of an emergency stop (s), after which the process is killed at once."""
-
+"""Timeout of an emergency stop (s), after which the process is killed at once. Chosen."""
 SENT_S_PER_RECORDED_S = 0.05
-"""Additional timeout (s) per recorded second (100 kB, 2 ms through a pipe, more on a busy computer)."""
-
+"""Additional timeout (s) per recorded second (100 kB, 2 ms through a pipe, more on a busy computer). Chosen."""
 INITIAL_HEALTH = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 """Health before the first stimulus: no fault, nothing counted."""
 
@@ -78,7 +74,7 @@ class RemoteDevice:
         self._fade_s = limits.release_s + limits.watchdog_s
         self._keep_s = settings.keep_s
         self._held_stimulus: HeldStimulus | None = None
-        self._releasing: Call | None = None
+        self._release_call: Call | None = None
         self._health = INITIAL_HEALTH
         self._force_left = self._stopped = False
         """Whether the process reported FORCE_LEFT or an executed stop; both remain true after its end."""
@@ -98,15 +94,17 @@ class RemoteDevice:
 
     @property
     def telemetry(self) -> str:
+        """Path of the telemetry ring (`study.devices.telemetry`); empty without one."""
         return self._ring.path if self._ring is not None else ""
 
     def hold(self, stimulus: HeldStimulus) -> None:
+        """Begin to play a stimulus; see `Device.hold`. Raises `DeviceError`, also for a closed or lost device."""
         self._require_idle()
-        previous, self._held_stimulus = self._held_stimulus, stimulus
+        previous_stimulus, self._held_stimulus = self._held_stimulus, stimulus
         try:
             self._call_remote(self._process.work, "hold", stimulus)
         except Exception:
-            self._held_stimulus = previous
+            self._held_stimulus = previous_stimulus
             raise
 
     def keep_alive(self) -> None:
@@ -127,7 +125,7 @@ class RemoteDevice:
     def health(self) -> Health:
         """Counters of the loop; where the process is lost, those that it reported last."""
         try:
-            return self._note_health(self._call_remote(self._process.signs, "health"))
+            return self._store_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
             return self._make_health_when_lost()
 
@@ -141,23 +139,24 @@ class RemoteDevice:
             return PlaybackResult(recording=None, health=self._make_health_when_lost())
         fade_out_s = self._held_stimulus.fade_out_s if self._held_stimulus is not None else 0.0
         # A caller that was interrupted while it waited gets the answer of the same release.
-        self._releasing = self._releasing or self._process.work.queue_call("release")
+        self._release_call = self._release_call or self._process.work.queue_call("release")
         try:
-            result: PlaybackResult = self._releasing.wait_for_answer(fade_out_s + self._compute_timeout_s(self._keep_s))
+            result: PlaybackResult = self._release_call.wait_for_answer(fade_out_s + self._get_timeout_s(self._keep_s))
         except LoopGoneError as loop_error:
             self._mark_lost(loop_error)
             result = PlaybackResult(recording=None, health=self._make_health_when_lost())
         except Exception:  # raised in the process. After an interruption the answer is awaited again.
-            self._releasing = self._held_stimulus = None
+            self._release_call = self._held_stimulus = None
             raise
-        self._note_health(result.health)
-        self._releasing = self._held_stimulus = None
+        self._store_health(result.health)
+        self._release_call = self._held_stimulus = None
         return result
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
+        """Play commands once; see `Device.play`. Any exception, such as KeyboardInterrupt, cancels them with a fade."""
         self._require_idle()
         call = self._process.work.queue_call("play", commands)
-        timeout_s = self._compute_timeout_s(0.0)
+        timeout_s = self._get_timeout_s(0.0)
         try:
             result: PlaybackResult = call.wait_for_answer(
                 timeout_s, on_progress, sending_s=SENT_S_PER_RECORDED_S * commands.duration_s
@@ -167,9 +166,9 @@ class RemoteDevice:
             raise self._make_lost_error() from loop_error
         except BaseException:
             if not call.is_over:
-                self._break_off(call, timeout_s)
+                self._cancel_play(call, timeout_s)
             raise
-        self._note_health(result.health)
+        self._store_health(result.health)
         return result
 
     def look(self) -> Look:
@@ -202,7 +201,7 @@ class RemoteDevice:
         try:
             if not (self._loss_reason or self._closed):
                 with contextlib.suppress(DeviceError):
-                    self._note_health(
+                    self._store_health(
                         self._call_remote(self._process.close, "close", timeout_s=self._fade_s + CLOSE_TIMEOUT_S)
                     )
         finally:  # closed pipes make the process fade the force and end
@@ -224,23 +223,23 @@ class RemoteDevice:
             except KeyboardInterrupt:  # arrived before SIGINT was ignored
                 continue
 
-    def _compute_timeout_s(self, recorded_s: float) -> float:
-        """Timeout (s) of a call that returns a recording of this length (s), or none, after a fade."""
+    def _get_timeout_s(self, recorded_s: float) -> float:
+        """Compute the timeout (s) of a call that returns a recording of this length (s; 0: none) after a fade."""
         return self._fade_s + ANSWER_TIMEOUT_S + SENT_S_PER_RECORDED_S * recorded_s
 
-    def _call_remote(self, line: Line, name: str, *arguments: Any, timeout_s: float | None = None) -> Any:
-        """Call a method in the process. Raises `DeviceError` for a device that is lost or closed, and what the method
+    def _call_remote(self, pipe: CallPipe, name: str, *arguments: Any, timeout_s: float | None = None) -> Any:
+        """Call a method in the process. Raises `DeviceError` for a lost or closed device, and what the method
         raised."""
         self._require_connected()
         try:
-            return line.queue_call(name, *arguments).wait_for_answer(
+            return pipe.queue_call(name, *arguments).wait_for_answer(
                 ANSWER_TIMEOUT_S if timeout_s is None else timeout_s
             )
         except LoopGoneError as loop_error:
             self._mark_lost(loop_error)
             raise self._make_lost_error() from loop_error
 
-    def _break_off(self, call: Call, timeout_s: float) -> None:
+    def _cancel_play(self, call: Call, timeout_s: float) -> None:
         """Cancel `play` with a fade, and wait for its end."""
         try:
             call.cancel(timeout_s)
@@ -260,23 +259,25 @@ class RemoteDevice:
                     f"{loop_error}, {self._process.end(0.0 if loop_error.hangs else self._fade_s + CLOSE_TIMEOUT_S)}"
                 )
 
-    def _note_health(self, health: Health) -> Health:
+    def _store_health(self, health: Health) -> Health:
         """Store the counters for the time after a loss of the process, and return them."""
         self._health = health
         self._force_left |= health.fault is Fault.FORCE_LEFT
         return health
 
     def _require_idle(self) -> None:
+        """Raise `DeviceError` for a lost or closed device, and while a release is pending."""
         self._require_connected()
-        if self._releasing is not None:  # its pending answer must not be taken for that of the next call
+        if self._release_call is not None:  # its pending answer must not be taken for that of the next call
             raise DeviceError("The device cannot do this now", "It is still playing.", "Call release first.")
 
     def _require_connected(self) -> None:
+        """Raise `DeviceError` for a lost or closed device."""
         if self._closed or self._loss_reason:
             raise self._make_lost_error()
 
     def _make_lost_error(self) -> DeviceError:
-        """Error for a call on a closed or lost device."""
+        """Make the error for a call on a closed or lost device."""
         if self._closing:
             return DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
         return DeviceError(
@@ -287,7 +288,7 @@ class RemoteDevice:
         )
 
     def _find_fault_when_lost(self) -> Fault:
-        """Fault without the process; see `fault`. After a normal close: the fault reported last."""
+        """Find the fault without the process; see `fault`. After a normal close: the fault reported last."""
         if self._force_left:
             return Fault.FORCE_LEFT
         if self._closed and not self._loss_reason:

@@ -20,7 +20,7 @@ from typing import Any
 from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock
 from study.devices.device import Device, PlaybackResult
-from study.devices.loop_process.line import CLOSE_TIMEOUT_S, ERROR, LINE_NAMES, PROGRESS, VALUE, PipeEnd
+from study.devices.loop_process.call_pipe import CLOSE_TIMEOUT_S, ERROR, PIPE_NAMES, PROGRESS, VALUE, PipeEnd
 from study.devices.opening import open_device, raise_thread_priority
 
 POLL_INTERVAL_S = 0.2
@@ -44,7 +44,7 @@ class PlaybackCancelledError(Exception):
 
 
 class DeviceServer:
-    """Executes the caller's remote calls on an opened device: a thread per pipe of `LINE_NAMES` calls the methods."""
+    """Executes the caller's remote calls on an opened device: a thread per pipe of `PIPE_NAMES` calls the methods."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class DeviceServer:
         after_stimulus: Callable[[], object] = lambda: None,
         raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: this process's ends of the pipes, in the order of `LINE_NAMES`. after_stimulus: called after each
+        """ends: this process's ends of the pipes, in the order of `PIPE_NAMES`. after_stimulus: called after each
         stimulus. raise_thread_priority: context in which the threads for stop and keep-alive calls run."""
         self._device = device
         self._after_stimulus = after_stimulus
@@ -78,7 +78,7 @@ class DeviceServer:
         )
         self._threads = [
             threading.Thread(target=self._serve, args=method_table, name=f"serve {name}", daemon=True)
-            for name, method_table in zip(LINE_NAMES, method_tables, strict=True)
+            for name, method_table in zip(PIPE_NAMES, method_tables, strict=True)
         ]
 
     def start(self) -> None:
@@ -129,7 +129,7 @@ class DeviceServer:
 
 def run(caller_pid: int, *handles: int) -> None:
     """Run the process. caller_pid: process id of the caller; handles: file descriptors or handles of this process's
-    ends of the pipes, in the order of `LINE_NAMES`."""
+    ends of the pipes, in the order of `PIPE_NAMES`."""
     received_signals: list[int] = []
     _install_signal_handlers(received_signals)
     watchdog = CallerWatchdog(caller_pid, received_signals)

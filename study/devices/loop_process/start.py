@@ -1,7 +1,7 @@
 """Starts the loop's process and opens the pipes to it, for `remote_device`.
 
-Not by `multiprocessing`, which would run the caller's main module again in the new process and leave it the terminal.
-Not by a fork, because the caller has threads.
+The process is a new interpreter (`serve.run`). `multiprocessing` is not used, because it would run the caller's main
+module again and leave the new process attached to the terminal; a fork is not used, because the caller has threads.
 """
 
 import contextlib
@@ -12,15 +12,15 @@ import sys
 from multiprocessing import Pipe
 from typing import Any
 
-from study.devices.loop_process.line import LINE_NAMES, Line, PipeEnd
+from study.devices.loop_process.call_pipe import PIPE_NAMES, CallPipe, PipeEnd
 from study.errors import DeviceError
 
 KILL_TIMEOUT_S = 2.0
-"""Timeout for the system to end a process that was killed."""
+"""Timeout (s) for the system to end a process that was killed. Chosen."""
 
 
 class LoopProcess:
-    """The process of the device loop, with a `Line` for each of `LINE_NAMES`. The constructor starts it, and raises
+    """The process of the device loop, with a `CallPipe` for each of `PIPE_NAMES`. The constructor starts it, and raises
     `DeviceError` where the system refuses.
 
     It has a separate session, so that the terminal's Ctrl-C and Ctrl-Z do not reach it. Its pipes are closed when this
@@ -28,12 +28,12 @@ class LoopProcess:
     """
 
     def __init__(self) -> None:
-        pairs = [Pipe() for _ in LINE_NAMES]
-        child_ends = [end for _, end in pairs]
+        pipe_pairs = [Pipe() for _ in PIPE_NAMES]
+        child_ends = [pipe_end for _, pipe_end in pipe_pairs]
         try:
-            self._process = _start_process([end.fileno() for end in child_ends], child_ends)
+            self._process = _start_process([pipe_end.fileno() for pipe_end in child_ends], child_ends)
         except OSError as error:
-            for caller_end, _ in pairs:
+            for caller_end, _ in pipe_pairs:
                 caller_end.close()
             raise DeviceError(
                 "The device's loop cannot be started",
@@ -41,13 +41,13 @@ class LoopProcess:
                 "Close other programs, then try again.",
             ) from error
         finally:
-            for end in child_ends:
-                end.close()
+            for pipe_end in child_ends:
+                pipe_end.close()
         self._killed = False
         try:
             self.pid = self._process.pid
             self.work, self.signs, self.look, self.stop, self.close = (
-                Line(caller_end, name) for (caller_end, _), name in zip(pairs, LINE_NAMES, strict=True)
+                CallPipe(caller_end, name) for (caller_end, _), name in zip(pipe_pairs, PIPE_NAMES, strict=True)
             )
         except BaseException:  # interrupted, or no more threads: nothing is held yet
             self.kill()
@@ -55,19 +55,19 @@ class LoopProcess:
 
     def hang_up(self) -> None:
         """Close the pipes after the queued calls: the process then fades the force and ends by itself."""
-        for line in (self.work, self.signs, self.look, self.stop, self.close):
-            line.end()
+        for pipe in (self.work, self.signs, self.look, self.stop, self.close):
+            pipe.close_after_calls()
 
     def kill(self) -> None:
         """Kill the process: the device's own watchdog then drops the force."""
         self._killed = True
         self._process.kill()
 
-    def end(self, patience_s: float) -> str:
-        """Wait for patience_s (s) until the process ends, else kill it. Returns how it ended, as a predicate for a
+    def end(self, timeout_s: float) -> str:
+        """Wait for timeout_s (s) until the process ends, else kill it. Returns how it ended, as a predicate for a
         message."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(patience_s)
+            self._process.wait(timeout_s)
         if self._process.returncode is None:
             self.kill()
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -80,11 +80,13 @@ class LoopProcess:
         return f"by signal {_name_signal(-return_code)}" if return_code < 0 else f"with code {return_code}"
 
 
-def _start_process(handles: list[int], ends: list[PipeEnd]) -> "subprocess.Popen[bytes]":
+def _start_process(handles: list[int], pipe_ends: list[PipeEnd]) -> "subprocess.Popen[bytes]":
     """Start an interpreter that runs `serve.run`. handles: file descriptors (on Windows, handles) of the ends of the
-    pipes that it inherits; ends: those ends, which must stay open meanwhile. Raises OSError."""
-    call = f"run({', '.join(map(str, (os.getpid(), *handles)))})"
-    program = f"import sys; sys.path[:] = {sys.path!r}; from study.devices.loop_process.serve import run; {call}"
+    pipes that it inherits; pipe_ends: those ends, referenced so that they stay open until then. Raises OSError."""
+    run_call = f"run({', '.join(map(str, (os.getpid(), *handles)))})"
+    program_text = (
+        f"import sys; sys.path[:] = {sys.path!r}; from study.devices.loop_process.serve import run; {run_call}"
+    )
     popen_options: dict[str, Any]
     if sys.platform == "win32":
         for handle in handles:
@@ -93,12 +95,12 @@ def _start_process(handles: list[int], ends: list[PipeEnd]) -> "subprocess.Popen
     else:
         popen_options = {"pass_fds": handles, "start_new_session": True}
     return subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **popen_options
+        [sys.executable, "-c", program_text], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **popen_options
     )
 
 
 def _name_signal(signal_number: int) -> str:
-    """Name of a signal, such as SIGKILL; its number where the system has no name for it."""
+    """Return the name of a signal, such as SIGKILL; its number where the system has no name for it."""
     try:
         return signal.Signals(signal_number).name
     except ValueError:

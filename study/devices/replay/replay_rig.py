@@ -3,7 +3,7 @@
 Before each stimulus, the stretch is searched whose recorded excitation is nearest to the stimulus (least squares over
 the whole stretch), and its motion is replayed: exactly for commands that were recorded, else that of the nearest ones.
 A stimulus that is repeated repeats its stretch, with a cross-fade from its end to its beginning. Between stimuli the
-handle rests where it is, and its sensor has noise. Made by `study.devices.rigs_by_name` for the device `replay:FILE`.
+handle is at rest, and its sensor has noise. Made by `study.devices.rigs_by_name` for the device `replay:FILE`.
 """
 
 from pathlib import Path
@@ -30,7 +30,7 @@ CROSSFADE_S = 0.02
 NOMINAL_MODEL = MODELS["omega3"]
 """Model whose maximum force and mass are taken for the replayed device: a recording contains neither."""
 
-TICK, FIRST, LENGTH, REPEATS, CROSSFADE_TICKS = range(5)
+TICK, FIRST_ROW, LENGTH, REPEATS, CROSSFADE = range(5)
 """Indices in the state: ticks since the first row (negative before), first row of the stretch, its number of rows,
 whether it is repeated, and rows over which its end is cross-faded into its beginning."""
 
@@ -42,15 +42,16 @@ _NOISE = types.uint64[::1]
 """numba's types of the arguments: vectors of floats, and the state of the random generator."""
 
 
-def _compile_entry_points(sources: int) -> tuple[Any, Any]:
-    """Compile `sense` and `advance`. sources: fingerprint, enclosed so that a change of any source compiles anew."""
+def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
+    """Compile `sense` and `advance`. sources_fingerprint: captured so that a change of a source invalidates numba's
+    cache."""
 
     @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
         """Fill the reading of the tick in `state`. noise: (1,), 0 during ticks; else the state of the random generator,
         for readings while nothing is played, with the handle at rest and noise in the acceleration."""
-        _ = sources
-        first_row, stretch_rows, crossfade_rows = int(state[FIRST]), int(state[LENGTH]), int(state[CROSSFADE_TICKS])
+        _ = sources_fingerprint
+        first_row, stretch_rows, crossfade_rows = int(state[FIRST_ROW]), int(state[LENGTH]), int(state[CROSSFADE])
         tick = int(state[TICK])
         tick = tick % stretch_rows if state[REPEATS] != 0.0 else min(max(tick, 0), stretch_rows - 1)
         earlier_weight = (
@@ -78,8 +79,8 @@ def _compile_entry_points(sources: int) -> tuple[Any, Any]:
 
     @njit(types.void(_VECTOR, _VECTOR, _VECTOR), cache=True, nogil=True)
     def advance(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
-        """Go on to the next row of the recording; the force has no effect."""
-        _ = sources
+        """Advance to the next row of the recording; the force has no effect."""
+        _ = sources_fingerprint
         state[TICK] += 1.0
 
     return sense, advance
@@ -89,13 +90,14 @@ sense, advance = _compile_entry_points(fingerprint(Path(__file__).parent, Path(_
 
 
 def make_replay_rig(path: Path) -> CompiledRig:
-    """A recording as a rig. Raises `DeviceError` for a file that cannot be replayed."""
+    """Make a rig that replays the recording in the file `path`. Raises `DeviceError` for a file that cannot be
+    replayed."""
     try:
         recording = read_recording(path)
-    except StudyError as problem:
-        raise _make_replay_error(f"{problem.title}: {problem.happened}") from problem
+    except StudyError as error:
+        raise _make_replay_error(f"{error.title}: {error.happened}") from error
     readings, excitation = _collect_readings(recording, path), _select_excitation(recording, path)
-    rate_hz, state = recording.sample_rate_hz, np.zeros(CROSSFADE_TICKS + 1)
+    rate_hz, state = recording.sample_rate_hz, np.zeros(CROSSFADE + 1)
     state[LENGTH] = len(readings)
 
     def prepare(rows: FloatArray, repeats: bool, wait: int) -> None:
@@ -107,9 +109,9 @@ def make_replay_rig(path: Path) -> CompiledRig:
             min(round(CROSSFADE_S * rate_hz), stretch_rows - 1, len(readings) - stretch_rows) if repeats else 0
         )
         # The cross-fade needs the rows before the stretch, where the end of the loop must have been played, too.
-        lead_in = commands[:stretch_rows][stretch_rows - crossfade_rows :]
-        first_row = crossfade_rows + _find_nearest(excitation, np.concatenate([lead_in, commands[:stretch_rows]]))
-        state[[TICK, FIRST, LENGTH, REPEATS, CROSSFADE_TICKS]] = -wait, first_row, stretch_rows, repeats, crossfade_rows
+        preceding = commands[:stretch_rows][stretch_rows - crossfade_rows :]
+        first_row = crossfade_rows + _find_stretch(excitation, np.concatenate([preceding, commands[:stretch_rows]]))
+        state[[TICK, FIRST_ROW, LENGTH, REPEATS, CROSSFADE]] = -wait, first_row, stretch_rows, repeats, crossfade_rows
 
     return CompiledRig(
         info=DeviceInfo(
@@ -130,9 +132,9 @@ def make_replay_rig(path: Path) -> CompiledRig:
     )
 
 
-def _find_nearest(excitation: FloatArray, pattern: FloatArray) -> int:
-    """Index in the excitation (N, 3), N, of the stretch with the smallest sum of squared differences from the pattern
-    (n, 3), n <= N; by cross-correlation with the fast Fourier transform."""
+def _find_stretch(excitation: FloatArray, pattern: FloatArray) -> int:
+    """Find the first row in the excitation (N, 3), N, of the stretch with the smallest sum of squared differences from
+    the pattern (n, 3), n <= N; by cross-correlation with the fast Fourier transform."""
     candidate_count = len(excitation) - len(pattern) + 1
     fft_length = len(excitation) + len(pattern)
     spectrum = np.fft.rfft(excitation, fft_length, axis=0) * np.fft.rfft(pattern, fft_length, axis=0).conj()
@@ -142,8 +144,8 @@ def _find_nearest(excitation: FloatArray, pattern: FloatArray) -> int:
 
 
 def _collect_readings(recording: Recording, path: Path) -> FloatArray:
-    """Recorded readings (n, READING_SIZE). Clipping of the sensor is not recorded, and is 0. Raises `DeviceError` for a
-    recording without a position in m or an acceleration in m/s², three channels each."""
+    """Collect the recorded readings (n, READING_SIZE). Clipping of the sensor is not recorded, and is 0. Raises
+    `DeviceError` for a recording without a position in m or an acceleration in m/s², three channels each."""
     position, response = recording.position, recording.response
     if position is None or position.samples.shape[1] != 3 or set(position.units) != {"m"}:
         raise _make_replay_error(f"{path.name} has no position of a handle, three channels in metres.")
@@ -158,7 +160,7 @@ def _collect_readings(recording: Recording, path: Path) -> FloatArray:
 
 
 def _estimate_noise_mps2(acceleration: FloatArray) -> float:
-    """Half width (m/s²) of a uniform noise with the sensor's standard deviation, which is sqrt(3) times that. The
+    """Estimate the half width (m/s²) of a uniform noise with the sensor's standard deviation: sqrt(3) times it. The
     deviation is 1/0.6745 of the median absolute third difference, which removes smooth motion, over sqrt(20), by which
     differencing scales white noise. acceleration: (n, 3); 0 for fewer than four samples."""
     residual = np.diff(acceleration, n=3, axis=0) / np.sqrt(20.0)
@@ -166,7 +168,7 @@ def _estimate_noise_mps2(acceleration: FloatArray) -> float:
 
 
 def _select_excitation(recording: Recording, path: Path) -> FloatArray:
-    """The recorded excitation (n, 3), N; the command where none was recorded. Missing samples count as 0. Raises
+    """Select the recorded excitation (n, 3), N; the command where none was recorded. Missing samples count as 0. Raises
     `DeviceError` for other units or numbers of channels."""
     excitation: Signal = recording.command if recording.excitation is None else recording.excitation
     if excitation.samples.shape[1] != 3 or set(excitation.units) != {"N"}:
@@ -175,7 +177,7 @@ def _select_excitation(recording: Recording, path: Path) -> FloatArray:
 
 
 def _make_replay_error(reason: str) -> DeviceError:
-    """Error for a file that cannot be replayed. reason: a sentence."""
+    """Make the error for a file that cannot be replayed. reason: a sentence."""
     return DeviceError(
         "This cannot be replayed", reason, f"Give a recording of `hapteq record`, as --device {REPLAY}FILE.h5."
     )

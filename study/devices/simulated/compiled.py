@@ -1,7 +1,8 @@
 """Compiled entry points of the simulated device. Their machine code is kept on disk: only a first run compiles.
 
 numba checks only the file of an entry point for changes, but most of the mechanism is in other files of this folder.
-Each entry point therefore encloses the fingerprint of all of them (`study.devices.governor.compiling`).
+Each entry point therefore captures the fingerprint of all of them (`study.devices.governor.compiling`). Used by
+`omega3` (`sense`, `advance`) and by `packing` and `simulated_linkage` (`solve_pose`).
 """
 
 from pathlib import Path
@@ -23,23 +24,26 @@ _RANDOM_STATE = types.uint64[::1]
 """numba's types of the arguments: vectors and matrices of floats, and the state of the random generator."""
 
 
-def _compile_entry_points(sources: int) -> tuple[Any, Any, Any]:
-    """Compile `sense`, `advance` and `solve_pose`. sources: fingerprint, enclosed so that a change of any source
-    compiles anew."""
+def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any, Any]:
+    """Compile `sense`, `advance` and `solve_pose`. sources_fingerprint: captured so that a change of a source
+    invalidates numba's cache."""
 
     @njit(types.void(_VECTOR, _VECTOR, _RANDOM_STATE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[uint64], reading: FloatArray) -> None:
-        _ = sources
+        """Fill the reading of a tick; see `sensors.read_sensors`."""
+        _ = sources_fingerprint
         read_sensors(state, parameters, noise, reading)
 
     @njit(types.void(_VECTOR, _VECTOR, _VECTOR), cache=True, nogil=True)
     def advance(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
-        _ = sources
+        """Integrate the device over a tick; see `dynamics.integrate_tick`."""
+        _ = sources_fingerprint
         integrate_tick(state, parameters, force_n)
 
     @njit(types.void(_VECTOR, _VECTOR, _VECTOR, _MATRIX), cache=True, nogil=True)
     def solve_pose(parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray) -> None:
-        _ = sources
+        """Fill joint angles and inverse Jacobian at a position; see `linkage.solve_inverse_kinematics`."""
+        _ = sources_fingerprint
         solve_inverse_kinematics(parameters, position, angles, jacobian)
 
     return sense, advance, solve_pose

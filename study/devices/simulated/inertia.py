@@ -14,8 +14,8 @@ MASS_MATRIX_SIZE = 3 + MOUNT_MODES
 
 
 @inlined
-def fill_mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatArray) -> None:
-    """Fill the mass matrix `mass` (5, 5), kg, of the velocities (v, r), from the kinetic energy T:
+def fill_mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass_matrix: FloatArray) -> None:
+    """Fill the mass matrix `mass_matrix` (5, 5), kg, of the velocities (v, r), from the kinetic energy T:
     2 T = (v + N r)^T S (v + N r) + I |J v|² + r^T M r.
     v: handle against the base; r: rocking speeds, N their directions; S: mass that moves with the handle; I: inertia of
     an arm; J: jacobian (3, 3), rad/m; M: modal masses of the base."""
@@ -26,25 +26,25 @@ def fill_mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatAr
             jacobian_product = 0.0
             for leg in range(3):
                 jacobian_product += jacobian[leg, row] * jacobian[leg, column]
-            mass[row, column] = platform_mass[row, column] + parameters[ARM_INERTIA] * jacobian_product
+            mass_matrix[row, column] = platform_mass[row, column] + parameters[ARM_INERTIA] * jacobian_product
         for mode in range(MOUNT_MODES):
             coupling_mass = 0.0
             for axis in range(3):
                 coupling_mass += platform_mass[row, axis] * directions[mode, axis]
-            mass[row, 3 + mode] = coupling_mass
-            mass[3 + mode, row] = coupling_mass
+            mass_matrix[row, 3 + mode] = coupling_mass
+            mass_matrix[3 + mode, row] = coupling_mass
     for mode in range(MOUNT_MODES):
         for second_mode in range(MOUNT_MODES):
             coupling_mass = 0.0
             for axis in range(3):
-                coupling_mass += directions[mode, axis] * mass[axis, 3 + second_mode]
-            mass[3 + mode, 3 + second_mode] = coupling_mass
-        mass[3 + mode, 3 + mode] += parameters[MOUNT_MASS + mode]
+                coupling_mass += directions[mode, axis] * mass_matrix[axis, 3 + second_mode]
+            mass_matrix[3 + mode, 3 + second_mode] = coupling_mass
+        mass_matrix[3 + mode, 3 + mode] += parameters[MOUNT_MASS + mode]
 
 
 @inlined
 def invert_in_place(matrix: FloatArray) -> None:
-    """Invert a positive definite matrix (5, 5) by Gauss-Jordan elimination, which then needs no pivoting."""
+    """Invert a positive definite matrix (5, 5) in place by Gauss-Jordan elimination, which then needs no pivoting."""
     for pivot in range(MASS_MATRIX_SIZE):
         inverse_pivot = 1.0 / matrix[pivot, pivot]
         matrix[pivot, pivot] = 1.0

@@ -25,8 +25,8 @@ from study.devices.simulated.layout import AZIMUTH, FOREARM_LENGTH, PLATFORM_DEP
 
 @inlined
 def solve_leg(parameters: FloatArray, position: FloatArray, leg: int, angle_gradient: FloatArray) -> float:
-    """Joint angle of one leg (0 to 2), rad, with the elbow outwards; fills `angle_gradient` (3,), d angle / d position,
-    rad/m. parameters: as in `layout`; position: (3,), m.
+    """Compute the joint angle of one leg (0 to 2), rad, with the elbow outwards; fills `angle_gradient` (3,), d angle /
+    d position, rad/m. parameters: as in `layout`; position: (3,), m.
 
     Where the handle is out of reach, which the mechanical stops exclude, the cosine is clipped: the angle is that of an
     upper arm in line with the handle, and the gradient is singular.
@@ -37,14 +37,15 @@ def solve_leg(parameters: FloatArray, position: FloatArray, leg: int, angle_grad
     inward = position[1] * cosine + position[2] * sine - parameters[RADIUS_DIFFERENCE]
     lateral = position[2] * cosine - position[1] * sine
     reach = math.sqrt(inward * inward + depth * depth)
-    # Law of cosines for the angle between the upper arm and the line from its pivot to the handle, in the leg's plane.
-    cos_elbow = (reach * reach + lateral * lateral + upper_arm * upper_arm - forearm * forearm) / (
+    # Law of cosines for the offset angle between the upper arm and the line from its pivot to the handle, in the leg's
+    # plane.
+    cos_offset = (reach * reach + lateral * lateral + upper_arm * upper_arm - forearm * forearm) / (
         2.0 * upper_arm * reach
     )
-    cos_elbow = min(1.0, max(-1.0, cos_elbow))
-    sin_elbow = math.sqrt(1.0 - cos_elbow * cos_elbow)
-    cos_q = (inward * cos_elbow + depth * sin_elbow) / reach
-    sin_q = (depth * cos_elbow - inward * sin_elbow) / reach
+    cos_offset = min(1.0, max(-1.0, cos_offset))
+    sin_offset = math.sqrt(1.0 - cos_offset * cos_offset)
+    cos_q = (inward * cos_offset + depth * sin_offset) / reach
+    sin_q = (depth * cos_offset - inward * sin_offset) / reach
     radial = inward - upper_arm * cos_q
     axial = depth - upper_arm * sin_q
     # (p - e) . (dp - de/dq dq) = 0, from the forearm's constant length; lever = (p - e) . de/dq.
@@ -81,7 +82,8 @@ def solve_forward_kinematics(parameters: FloatArray, angles: FloatArray, positio
         second_side[axis] = elbows[2, axis] - elbows[0, axis]
     _cross(first_side, second_side, normal)
     g11, g12, g22 = _dot(first_side, first_side), _dot(first_side, second_side), _dot(second_side, second_side)
-    # Circumcentre of the elbows, from the first one in the basis of two sides; squared_area is |normal|^2.
+    # Circumcentre of the elbows, from the first one in the basis of two sides. g11, g12, g22: Gram matrix of the sides;
+    # squared_area is its determinant, |normal|^2.
     squared_area = g11 * g22 - g12 * g12
     first_share = 0.5 * g22 * (g11 - g12) / squared_area
     second_share = 0.5 * g11 * (g22 - g12) / squared_area
@@ -98,7 +100,7 @@ def solve_forward_kinematics(parameters: FloatArray, angles: FloatArray, positio
 
 @inlined
 def _dot(a: FloatArray, b: FloatArray) -> float:
-    """Scalar product of two vectors (3,)."""
+    """Compute the scalar product of two vectors (3,)."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 

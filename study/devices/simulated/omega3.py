@@ -1,6 +1,7 @@
 """Builds the simulated omega.3 as a rig, with packed parameters, state at rest and compiled functions.
 
-Its numbers are not those of the real device: see docs/simulated_omega3.md and `parameters`.
+Its numbers are not those of the real device: see docs/simulated_omega3.md and `parameters`. Called by
+`study.devices.rigs_by_name`; `simulated_linkage` uses the device's properties.
 """
 
 import math
@@ -28,33 +29,33 @@ def build_omega3(
     friction: bool = True,
     parameters: Omega3Parameters | None = None,
 ) -> CompiledRig:
-    """A device at rest at place_m, gravity compensated. seed: of the accelerometer's noise, any integer >= 0. hand:
-    whether a simulated hand holds the handle. friction: False sets the Coulomb friction of the drives to zero, to show
-    the effect of friction by comparison. parameters: those fitted to a calibration; None: the set of `parameters`.
+    """Build a device at rest at place_m (m), gravity compensated. seed: of the accelerometer's noise, any integer >= 0.
+    hand: whether a simulated hand holds the handle. friction: False sets the Coulomb friction of the drives to zero, to
+    show the effect of friction by comparison. parameters: those fitted to a calibration; None: the set of `parameters`.
 
     Raises ValueError where place_m is not closer to the origin than the end stop.
     """
     device_name = NAME if parameters is None else f"{NAME} as calibrated"
-    set_words = "parameter set 1" if parameters is None else "linkage and masses of a calibration"
+    parameter_source = "parameter set 1" if parameters is None else "linkage and masses of a calibration"
     parameters = parameters or Omega3Parameters()
     if not friction:
         parameters = replace(parameters, drives=replace(parameters.drives, friction_n_m=0.0))
     if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
         raise ValueError(f"place_m must be within {parameters.stops.radius_m} m of the centre, not {place_m}")
-    packed = pack_parameters(parameters, hand, place_m)
-    without_hand, with_hand = pack_parameters(parameters, False, place_m), packed.copy()
+    packed_parameters = pack_parameters(parameters, hand, place_m)
+    without_hand, with_hand = pack_parameters(parameters, False, place_m), packed_parameters.copy()
 
     def simulate_hand(on_handle: bool) -> None:
-        """Set only the parameters that the hand changes; others, which a test may have altered, stay."""
-        hand_cells = without_hand != with_hand
-        packed[hand_cells] = (with_hand if on_handle and hand else without_hand)[hand_cells]
+        """Set only the parameters that the hand changes; others, which a test may have altered, are kept."""
+        differs_with_hand = without_hand != with_hand
+        packed_parameters[differs_with_hand] = (with_hand if on_handle and hand else without_hand)[differs_with_hand]
 
-    details = f"{set_words}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}"
-    mass_kg = compute_effective_mass_kg(parameters, packed)
+    details = f"{parameter_source}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}"
+    mass_kg = compute_effective_mass_kg(parameters, packed_parameters)
     return CompiledRig(
         info=make_omega3_info(device_name if friction else f"{device_name} without friction", mass_kg, details),
-        state=make_rest_state(packed, place_m),
-        parameters=packed,
+        state=make_rest_state(packed_parameters, place_m),
+        parameters=packed_parameters,
         noise=np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64),
         sense=sense,
         advance=advance,
@@ -63,7 +64,7 @@ def build_omega3(
 
 
 def make_omega3_info(name: str, effective_mass_kg: float, details: str) -> DeviceInfo:
-    """`DeviceInfo` of a simulated omega.3: 1 kHz and `MAX_FORCE_N`, with the given mass (kg)."""
+    """Make the `DeviceInfo` of a simulated omega.3: 1 kHz and `MAX_FORCE_N`, with the given mass (kg)."""
     return DeviceInfo(
         name=name,
         simulated=True,

@@ -33,7 +33,8 @@ class Linkage:
 
 @dataclass(frozen=True, slots=True)
 class Masses:
-    """Lumped model (Codourey 1998): two thirds of a forearm at its elbow, one third at the platform."""
+    """Lumped model (A. Codourey, Int. J. Robotics Research 17 (1998), 1325): two thirds of a forearm at its elbow, one
+    third at the platform."""
 
     handle_kg: float = 0.128
     """Platform and handle: with the forearms' share the 0.148 kg of CHAI3D-based configurations of the omega.3."""

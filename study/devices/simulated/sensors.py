@@ -2,7 +2,7 @@
 
 The noise comes from a generator with a 64-bit state (SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast splittable
 pseudorandom number generators", OOPSLA 2014), turned into normal numbers by Box and Muller's method. Its state is part
-of the rig, so that a recording depends on the seed alone.
+of the rig, so that a recording depends on the seed alone. Compiled into `compiled.sense`.
 """
 
 import math
@@ -26,53 +26,56 @@ from study.devices.simulated.layout import (
 from study.devices.simulated.linkage import solve_forward_kinematics
 from study.devices.simulated.parameters import GRAVITY_MPS2
 
-_STEP = np.uint64(0x9E3779B97F4A7C15)
+_STATE_INCREMENT = np.uint64(0x9E3779B97F4A7C15)
 """Increment of the state in SplitMix64; below, the factors and shifts of its output function (the cited paper)."""
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
+_FIRST_FACTOR = np.uint64(0xBF58476D1CE4E5B9)
+_SECOND_FACTOR = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
-_ULP = 2.0**-53
+_UNIFORM_SPACING = 2.0**-53
 """Spacing of the uniform numbers: 53 random bits."""
 
 
 @inlined
 def draw_uniform(noise: npt.NDArray[np.uint64]) -> Any:
-    """Draw a uniform number in (0, 1]. Advances noise[0]."""
-    noise[0] += _STEP
-    word = noise[0]
-    word = (word ^ (word >> _S30)) * _MIX_1
-    word = (word ^ (word >> _S27)) * _MIX_2
-    word = word ^ (word >> _S31)
-    return (np.float64(word >> _S11) + 1.0) * _ULP
+    """Draw a uniform number in (0, 1]. Advances noise[0], the state of the generator."""
+    noise[0] += _STATE_INCREMENT
+    output_bits = noise[0]
+    output_bits = (output_bits ^ (output_bits >> _S30)) * _FIRST_FACTOR
+    output_bits = (output_bits ^ (output_bits >> _S27)) * _SECOND_FACTOR
+    output_bits = output_bits ^ (output_bits >> _S31)
+    return (np.float64(output_bits >> _S11) + 1.0) * _UNIFORM_SPACING
 
 
 @inlined
 def draw_three_normals(noise: npt.NDArray[np.uint64], normals: FloatArray) -> None:
-    """Fill out (3,) with independent standard normal numbers (Box and Muller)."""
+    """Fill normals (3,) with independent standard normal numbers (Box and Muller)."""
     radius = math.sqrt(-2.0 * math.log(draw_uniform(noise)))
-    turn = 2.0 * math.pi * draw_uniform(noise)
-    normals[0] = radius * math.cos(turn)
-    normals[1] = radius * math.sin(turn)
+    angle = 2.0 * math.pi * draw_uniform(noise)
+    normals[0] = radius * math.cos(angle)
+    normals[1] = radius * math.sin(angle)
     radius = math.sqrt(-2.0 * math.log(draw_uniform(noise)))
     normals[2] = radius * math.cos(2.0 * math.pi * draw_uniform(noise))
 
 
-_POSITION, _ACCELERATION, _TRUE = rig.POSITION.start, rig.ACCELERATION.start, rig.TRUE_ACCELERATION.start
-"""Index of the first number of each part of a reading."""
+_POSITION, _ACCELERATION, _TRUE_ACCELERATION = rig.POSITION.start, rig.ACCELERATION.start, rig.TRUE_ACCELERATION.start
+"""Index of the first number of position, acceleration and true acceleration in a reading."""
 
 
 @inlined
 def read_sensors(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
-    """Fill reading (READING_SIZE,), laid out as in `study.devices.rig`. Advances `noise`; `state` stays. The position
-    is the forward kinematics of the motor angles, rounded to whole counts, so it does not show the cables' stretch."""
+    """Fill reading (READING_SIZE,), laid out as in `study.devices.rig`. Advances `noise`; `state` is not changed. The
+    position is the forward kinematics of the motor angles, rounded to whole counts, so it does not show the cables'
+    stretch."""
     angles = np.empty(3)
-    count = parameters[ENCODER_STEP]
+    count_rad = parameters[ENCODER_STEP]
     for drive in range(3):
-        angles[drive] = count * math.floor(state[MOTOR_ANGLE + drive] / count + 0.5)
+        angles[drive] = count_rad * math.floor(state[MOTOR_ANGLE + drive] / count_rad + 0.5)
     solve_forward_kinematics(parameters, angles, reading[_POSITION:_ACCELERATION])
-    reading[rig.SENSOR_CLIPPED] = _read_accelerometer(state, parameters, noise, reading[_ACCELERATION:_TRUE])
+    reading[rig.SENSOR_CLIPPED] = _read_accelerometer(
+        state, parameters, noise, reading[_ACCELERATION:_TRUE_ACCELERATION]
+    )
     for axis in range(3):
-        reading[_TRUE + axis] = state[TRUE_ACCELERATION + axis]
+        reading[_TRUE_ACCELERATION + axis] = state[TRUE_ACCELERATION + axis]
 
 
 @inlined
@@ -82,16 +85,16 @@ def _read_accelerometer(
     """Fill channels (3,), m/s². The range limits the specific force, which contains gravity; the reading at rest is
     then subtracted. Returns 1 if a channel was at its limit, else 0."""
     draw_three_normals(noise, channels)
-    limit = parameters[SENSOR_RANGE]
+    range_mps2 = parameters[SENSOR_RANGE]
     clipped = 0.0
     for axis in range(3):
-        row = SENSOR_MATRIX + 3 * axis
-        gravity_mps2 = parameters[row + 2] * GRAVITY_MPS2
-        force = gravity_mps2 + parameters[SENSOR_NOISE + axis] * channels[axis]
+        matrix_row = SENSOR_MATRIX + 3 * axis
+        gravity_mps2 = parameters[matrix_row + 2] * GRAVITY_MPS2
+        specific_force = gravity_mps2 + parameters[SENSOR_NOISE + axis] * channels[axis]
         for column in range(3):
-            force += parameters[row + column] * state[FILTERED_ACCELERATION + column]
-        if abs(force) >= limit:
-            force = math.copysign(limit, force)
+            specific_force += parameters[matrix_row + column] * state[FILTERED_ACCELERATION + column]
+        if abs(specific_force) >= range_mps2:
+            specific_force = math.copysign(range_mps2, specific_force)
             clipped = 1.0
-        channels[axis] = force - gravity_mps2
+        channels[axis] = specific_force - gravity_mps2
     return clipped

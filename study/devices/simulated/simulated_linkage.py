@@ -23,8 +23,8 @@ from study.devices.simulated.packing import compute_effective_mass_kg, compute_i
 from study.devices.simulated.parameters import GRAVITY_MPS2, Linkage, Masses, Omega3Parameters
 
 MAX_MISFIT = 0.1
-"""Largest accepted relative misfit of Jacobian or inertia; above it, the simulated device would not represent the
-calibrated device."""
+"""Largest accepted relative misfit of Jacobian or inertia. Chosen: above it, the simulated device would not represent
+the calibrated device."""
 MIN_MOVING_MASS_KG = 0.07
 """Smallest mass that moves with the handle (kg): the handle modes, which are part of it, have 54 g."""
 
@@ -34,25 +34,29 @@ class SimulatedLinkage:
 
     def __init__(self, parameters: Omega3Parameters, info: DeviceInfo) -> None:
         self.info = info
-        self._packed = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
+        self._packed_parameters = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
     def compute_reading_at(self, position_m: FloatArray) -> LinkageReading | None:
-        """Joint angles (rad), Jacobian (m/rad), inertia matrix (kg) and gravity force (N) at a position of the handle
-        (3,), m; None at or beyond the end stop."""
+        """Compute joint angles (rad), Jacobian (m/rad), inertia matrix (kg) and gravity force (N) at a position of the
+        handle (3,), m; None at or beyond the end stop."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
-        angles, rates = _compute_pose(self._packed, position_m)
+        angles, inverse_jacobian = _compute_pose(self._packed_parameters, position_m)
         moving_mass_kg = self._masses.handle_kg + self._masses.forearm_kg
-        arm_inertia = self._packed[layout.ARM_INERTIA] + self._packed[layout.DRIVE_INERTIA]
-        inertia = moving_mass_kg * np.eye(3) + arm_inertia * rates.T @ rates
+        arm_inertia = self._packed_parameters[layout.ARM_INERTIA] + self._packed_parameters[layout.DRIVE_INERTIA]
+        inertia = moving_mass_kg * np.eye(3) + arm_inertia * inverse_jacobian.T @ inverse_jacobian
         gravity_force_n = np.array([0.0, 0.0, GRAVITY_MPS2 * moving_mass_kg])
-        jacobian: FloatArray = np.asarray(np.linalg.inv(rates), dtype=np.float64)
+        jacobian: FloatArray = np.asarray(np.linalg.inv(inverse_jacobian), dtype=np.float64)
         return LinkageReading(np.array(position_m), angles, jacobian, inertia, gravity_force_n)
 
     def compute_angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """Joint angles (3,), rad, at a position of the handle (3,), m; None at or beyond the end stop."""
-        return _compute_pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
+        """Compute the joint angles (3,), rad, at a position of the handle (3,), m; None at or beyond the end stop."""
+        return (
+            _compute_pose(self._packed_parameters, position_m)[0]
+            if float(np.linalg.norm(position_m)) < self._reach_m
+            else None
+        )
 
     def check_frame(self) -> None:
         """Nothing to check: positions and readings of the simulated device have the same axes."""
@@ -70,7 +74,7 @@ class FittedLinkage:
 
 
 def make_simulated_linkage() -> SimulatedLinkage:
-    """Linkage of the simulated omega.3 with its default parameters."""
+    """Make the linkage of the simulated omega.3 with its default parameters."""
     parameters = Omega3Parameters()
     mass_kg = compute_effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
     return SimulatedLinkage(parameters, make_omega3_info(NAME, mass_kg, "parameter set 1, without a hand"))
@@ -79,11 +83,12 @@ def make_simulated_linkage() -> SimulatedLinkage:
 def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
     """Fit the simulated device to a calibration. Raises ValueError where Jacobian or inertia differ by more than
     `MAX_MISFIT`, or a fitted mass is too small."""
-    rates = np.linalg.inv(calibration.jacobian)
-    rates = rates * np.sign(rates[:, :, :1])
+    inverse_jacobians = np.linalg.inv(calibration.jacobian)
+    # The sign of each joint angle is chosen as in the simulated device, where it increases with x.
+    inverse_jacobians = inverse_jacobians * np.sign(inverse_jacobians[:, :, :1])
     centre_index = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
     azimuths = estimate_arm_azimuths(calibration.jacobian[centre_index])
-    linkage, jacobian_misfit = _fit_lengths(calibration.position_m, rates, azimuths)
+    linkage, jacobian_misfit = _fit_lengths(calibration.position_m, inverse_jacobians, azimuths)
     parameters = replace(Omega3Parameters(), linkage=linkage)
     masses, inertia_misfit = _fit_masses(parameters, calibration)
     for name, misfit in (("Jacobian", jacobian_misfit), ("inertia", inertia_misfit)):
@@ -92,33 +97,42 @@ def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
     return FittedLinkage(replace(parameters, masses=masses), jacobian_misfit, inertia_misfit)
 
 
-def _compute_pose(packed: FloatArray, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Joint angles (3,), rad, and joint speeds per handle velocity (3, 3), rad/m, at a position (3,), m. packed:
-    parameters as in `layout`."""
-    angles, rates = np.empty(3), np.empty((3, 3))
-    solve_pose(packed, np.array(position_m, dtype=float), angles, rates)
-    return angles, rates
+def _compute_pose(packed_parameters: FloatArray, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Compute joint angles (3,), rad, and inverse Jacobian (3, 3), rad/m, at a position (3,), m. packed_parameters:
+    laid out as in `layout`."""
+    angles, inverse_jacobian = np.empty(3), np.empty((3, 3))
+    solve_pose(packed_parameters, np.array(position_m, dtype=float), angles, inverse_jacobian)
+    return angles, inverse_jacobian
 
 
-def _compute_rates(parameters: Omega3Parameters, positions: FloatArray) -> FloatArray:
-    """(n, 3, 3), rad/m: joint speeds per handle velocity at the positions (n, 3), m."""
-    packed = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
-    return np.stack([_compute_pose(packed, position)[1] for position in positions])
+def _compute_inverse_jacobians(parameters: Omega3Parameters, positions_m: FloatArray) -> FloatArray:
+    """Compute the inverse Jacobians (n, 3, 3), rad/m, at the positions (n, 3), m."""
+    packed_parameters = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
+    return np.stack([_compute_pose(packed_parameters, position)[1] for position in positions_m])
 
 
-def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray) -> tuple[Linkage, float]:
-    """Fit the linkage by least squares. Returns it and its misfit, see `FittedLinkage`. positions: (n, 3), m; rates:
-    (n, 3, 3), rad/m; azimuths: (3,), rad. The unknowns are the logarithms of four lengths over their start values,
-    which are scaled to the size of the device, and a turn of all azimuths."""
-    nominal = Linkage()
-    scale = float(np.abs(_compute_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
-    start_lengths_m = scale * np.array(
-        [nominal.upper_arm_m, nominal.forearm_m, nominal.radius_m, compute_isotropic_depth_m(nominal)]
+def _fit_lengths(positions_m: FloatArray, inverse_jacobians: FloatArray, azimuths: FloatArray) -> tuple[Linkage, float]:
+    """Fit the linkage by least squares. Returns it and its misfit, see `FittedLinkage`. positions_m: (n, 3);
+    inverse_jacobians: (n, 3, 3), rad/m; azimuths: (3,), rad. The unknowns are the logarithms of four lengths over their
+    start values, which are scaled to the size of the device, and a turn of all azimuths, each within ±1.5 (lengths by a
+    factor of 4.5)."""
+    nominal_linkage = Linkage()
+    size_ratio = float(
+        np.abs(_compute_inverse_jacobians(Omega3Parameters(), positions_m)).max() / np.abs(inverse_jacobians).max()
     )
-    largest_rate = float(np.abs(rates).max())
+    start_lengths_m = size_ratio * np.array(
+        [
+            nominal_linkage.upper_arm_m,
+            nominal_linkage.forearm_m,
+            nominal_linkage.radius_m,
+            compute_isotropic_depth_m(nominal_linkage),
+        ]
+    )
+    largest_element = float(np.abs(inverse_jacobians).max())
 
     def make_linkage(unknowns: FloatArray) -> Linkage:
-        """Linkage of the unknowns (5,): four logarithms of length ratios, and the turn of the azimuths (rad)."""
+        """Make the linkage of the unknowns (5,): four logarithms of length ratios, and the turn of the azimuths
+        (rad)."""
         azimuths_deg = np.degrees(azimuths + unknowns[4])
         upper_arm, forearm, radius, depth = (float(length) for length in start_lengths_m * np.exp(unknowns[:4]))
         return Linkage(
@@ -126,23 +140,25 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
         )
 
     def compute_misfits(unknowns: FloatArray) -> FloatArray:
-        """Residuals (9 n,) of the inverse Jacobian, relative to its largest element."""
-        fitted_rates = _compute_rates(replace(Omega3Parameters(), linkage=make_linkage(unknowns)), positions)
-        return np.ravel(fitted_rates - rates) / largest_rate
+        """Compute the residuals (9 n,) of the inverse Jacobians, relative to the largest element."""
+        fitted_inverse_jacobians = _compute_inverse_jacobians(
+            replace(Omega3Parameters(), linkage=make_linkage(unknowns)), positions_m
+        )
+        return np.ravel(fitted_inverse_jacobians - inverse_jacobians) / largest_element
 
-    solution = least_squares(compute_misfits, np.zeros(5), bounds=(-1.5, 1.5))
-    return make_linkage(solution.x), float(np.abs(solution.fun).max())
+    least_squares_result = least_squares(compute_misfits, np.zeros(5), bounds=(-1.5, 1.5))
+    return make_linkage(least_squares_result.x), float(np.abs(least_squares_result.fun).max())
 
 
 def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -> tuple[Masses, float]:
-    """Fit the masses by linear least squares to the calibration's inertia matrices, m I + i J^T J with J the joint
-    speeds per handle velocity (rad/m): m (kg) moves with the handle, and i (kg m²) turns with each arm. Returns the
+    """Fit the masses by linear least squares to the calibration's inertia matrices, m I + i J^T J with J the inverse
+    Jacobian (rad/m): m (kg) moves with the handle, and i (kg m²) turns with each arm. Returns the
     misfit too, see `FittedLinkage`. Raises ValueError for masses that are too small."""
-    nominal, arm_m = parameters.masses, parameters.linkage.upper_arm_m
-    rates = _compute_rates(parameters, calibration.position_m)
-    rate_products = np.einsum("nki,nkj->nij", rates, rates)
+    nominal_masses, upper_arm_m = parameters.masses, parameters.linkage.upper_arm_m
+    inverse_jacobians = _compute_inverse_jacobians(parameters, calibration.position_m)
+    jacobian_products = np.einsum("nki,nkj->nij", inverse_jacobians, inverse_jacobians)
     design_matrix = np.stack(
-        [np.ravel(np.broadcast_to(np.eye(3), rate_products.shape)), np.ravel(rate_products)], axis=1
+        [np.ravel(np.broadcast_to(np.eye(3), jacobian_products.shape)), np.ravel(jacobian_products)], axis=1
     )
     inertia_kg = np.ravel(calibration.inertia_kg)
     (moving_mass_kg, inertia_kg_m2), *_ = np.linalg.lstsq(design_matrix, inertia_kg, rcond=None)
@@ -155,15 +171,15 @@ def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -
         np.abs(design_matrix @ np.array([moving_mass_kg, inertia_kg_m2]) - inertia_kg).max() / np.abs(inertia_kg).max()
     )
     # The inertia does not show how i is divided between arms and motors: the ratio is that of the nominal device.
-    forearm_kg_m2 = 2 / 3 * nominal.forearm_kg * arm_m**2
-    inertia_ratio = inertia_kg_m2 / (nominal.upper_arm_kg_m2 + forearm_kg_m2 + nominal.drive_kg_m2)
-    arms_kg_m2 = inertia_ratio * (nominal.upper_arm_kg_m2 + forearm_kg_m2) - forearm_kg_m2
+    forearm_kg_m2 = 2 / 3 * nominal_masses.forearm_kg * upper_arm_m**2
+    inertia_ratio = inertia_kg_m2 / (nominal_masses.upper_arm_kg_m2 + forearm_kg_m2 + nominal_masses.drive_kg_m2)
+    arms_kg_m2 = inertia_ratio * (nominal_masses.upper_arm_kg_m2 + forearm_kg_m2) - forearm_kg_m2
     if arms_kg_m2 <= 0:
-        raise ValueError(f"its arms would weigh less than forearms of {1000 * nominal.forearm_kg:.0f} g alone")
+        raise ValueError(f"its arms would weigh less than forearms of {1000 * nominal_masses.forearm_kg:.0f} g alone")
     masses = replace(
-        nominal,
-        handle_kg=float(moving_mass_kg) - nominal.forearm_kg,
+        nominal_masses,
+        handle_kg=float(moving_mass_kg) - nominal_masses.forearm_kg,
         upper_arm_kg_m2=float(arms_kg_m2),
-        drive_kg_m2=float(inertia_ratio * nominal.drive_kg_m2),
+        drive_kg_m2=float(inertia_ratio * nominal_masses.drive_kg_m2),
     )
     return masses, misfit

@@ -1,4 +1,4 @@
-"""Runs the diagnosis of a bank's unanswered cases in worker processes (`answer_cases`), each for many cases. Called by
+"""Run the diagnosis of a bank's unanswered cases in worker processes (`answer_cases`), each for many cases. Called by
 `prove`, `follow_up`, `run_controls`, `laws.prove_laws` and, for real recordings, `study.evaluation.real.inject_real`.
 
 The processes run on this computer, or on the workers of an executor. A case is tried `MAX_ATTEMPTS` times, with a new
@@ -30,15 +30,16 @@ from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import run_tasks
 
 CASE_TIMEOUT_S = 1200.0
-"""Longest wait for one case (s); a case takes seconds to a minute."""
+"""Longest wait for one case (s). Chosen: twenty times the usual limit of the search (`seal_cases.SEARCH_CPU_S`)."""
 POLL_INTERVAL_S = 0.5
-"""Interval at which the calling thread checks that the threads of the processes still run (s)."""
+"""Interval at which the calling thread checks that the threads of the processes still run (s). Chosen."""
 MAX_ATTEMPTS = 2
-"""Attempts per case: a process may have died because it was killed from outside."""
+"""Attempts per case and run; the second, because a process may have been killed from outside. Chosen."""
 
 
-class Engine:
-    """One worker process, started on the first request and restarted after it died."""
+class DiagnosisProcess:
+    """A worker process that diagnoses cases one after another (`answer_cases`). It is started on the first request and
+    restarted after it died."""
 
     def __init__(self, folder: ProofFolder) -> None:
         self._folder = folder
@@ -46,7 +47,7 @@ class Engine:
         self._lock = threading.Lock()
         self.ended = False
 
-    def request_answer(self, name: str) -> bool:
+    def request_answer(self, case_name: str) -> bool:
         """Send one case name and wait until the process has written its answer; False if the process died, timed out or
         was ended."""
         with self._lock:
@@ -56,7 +57,7 @@ class Engine:
                 self.close()
                 self._process = self._start_process()
             process = self._process
-        if answered := _send_case_name(process, name):
+        if answered := _send_case_name(process, case_name):
             return answered
         # A process that is about to end still seems to run, and the next request would be lost with it.
         process.kill()
@@ -72,7 +73,7 @@ class Engine:
                 self._process.wait()
 
     def close(self) -> None:
-        """Close the pipes of the process."""
+        """Close the pipes of the process; nothing if none was started."""
         for pipe in () if self._process is None else (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 with suppress(OSError):
@@ -90,7 +91,7 @@ class Engine:
             )
 
 
-def _send_case_name(process: "subprocess.Popen[str]", name: str) -> bool:
+def _send_case_name(process: "subprocess.Popen[str]", case_name: str) -> bool:
     """Send a case name and wait until the process repeats it, when its answer is written. Kills the process after
     `CASE_TIMEOUT_S`, which ends the wait. Returns whether the name came back."""
     timeout = threading.Timer(CASE_TIMEOUT_S, process.kill)
@@ -99,9 +100,9 @@ def _send_case_name(process: "subprocess.Popen[str]", name: str) -> bool:
     try:
         if process.stdin is None or process.stdout is None:
             return False
-        process.stdin.write(f"{name}\n")
+        process.stdin.write(f"{case_name}\n")
         process.stdin.flush()
-        return process.stdout.readline().strip() == name
+        return process.stdout.readline().strip() == case_name
     except OSError:
         return False
     finally:
@@ -114,125 +115,135 @@ Workers = int | Executor
 
 def diagnose_and_count(
     folder: ProofFolder,
-    names: Sequence[str],
+    case_names: Sequence[str],
     workers: Workers,
     on_done: Callable[[int, int], None],
     *,
     keep: bool,
     diagnosable: Sequence[str] | None = None,
 ) -> None:
-    """Diagnose the cases `names` that have no answer, calling `on_done(answered, total)`. keep: do not delete the
-    recordings of cases that are answered now. diagnosable: those of `names` that can be diagnosed; None = all. Raises
-    StudyError as `diagnose_cases`."""
-    answered_count = sum(is_answered(folder.open / name) for name in names)
-    on_done(answered_count, len(names))
+    """Diagnose the cases `case_names` that have no answer, calling `on_done(answered, total)`. keep: do not delete the
+    recordings of cases that are answered now. diagnosable: those of `case_names` that can be diagnosed; None = all.
+    Raises StudyError where `diagnose_cases` does."""
+    answered_count = sum(is_answered(folder.open / case_name) for case_name in case_names)
+    on_done(answered_count, len(case_names))
 
-    def on_answered(name: str) -> None:
+    def on_answered(case_name: str) -> None:
         """Count a case that was answered now, and delete its recordings unless `keep`."""
         nonlocal answered_count
         answered_count += 1
         if not keep:
-            delete_answered_recordings(folder.open / name)
-        on_done(answered_count, len(names))
+            delete_answered_recordings(folder.open / case_name)
+        on_done(answered_count, len(case_names))
 
-    diagnose_cases(folder, names if diagnosable is None else diagnosable, workers, on_answered)
+    diagnose_cases(folder, case_names if diagnosable is None else diagnosable, workers, on_answered)
 
 
 def diagnose_cases(
-    folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]
+    folder: ProofFolder, case_names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]
 ) -> None:
-    """Diagnose the cases `names` that have no answer yet; blocks until done. `on_answered(name)` is called in this
-    thread after each case. Raises StudyError if all worker processes ended early."""
-    pending, answered = SimpleQueue[str](), SimpleQueue[str]()
-    unanswered = [name for name in names if not is_answered(folder.open / name)]
+    """Diagnose the cases `case_names` that have no answer yet; blocks until done. `on_answered(case name)` is called in
+    this thread after each case, also after a failed one. Raises StudyError if all worker threads ended early."""
+    pending_names, answered_names = SimpleQueue[str](), SimpleQueue[str]()
+    unanswered_names = [case_name for case_name in case_names if not is_answered(folder.open / case_name)]
     if isinstance(workers, Executor):
-        _diagnose_on_executor(folder, unanswered, workers, on_answered)
+        _diagnose_on_executor(folder, unanswered_names, workers, on_answered)
         return
-    for name in unanswered:
-        pending.put(name)
-    with _start_engines(folder, min(workers, len(unanswered)), pending, answered) as threads:
-        missing_count = len(unanswered)
+    for case_name in unanswered_names:
+        pending_names.put(case_name)
+    with _start_diagnosis_processes(
+        folder, min(workers, len(unanswered_names)), pending_names, answered_names
+    ) as threads:
+        missing_count = len(unanswered_names)
         while missing_count:
             try:
-                name = answered.get(timeout=POLL_INTERVAL_S)
+                case_name = answered_names.get(timeout=POLL_INTERVAL_S)
             except Empty:
-                if not any(thread.is_alive() for thread in threads) and answered.empty():
+                if not any(thread.is_alive() for thread in threads) and answered_names.empty():
                     raise _make_processes_ended_error(folder, missing_count) from None
                 continue
             missing_count -= 1
-            on_answered(name)
+            on_answered(case_name)
 
 
 def _diagnose_on_executor(
-    folder: ProofFolder, names: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
+    folder: ProofFolder, case_names: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
 ) -> None:
-    """Diagnose the cases on an executor, and write the answers that it returns."""
-    cases = ((name, (name, read_files(folder.open / name))) for name in names)
-    for name, document in run_tasks(executor, answer_sent_case, cases):
-        if document is None:
-            _write_failure(folder.open / name)
+    """Diagnose the cases on an executor, and write the answers that it returns; a failure where it returns none."""
+    cases = ((case_name, (case_name, read_files(folder.open / case_name))) for case_name in case_names)
+    for case_name, answer_text in run_tasks(executor, diagnose_sent_case, cases):
+        if answer_text is None:
+            _write_failed_answer(folder.open / case_name)
         else:
-            write_text(folder.open / name / ANSWER_FILE, document, overwrite=True)
-        on_answered(name)
+            write_text(folder.open / case_name / ANSWER_FILE, answer_text, overwrite=True)
+        on_answered(case_name)
 
 
-def answer_sent_case(name: str, case: FileContents) -> str | None:
+def diagnose_sent_case(case_name: str, case_files: FileContents) -> str | None:
     """Diagnose a case on a worker of an executor. Returns the text of answer.json, from a process in a temporary folder
     with nothing but the files of the case. None if the process died or timed out at every attempt."""
     with TemporaryDirectory() as temporary:
         folder = ProofFolder(Path(temporary))
-        write_files(folder.open / name, case)
-        engine = Engine(folder)
+        write_files(folder.open / case_name, case_files)
+        diagnosis_process = DiagnosisProcess(folder)
         try:
-            is_done = any(engine.request_answer(name) for _ in range(MAX_ATTEMPTS))
+            is_done = any(diagnosis_process.request_answer(case_name) for _ in range(MAX_ATTEMPTS))
         finally:
-            engine.end()
-            engine.close()
-        return read_text(folder.open / name / ANSWER_FILE) if is_done else None
+            diagnosis_process.end()
+            diagnosis_process.close()
+        return read_text(folder.open / case_name / ANSWER_FILE) if is_done else None
 
 
 @contextmanager
-def _start_engines(
-    folder: ProofFolder, worker_count: int, pending: SimpleQueue[str], answered: SimpleQueue[str]
+def _start_diagnosis_processes(
+    folder: ProofFolder, worker_count: int, pending_names: SimpleQueue[str], answered_names: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
-    """Context with a thread per worker process (`_run_worker`). On exit, also by an exception, the pending names are
-    dropped and the processes killed."""
-    engines = [Engine(folder) for _ in range(worker_count)]
+    """Context with a thread per worker process (`_request_pending_answers`). On exit, also by an exception, the pending
+    names are dropped and the processes killed."""
+    diagnosis_processes = [DiagnosisProcess(folder) for _ in range(worker_count)]
     threads = [
-        threading.Thread(target=_run_worker, args=(worker, folder, pending, answered), daemon=True)
-        for worker in engines
+        threading.Thread(
+            target=_request_pending_answers, args=(new_process, folder, pending_names, answered_names), daemon=True
+        )
+        for new_process in diagnosis_processes
     ]
     for thread in threads:
         thread.start()
     try:
         yield threads
     finally:
-        while not pending.empty():
-            pending.get()
-        for engine in engines:
-            engine.end()
-        for thread, engine in zip(threads, engines, strict=True):
+        while not pending_names.empty():
+            pending_names.get()
+        for diagnosis_process in diagnosis_processes:
+            diagnosis_process.end()
+        for thread, diagnosis_process in zip(threads, diagnosis_processes, strict=True):
             thread.join()
-            engine.close()
+            diagnosis_process.close()
 
 
-def _run_worker(engine: Engine, folder: ProofFolder, pending: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
-    """Take names from `pending` until it is empty; put them into `answered` once an answer or a failure is written.
-    Ends early, without a failure, where the engine was ended."""
+def _request_pending_answers(
+    diagnosis_process: DiagnosisProcess,
+    folder: ProofFolder,
+    pending_names: SimpleQueue[str],
+    answered_names: SimpleQueue[str],
+) -> None:
+    """Request the answer of each name from `pending_names` until it is empty; put it into `answered_names` once an
+    answer or a failure is written. Returns early, without a failure, where the process was ended by `end`."""
     while True:
         try:
-            name = pending.get_nowait()
+            case_name = pending_names.get_nowait()
         except Empty:
             return
-        if not any(engine.request_answer(name) for _ in range(MAX_ATTEMPTS)):
-            if engine.ended:
+        if not any(diagnosis_process.request_answer(case_name) for _ in range(MAX_ATTEMPTS)):
+            if diagnosis_process.ended:
                 return
-            _write_failure(folder.open / name)
-        answered.put(name)
+            _write_failed_answer(folder.open / case_name)
+        answered_names.put(case_name)
 
 
 def _make_processes_ended_error(folder: ProofFolder, missing_count: int) -> StudyError:
-    """Error for threads that ended before all cases were answered. missing_count: number of unanswered cases."""
+    """Make the error for threads that ended before all cases were answered. missing_count: number of unanswered
+    cases."""
     return StudyError(
         "The processes of the diagnosis ended before their work was done",
         f"{missing_count} cases have no answer; the last output of the processes is in {folder.log_file}.",
@@ -247,7 +258,7 @@ def is_answered(case_folder: Path) -> bool:
     return (case_folder / ANSWER_FILE).exists() and WORKER_DIED_KEY not in read_answer(case_folder)
 
 
-def _write_failure(case_folder: Path) -> None:
+def _write_failed_answer(case_folder: Path) -> None:
     """Write an answer that says that the process died or timed out."""
     reason = f"the process died {MAX_ATTEMPTS} times, or took longer than {CASE_TIMEOUT_S:g} s"
     document = {"name": case_folder.name, "failed": reason, WORKER_DIED_KEY: True}

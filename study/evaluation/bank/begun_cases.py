@@ -18,7 +18,8 @@ from study.store.disk.atomic_write import sync_folder
 from study.store.disk.text_file import read_text
 
 NAME_BYTES = 6
-"""Random bytes in the name of a case, which does not reveal its number."""
+"""Random bytes in the name of a case, so that the name does not reveal the number. Chosen: equal names are
+improbable."""
 
 
 def begin_case(folder: ProofFolder) -> Path:
@@ -29,7 +30,7 @@ def begin_case(folder: ProofFolder) -> Path:
 
 
 def publish_case(folder: ProofFolder, case_folder: Path) -> None:
-    """Move the folder of a case from `begun` to `open`; its label must be written before."""
+    """Move the folder of a case from `begun` to `open` and flush both to disk; its label must be written before."""
     sync_folder(case_folder)
     case_folder.rename(folder.open / case_folder.name)
     sync_folder(folder.open)

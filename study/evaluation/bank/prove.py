@@ -88,7 +88,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
         _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
         outcomes = reveal_bank(folder, plan.cases, make_outcome)
         follow_ups = follow_up(
-            folder, plan, outcomes, (options.answering, options.keep), partial(on_progress, "following up")
+            folder, plan, outcomes, (options.diagnosis_workers, options.keep), partial(on_progress, "following up")
         )
         controls = _run_all_controls(path, plan, options, on_progress)
     return BlindTest(
@@ -118,7 +118,9 @@ def _answer_cases(
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING_FILE).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.get_label_file(number)))
-    diagnose_and_count(folder, tuple(numbers), options.answering, partial(on_progress, "diagnosing"), keep=options.keep)
+    diagnose_and_count(
+        folder, tuple(numbers), options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
+    )
 
 
 def _run_all_controls(
@@ -128,5 +130,5 @@ def _run_all_controls(
     outcomes: tuple[ControlOutcome, ...] = ()
     for seed in range(plan.seed, plan.seed + CONTROL_REPETITIONS) if options.controls else ():
         control_folder = path / "controls" / str(seed)
-        outcomes += run_controls(control_folder, seed, options.answering, partial(on_progress, "controls"))
+        outcomes += run_controls(control_folder, seed, options.diagnosis_workers, partial(on_progress, "controls"))
     return outcomes

@@ -1,5 +1,8 @@
-"""Controls of a diagnosis: altered inputs with a known expected change of the answer, diagnosed by the same
-processes as a bank."""
+"""Run the controls of a diagnosis: altered inputs with a known expected change of the answer, diagnosed by the same
+processes as a bank. Called by `study.evaluation.bank.prove`.
+
+The inputs are drawn by `challenge.controls`; `analysis.evaluation.blind_test.control_claims` judges the answers.
+"""
 
 import json
 from collections.abc import Callable, Sequence
@@ -19,7 +22,8 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
 
 CONTROL_SETTINGS = CaseSettings((0,), 1000, 3, steps=80)
-"""One axis and three periods of 1000 samples: a control asks what is said, not how well."""
+"""One axis, three periods of 1000 samples and 80 integration steps per sample. Chosen: short recordings suffice, as a
+control compares answers with each other or looks for a named effect, but compares no parameter with its true value."""
 
 
 def run_controls(
@@ -30,18 +34,19 @@ def run_controls(
     controls: Sequence[Control] = CONTROLS,
     settings: CaseSettings = CONTROL_SETTINGS,
 ) -> tuple[ControlOutcome, ...]:
-    """Write, diagnose and judge the controls in the folder `path`. `on_done(answered, total)`. Resumable. Raises
-    StudyError."""
+    """Write, diagnose and judge the controls in the folder `path`, with `on_done(answered, total)` after each case. A
+    repeated call with the same folder and seed continues. Raises StudyError where the processes end early or a file
+    cannot be read or written."""
     folder = ProofFolder(path)
     folder.open.mkdir(parents=True, exist_ok=True)
-    names = {control.name: _prepare_control(folder, seed, control, settings) for control in controls}
-    all_names = [name for control_names in names.values() for name in control_names]
+    case_names_by_control = {control.name: _prepare_control(folder, seed, control, settings) for control in controls}
+    all_names = [name for control_names in case_names_by_control.values() for name in control_names]
     diagnose_and_count(folder, all_names, workers, on_done, keep=False)
     return tuple(
         judge_control(
             f"{control.name}, seed {seed}",
             control.claim,
-            [_read_answer(folder.open / name) for name in names[control.name]],
+            [_read_answer(folder.open / name) for name in case_names_by_control[control.name]],
         )
         for control in controls
     )
@@ -54,25 +59,28 @@ def _prepare_control(folder: ProofFolder, seed: int, control: Control, settings:
     if (written_names := _read_case_names(names_path, prefix)) is not None:
         return written_names
     inputs = control.draw(seed, settings)
-    names = tuple(f"{prefix}{number}" for number in range(len(inputs)))
-    for name, control_input in zip(names, inputs, strict=True):
+    case_names = tuple(f"{prefix}{number}" for number in range(len(inputs)))
+    for name, control_input in zip(case_names, inputs, strict=True):
         _write_input(folder.open / name, control_input)
-    write_text(names_path, json.dumps(names) + "\n", overwrite=True)
-    return names
+    write_text(names_path, json.dumps(case_names) + "\n", overwrite=True)
+    return case_names
 
 
 def _read_case_names(names_path: Path, prefix: str) -> tuple[str, ...] | None:
-    """Case names of a control; None where they are not written yet or do not match this program: they are then drawn
-    again."""
+    """Read the case names of a control; None where there are none or they lack `prefix`, as of another version of the
+    program: the inputs are then drawn again."""
     try:
-        names = load_json(read_text(names_path))
+        case_names = load_json(read_text(names_path))
     except (StudyError, ValueError):
         return None
-    is_complete = isinstance(names, list) and names == [f"{prefix}{number}" for number in range(len(names))]
-    return tuple(names) if is_complete and names else None
+    is_complete = isinstance(case_names, list) and case_names == [
+        f"{prefix}{number}" for number in range(len(case_names))
+    ]
+    return tuple(case_names) if is_complete and case_names else None
 
 
 def _write_input(case_folder: Path, control_input: ControlInput) -> None:
+    """Write recording, model and settings of a control into the folder of its case, replacing earlier ones."""
     case_folder.mkdir(exist_ok=True)
     write_recording(case_folder / RECORDING_FILE, control_input.recording, precision="float32", overwrite=True)
     write_mechanical_model(case_folder / MODEL_FILE, control_input.model, overwrite=True)
@@ -84,5 +92,6 @@ def _write_input(case_folder: Path, control_input: ControlInput) -> None:
 
 
 def _read_answer(case_folder: Path) -> Diagnosis | None:
+    """Read the diagnosis of a case; None where it failed. Raises StudyError where there is no answer."""
     answer = read_answer(case_folder)
     return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])

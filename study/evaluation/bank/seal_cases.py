@@ -1,5 +1,5 @@
 """Draw the cases of a bank and write them: open inputs for the diagnosis, and sealed labels with the truth. Called by
-`study.evaluation.bank.prove`.
+`prove` and `follow_up`; `laws.seal_laws` and `study.evaluation.real.inject_real` seal other cases by the same steps.
 
 A seal is a commitment by hash: the SHA-256 of every label is written, and can be published, before any case is
 diagnosed, so that truth and answers cannot be changed to suit each other. Labels hold a random salt; without it, the
@@ -30,15 +30,15 @@ from study.workflows.worker_processes import open_worker_processes
 
 
 def list_concealed_effects(case: Case) -> list[dict[str, Any]]:
-    """Concealed effects of a case as JSON values: name, place, axis, parameters; empty where the model lacks
-    nothing."""
+    """List the concealed effects of a case as JSON values (`Truth`: name, place, axis, parameters); empty where the
+    model lacks nothing."""
     return [asdict(truth) for truth in case.truth]
 
 
 SALT_BYTES = 16
-"""Random bytes in a label: too many to be found by trying."""
+"""Random bytes in a label. Chosen: 128 bits cannot be found by trying."""
 SEARCH_CPU_S = 60.0
-"""Processor time for the search in one case (s); the best result so far is then the answer."""
+"""Processor time for the search in one case (s), after which the best result so far is the answer. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,19 +47,22 @@ class BankPlan:
 
     seed: int
     cases: int
+    """Number of cases; they are numbered from 0."""
     brief: bool = False
     """One axis and short periods: for tests, and for a quick try."""
 
 
 def list_drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
-    """All cases that can be drawn on this machine: without MuJoCo its cases are left out."""
+    """List the cases of a bank that can be drawn on this machine; those of MuJoCo are left out where it is not
+    installed."""
     draws = (draw_case_plan(plan.seed, number, plan.brief) for number in range(plan.cases))
     return tuple(case_draw for case_draw in draws if case_draw.bank != "engine" or mujoco_access.is_installed())
 
 
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
-    """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256, to
-    be published before anything is diagnosed. Raises StudyError."""
+    """Draw, write and seal the cases that have no label yet, calling `on_sealed(count)` with the number of sealed
+    cases. Returns the SHA-256 of labels.sha256, to be published before anything is diagnosed. Raises StudyError where a
+    file cannot be written."""
     case_writers = {
         case_draw.number: partial(write_sealed_case, folder, case_draw) for case_draw in list_drawable_cases(plan)
     }
@@ -98,8 +101,8 @@ def write_sealed_case(folder: ProofFolder, case_draw: CaseDraw) -> None:
 
 
 def format_settings(excluded_effects: Sequence[str], processor_s: float | None = None) -> str:
-    """Settings of a diagnosis as JSON. excluded_effects: effects that it must not consider; processor_s: limit of the
-    search (s)."""
+    """Format the settings of a diagnosis as JSON. excluded_effects: effects that it must not consider; processor_s:
+    limit of the search's processor time (s), None = no limit."""
     return json.dumps({"without": list(excluded_effects), "processor_s": processor_s}) + "\n"
 
 
@@ -118,8 +121,8 @@ def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -
 
 
 def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str, Any]:
-    """Everything that is concealed. A random salt keeps the content from being guessed from its hash: there are few
-    effects."""
+    """Make the label of a case: its draw, the truth, and the hashes of its files. Without the random salt, the content
+    could be guessed from the hash, because there are few effects."""
     draw_fields = asdict(case_draw)
     return {
         "name": case_folder.name,
@@ -136,6 +139,7 @@ def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str,
 
 
 def read_case_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Folder names of the cases under `open`, in the order of their numbers."""
+    """Read the folder names under `open` of the cases with these numbers, in the same order. Raises StudyError where a
+    label cannot be read."""
     labels = [read_label(folder.get_label_file(number)) for number in numbers]
     return tuple(str(label["name"]) for label in labels)

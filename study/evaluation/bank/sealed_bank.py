@@ -41,8 +41,8 @@ class BankOptions:
     """Executor on whose workers the cases are diagnosed; None: on this computer."""
 
     @property
-    def answering(self) -> Workers:
-        """Workers of the diagnosis: the executor, or the number of processes of this computer."""
+    def diagnosis_workers(self) -> Workers:
+        """The executor, or without one the number of processes of this computer."""
         return self.workers if self.executor is None else self.executor
 
 
@@ -52,9 +52,10 @@ def reveal_bank(
     make_outcome: Callable[[dict[str, Any], dict[str, Any]], OutcomeT],
     is_unchanged: Callable[[dict[str, Any]], bool] = lambda label: True,
 ) -> tuple[OutcomeT, ...]:
-    """Check all seals, and return the outcomes of the answered cases with numbers below `case_count`. make_outcome:
-    makes an outcome from a label and its answer. is_unchanged: whether further files whose hashes the label holds are
-    unchanged. Raises StudyError where a label or such a file has changed, or an answer was given to other files."""
+    """Check all seals, and return the outcomes of the answered cases with numbers below `case_count`, sorted by the
+    names of their label files. make_outcome: makes an outcome from a label and its answer. is_unchanged: whether
+    further files whose hashes the label holds are unchanged. Raises StudyError where a label or such a file has
+    changed, or an answer was given to other files."""
     seals = read_seals(folder)
     outcomes: list[OutcomeT] = []
     broken_names: list[str] = []
@@ -89,8 +90,12 @@ def collect_answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any])
     }
 
 
-def list_engine_digests(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
-    """Digests of the code that gave the answers to the cases `names`, sorted; several if the code changed during the
-    run. Cases without an answer, or whose answer names no digest, are left out."""
-    answers = [read_answer(folder.open / name) for name in names if (folder.open / name / ANSWER_FILE).exists()]
+def list_engine_digests(folder: ProofFolder, case_names: Iterable[str]) -> tuple[str, ...]:
+    """List the digests of the code that gave the answers to the cases `case_names`, sorted; several if the code changed
+    during the run. Cases without an answer, or whose answer names no digest, are left out."""
+    answers = [
+        read_answer(folder.open / case_name)
+        for case_name in case_names
+        if (folder.open / case_name / ANSWER_FILE).exists()
+    ]
     return tuple(sorted({answer["engine"] for answer in answers if "engine" in answer}))

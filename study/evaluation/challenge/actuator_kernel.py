@@ -1,5 +1,5 @@
 """Force of each amplifier and motor from the command, at the mechanism's integration step (compiled). Called by
-`study.evaluation.challenge.device`; `effects.actuator` sets the columns.
+`study.evaluation.challenge.device`; `effects.actuator` and `effects.decoys` set the columns.
 
 In this order: delay (interpolated between steps), dead band, hysteresis (play operator), slew limit, saturation,
 first-order lag (explicit Euler), and a gain that falls with the averaged square of the force, as by heating.
@@ -20,7 +20,7 @@ of that mean (s); half width of the hysteresis between command and force (N)."""
 def drive_actuators(
     command: FloatArray, axis_parameters: FloatArray, steps_per_sample: int, rate_hz: float
 ) -> FloatArray:
-    """Actuator force, (samples * steps_per_sample, 3), N. command: (samples, 3), N, each sample held for
+    """Compute the actuator force, (samples * steps_per_sample, 3), N. command: (samples, 3), N, each sample held for
     `steps_per_sample` integration steps. axis_parameters: (3, 9), columns above. rate_hz: sample rate of the command. A
     lag of at most a step is ignored."""
     sample_count, step_s = command.shape[0], 1.0 / (rate_hz * steps_per_sample)
@@ -29,46 +29,50 @@ def drive_actuators(
         parameters = axis_parameters[axis]
         delay_steps = parameters[DELAY_S] / step_s
         whole_steps = int(delay_steps)
-        slewed, lagged, mean_square, play_output = 0.0, 0.0, 0.0, 0.0
+        slew_limited, lagged_force, mean_square, play_output = 0.0, 0.0, 0.0, 0.0
         for step in range(sample_count * steps_per_sample):
-            delayed = (1.0 - (delay_steps - whole_steps)) * _look_up_command(
+            delayed_command = (1.0 - (delay_steps - whole_steps)) * _look_up_command(
                 command, axis, step - whole_steps, steps_per_sample
             )
-            delayed += (delay_steps - whole_steps) * _look_up_command(
+            delayed_command += (delay_steps - whole_steps) * _look_up_command(
                 command, axis, step - whole_steps - 1, steps_per_sample
             )
-            delayed = _apply_dead_band(delayed, parameters[DEAD_BAND])
+            delayed_command = _apply_dead_band(delayed_command, parameters[DEAD_BAND])
             play_output = min(
-                max(play_output, delayed - parameters[HYSTERESIS_HALF_WIDTH]),
-                delayed + parameters[HYSTERESIS_HALF_WIDTH],
+                max(play_output, delayed_command - parameters[HYSTERESIS_HALF_WIDTH]),
+                delayed_command + parameters[HYSTERESIS_HALF_WIDTH],
             )
-            slewed = _limit_slew(slewed, play_output, parameters[SLEW_RATE] * step_s)
-            limited = (
-                min(max(slewed, -parameters[FORCE_LIMIT]), parameters[FORCE_LIMIT])
+            slew_limited = _limit_slew(slew_limited, play_output, parameters[SLEW_RATE] * step_s)
+            limited_force = (
+                min(max(slew_limited, -parameters[FORCE_LIMIT]), parameters[FORCE_LIMIT])
                 if parameters[FORCE_LIMIT] > 0.0
-                else slewed
+                else slew_limited
             )
-            lagged = lagged + (limited - lagged) * step_s / parameters[LAG_S] if parameters[LAG_S] > step_s else limited
+            lagged_force = (
+                lagged_force + (limited_force - lagged_force) * step_s / parameters[LAG_S]
+                if parameters[LAG_S] > step_s
+                else limited_force
+            )
             if parameters[HEATING_LOSS] > 0.0:
-                mean_square += (lagged * lagged - mean_square) * step_s / parameters[HEATING_TIME_S]
-            force[step, axis] = parameters[GAIN] * (1.0 - parameters[HEATING_LOSS] * mean_square) * lagged
+                mean_square += (lagged_force * lagged_force - mean_square) * step_s / parameters[HEATING_TIME_S]
+            force[step, axis] = parameters[GAIN] * (1.0 - parameters[HEATING_LOSS] * mean_square) * lagged_force
     return force
 
 
 @njit(cache=True, nogil=True)
 def _look_up_command(command: FloatArray, axis: int, step: int, steps_per_sample: int) -> float:
-    """Command of an axis, N, held at an integration step; zero before the start."""
-    value: float = command[step // steps_per_sample, axis] if step >= 0 else 0.0
-    return value
+    """Look up the command (N) of an axis at an integration step, held over each sample; zero before the start."""
+    held_command_n: float = command[step // steps_per_sample, axis] if step >= 0 else 0.0
+    return held_command_n
 
 
 @njit(cache=True, nogil=True)
 def _apply_dead_band(command: float, half_width: float) -> float:
-    """Command (N) after a dead band of half width `half_width` (N): reduced by that in magnitude, 0 within it."""
+    """Apply a dead band to a command (N): its magnitude is reduced by `half_width` (N), to no less than 0."""
     return max(command - half_width, 0.0) + min(command + half_width, 0.0) if half_width > 0.0 else command
 
 
 @njit(cache=True, nogil=True)
 def _limit_slew(previous: float, target: float, max_change: float) -> float:
-    """`previous`, moved towards `target` by at most `max_change`, N; 0 = no limit."""
+    """Move `previous` towards `target` by at most `max_change` (all in N); at 0 return `target`: no limit."""
     return previous + min(max(target - previous, -max_change), max_change) if max_change > 0.0 else target

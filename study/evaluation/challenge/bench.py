@@ -2,7 +2,7 @@
 three oscillators (structural modes) attached. Drawn by `draw_case`, integrated by `device`.
 
 Equation of motion: M d2q/dt2 + C dq/dt + K q = (f, 0), where q holds the positions of the handle and of the
-oscillators' masses along their directions, and f is the force on the handle.
+oscillators' masses along their directions, and f is the force on the handle. All ranges of parameters were chosen.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 MAX_MASS_COUPLING_KG, MAX_STIFFNESS_COUPLING_SHARE = 0.012, 0.03
-"""Largest off-diagonal elements: of the mass (kg), and of the stiffness as a fraction of its mean."""
+"""Largest off-diagonal elements: of the mass (kg), and of the stiffness as a fraction of its mean. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,14 +24,14 @@ class Oscillators:
     mass_kg: FloatArray
     """(k,)"""
     damping_ratio: FloatArray
-    """(k,)"""
+    """(k,), fraction of the critical damping with the handle fixed"""
     direction: FloatArray
     """(k, 3), unit vectors"""
 
     def with_oscillator(
         self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
     ) -> "Oscillators":
-        """Copy with a further oscillator. direction: unit vector (3,)."""
+        """Append an oscillator to a copy. frequency_hz: with the handle fixed; direction: unit vector (3,)."""
         return Oscillators(
             np.append(self.frequency_hz, frequency_hz),
             np.append(self.mass_kg, mass_kg),
@@ -53,7 +53,7 @@ class Bench:
     oscillators: Oscillators
 
     def assemble_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Mass (kg), damping (N s/m) and stiffness (N/m) of handle and k oscillators, (3 + k, 3 + k) each."""
+        """Assemble mass (kg), damping (N s/m) and stiffness (N/m) of handle and k oscillators, (3 + k, 3 + k) each."""
         oscillators = self.oscillators
         spring_stiffness = oscillators.mass_kg * (2 * np.pi * oscillators.frequency_hz) ** 2
         damper_coefficient = 2 * oscillators.damping_ratio * np.sqrt(spring_stiffness * oscillators.mass_kg)
@@ -68,8 +68,8 @@ class Bench:
 
 
 def draw_bench(random: np.random.Generator) -> Bench:
-    """Draw the bench of a case: rigid below about 10 Hz, with modes near 11, 95 and 175 Hz. All values are uniformly
-    distributed in the ranges below (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
+    """Draw the bench of a case, with oscillators near 11, 95 and 175 Hz. All values are uniformly distributed in the
+    ranges below (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
     mean_mass_kg = random.uniform(0.17, 0.29)
     mass = np.diag(mean_mass_kg * random.uniform(0.92, 1.08, 3)) + _draw_symmetric(random, MAX_MASS_COUPLING_KG)
     mean_stiffness = random.uniform(90.0, 210.0)
@@ -87,15 +87,15 @@ def draw_bench(random: np.random.Generator) -> Bench:
 
 
 def _draw_symmetric(random: np.random.Generator, limit: float) -> FloatArray:
-    """Symmetric matrix (3, 3) with zero diagonal and off-diagonal elements uniform in [-limit, limit)."""
+    """Draw a symmetric matrix (3, 3) with zero diagonal and off-diagonal elements uniform in [-limit, limit)."""
     upper_triangle = np.triu(random.uniform(-limit, limit, (3, 3)), 1)
     symmetric: FloatArray = upper_triangle + upper_triangle.T
     return symmetric
 
 
 def _add_oscillators(ground: FloatArray, coefficients: FloatArray, direction: FloatArray) -> FloatArray:
-    """Damping or stiffness matrix (3 + k, 3 + k). ground: (3, 3); coefficients: (k,), of the oscillators; direction:
-    (k, 3)."""
+    """Add oscillators to a damping or stiffness matrix; returns (3 + k, 3 + k). ground: (3, 3), of the handle to the
+    ground; coefficients: (k,), of the oscillators; direction: (k, 3)."""
     coordinate_count = 3 + len(coefficients)
     matrix = np.zeros((coordinate_count, coordinate_count))
     matrix[:3, :3] = ground + direction.T @ np.diag(coefficients) @ direction

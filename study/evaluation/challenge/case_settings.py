@@ -8,20 +8,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class CaseSettings:
-    """Settings of a case. Axes that are not driven move passively, and their parameters are known exactly."""
+    """Settings of a case; the defaults are chosen. Axes that are not driven move passively, and their parameters are
+    known exactly."""
 
     axes: tuple[int, ...] = (0, 1, 2)
     """Driven and measured axes, 0 to 2."""
     period: int = 2000
-    """Period of a multisine (samples); sweeps and slow sines scale with it."""
+    """Period of a multisine (samples); sweeps and slow sines scale with it (`scale_duration`)."""
     periods: int = 4
     """Number of periods of each multisine for the fit."""
     extras: float = 0.0
     """Factor of the effects of `nuisance_effects`, which no label names; 0 = none, 1 = about a tenth of the noise."""
 
     steps: int = 20
-    """Integration steps per sample. With 20 the integration error equals a sensor gain error of 0.2 % on one axis
-    (measured)."""
+    """Integration steps per sample. At 20, the error of integration equals a sensor gain error of about 0.2 % on one
+    axis; `draw_bank` therefore takes more."""
     loud_n: float = 0.0
     """Level (N) of an additional test segment with all axes at once; 0 = none."""
 

@@ -40,19 +40,19 @@ class EffectContext:
     """Driven and measured axes."""
 
     def interpolate_log(self, weakest: float, strongest: float) -> float:
-        """Geometric interpolation between two values by the strength."""
+        """Interpolate geometrically between two values of the same sign by the strength."""
         return float(weakest * (strongest / weakest) ** self.strength)
 
     def draw_log_uniform(self, lowest: float, highest: float) -> float:
-        """Log-uniform random value, independent of the strength."""
+        """Draw a log-uniform random value, independent of the strength; both limits are positive."""
         return float(np.exp(self.random.uniform(np.log(lowest), np.log(highest))))
 
     def draw_sign(self) -> float:
-        """+1 or -1 with equal probability."""
+        """Draw +1 or -1 with equal probability."""
         return float(self.random.choice((-1.0, 1.0)))
 
     def draw_direction(self) -> FloatArray:
-        """Unit vector (3,), uniformly distributed."""
+        """Draw a unit vector (3,), uniformly distributed on the sphere."""
         components = self.random.normal(size=3)
         unit_vector: FloatArray = components / np.linalg.norm(components)
         return unit_vector
@@ -71,11 +71,11 @@ class ConcealedEffect:
     draw: Callable[[EffectContext], dict[str, float]]
     """Draws the parameters, by name: those of the vocabulary, and further parameters that `build` needs."""
     build: Callable[[Device, int, Values], Device]
-    """build(device, axis, values): the device with the effect."""
+    """build(device, axis, values): a new device with the effect."""
 
 
 def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
-    """Copy of a table (3, columns) in which the columns `cells` of the row `axis` are set."""
+    """Set columns of the row `axis` in a copy of a table (3, columns). cells: value by column."""
     new_table = table.copy()
     for column, value in cells.items():
         new_table[axis, column] = value
@@ -83,14 +83,14 @@ def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> Floa
 
 
 def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:
-    """The device with these columns of position- and velocity-dependent forces set on one axis. cells: value by column
-    of `handle_force_kernel`."""
+    """Set columns of the position- and velocity-dependent forces of one axis; returns a new device. cells: value by
+    column of `handle_force_kernel`."""
     return replace(device, forces=with_cells(device.forces, axis, cells))
 
 
 def with_amplifier(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
-    """The device with these amplifier columns set; axis None: on all axes. cells: value by column of
-    `actuator_kernel`."""
+    """Set columns of the amplifier of one axis, or of all axes with axis None; returns a new device. cells: value by
+    column of `actuator_kernel`."""
     table = device.amplifiers
     for amplifier_axis in range(3) if axis is None else (axis,):
         table = with_cells(table, amplifier_axis, cells)

@@ -1,6 +1,6 @@
 """Excitation of every challenge recording: multisines to fit; sweeps, all axes at once and slow sines to test.
 
-`draw_case` plays a plan on a device; all numbers were chosen by hand.
+`draw_plan` is called by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`; all numbers were chosen by hand.
 """
 
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.case_settings import DEFAULT_SETTINGS, CaseSettings
 
 RATE_HZ = 1000.0
-"""Sample rate of all challenge recordings."""
+"""Sample rate of all challenge recordings (Hz)."""
 AXES = ("x", "y", "z")
 """Names of the bench's axes."""
 LEVELS_N = (0.5, 1.5, 3.0)
-"""Peaks of the multisines."""
+"""Peaks of the multisines (N)."""
 PERIOD_SAMPLES, FIT_PERIODS, TEST_PERIODS = 2000, 4, 2
 """Samples of a multisine's period, and periods of a segment to fit and of one to test."""
 REST_SAMPLES = 500
@@ -24,9 +24,9 @@ REST_SAMPLES = 500
 FIRST_LINE, LAST_LINE = 3, 479
 """Lines of a 2 s period: 1.5 to 239.5 Hz, odd lines only."""
 SWEEP_PEAK_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE_SAMPLES = 1.8, (1.0, 240.0), 6000, 200
-"""Swept sines of the test: peak, first and last frequency, samples, and samples of each fade."""
+"""Swept sines of the test: peak (N), first and last frequency (Hz), samples, and samples of each fade."""
 SLOW_PEAK_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE_SAMPLES = 1.6, (0.9, 1.3, 2.1), 4000, 500
-"""Slow sines of the test, for large motions: peak, frequency per axis, samples, and samples of each fade."""
+"""Slow sines of the test, for large motions: peak (N), frequency per axis (Hz), samples, and samples of the fade-in."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +39,9 @@ class DrivePlan:
 
 
 def draw_multisine(random: np.random.Generator, level_n: float, period: int = PERIOD_SAMPLES) -> FloatArray:
-    """One period, (period,), N, with peak `level_n`: odd lines of amplitude f^-1/2 and random phase. One of every
-    four neighbouring lines is left out, so that it shows odd distortion."""
+    """Draw one period (period,), N, of a multisine with the peak `level_n`: odd lines of amplitude f^-1/2 and random
+    phase. One of about every four neighbouring lines is left out, so that the response at the missing lines shows odd
+    distortion. period: samples."""
     lines = np.arange(FIRST_LINE * period // PERIOD_SAMPLES | 1, LAST_LINE * period // PERIOD_SAMPLES + 1, 2)
     omitted_lines = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
@@ -52,12 +53,13 @@ def draw_multisine(random: np.random.Generator, level_n: float, period: int = PE
 
 
 def draw_plan(random: np.random.Generator, settings: CaseSettings = DEFAULT_SETTINGS) -> DrivePlan:
-    """Commands and segments of a recording; 105 s for the whole bench."""
+    """Draw commands and segments of a recording; it takes 105 s with the default settings."""
     commands: list[FloatArray] = []
     segments: list[Segment] = []
     start = 0
 
     def append_segment(command: FloatArray, kind: str, level_n: float, period: int, role: str) -> None:
+        """Append a segment with the command (samples, 3), N, and the rest after it."""
         nonlocal start
         segments.append(Segment(start, start + len(command), kind, level_n, period, role))
         commands.extend((command, np.zeros((REST_SAMPLES, 3))))
@@ -85,14 +87,14 @@ def draw_plan(random: np.random.Generator, settings: CaseSettings = DEFAULT_SETT
 
 
 def _place_on_axis(axis: int, wave: FloatArray) -> FloatArray:
-    """Command (samples, 3), N, with the wave (samples,) on one axis and zero on the others."""
+    """Make the command (samples, 3), N, with the wave (samples,) on one axis and zero on the others."""
     command = np.zeros((len(wave), 3))
     command[:, axis] = wave
     return command
 
 
 def _make_sweep(samples: int) -> FloatArray:
-    """Logarithmic sine sweep (samples,), N, with linear fade-in and fade-out."""
+    """Make a logarithmic sine sweep (samples,), N, with linear fade-in and fade-out."""
     t, duration_s = np.arange(samples) / RATE_HZ, samples / RATE_HZ
     log_ratio = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
     cycles = SWEEP_HZ[0] * duration_s / log_ratio * (np.exp(log_ratio * t / duration_s) - 1.0)
@@ -102,7 +104,8 @@ def _make_sweep(samples: int) -> FloatArray:
 
 
 def _make_slow_sines(settings: CaseSettings) -> FloatArray:
-    """Sines (samples, 3), N, of all driven axes at once, each at its own frequency, with fade-in but no fade-out."""
+    """Make sines (samples, 3), N, of all driven axes at once, each at its own frequency, with fade-in but no
+    fade-out."""
     sample_numbers = np.arange(settings.scale_duration(SLOW_SAMPLES))
     fade_in = np.minimum(sample_numbers / SLOW_FADE_SAMPLES, 1.0)
     command: FloatArray = (

@@ -24,8 +24,8 @@ bristle (N/m), change of the level with position: a (1/m) and b (1/m^2)."""
 
 @njit(cache=True, nogil=True)
 def step_bristle(parameters: FloatArray, x: float, v: float, deflection_m: float, step_s: float) -> tuple[float, float]:
-    """Integrate the bristle over one step: friction force on the handle (N) and new deflection (m). parameters (7,):
-    the columns above; x: position (m); v: velocity (m/s); deflection_m: previous deflection.
+    """Integrate the bristle over one step of `step_s` (s); returns the friction force on the handle (N) and the new
+    deflection (m). parameters (7,): the columns above; x: position (m); v: velocity (m/s); deflection_m: previous one.
 
     The relaxation of the deflection is integrated implicitly (backward Euler), so that a stiff bristle does not
     oscillate from step to step.

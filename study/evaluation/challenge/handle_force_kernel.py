@@ -2,7 +2,8 @@
 
     F = c - k2 x^2 - k3 x^3 + A sin(2 pi x / pitch + phase) - (b |v| + d x^2) v - k_s (x - x_s) beyond an end stop x_s
 
-`mechanism_kernel` evaluates it at every integration step and adds it to the other forces on the handle.
+`mechanism_kernel` evaluates it at every integration step and adds it to the other forces on the handle. Without cogging
+(A = 0) the pitch may be 0; the stops may be at infinity.
 """
 
 from math import pi, sin
@@ -31,7 +32,7 @@ cogging; positions x_s (m) of the upper and lower end stop, and their common sti
 
 @njit(cache=True, nogil=True)
 def compute_handle_force(parameters: FloatArray, x: float, v: float) -> float:
-    """Force on the handle (N). parameters (11,): the columns above; x: position (m); v: velocity (m/s)."""
+    """Compute the force on the handle (N). parameters (11,): the columns above; x: position (m); v: velocity (m/s)."""
     force_n: float = (
         parameters[CONSTANT_FORCE] - (parameters[SQUARE_STIFFNESS] + parameters[CUBIC_STIFFNESS] * x) * x * x
     )

@@ -1,8 +1,10 @@
-"""Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled).
+"""Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled). Called
+by `study.evaluation.challenge.device`.
 
     M(q) d2q/dt2 = -C dq/dt - K q + (drive + friction + handle forces + creep + time-varying forces + laws, 0)
 
-q: positions of the handle (3) and of the attached oscillators. Optionally, the drive force acts through play.
+q: positions of the handle (3) and of the attached oscillators. Optionally, the drive force acts through play
+(backlash): on a motor that touches the handle at either end of a gap.
 
 The velocity is updated first, then the position, so that a velocity belongs half a step before its position. Damping
 and friction use the velocity extrapolated by half a step with the previous acceleration: otherwise the mass of each
@@ -20,10 +22,10 @@ from study.evaluation.challenge.friction_kernel import step_bristle
 from study.evaluation.challenge.handle_force_kernel import compute_handle_force
 from study.evaluation.challenge.law_kernel import advance_law_memory, sum_law_forces
 
-RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, PHASE, SQUARE = range(5)
-"""Columns of `varying`: frequency (Hz, 0 = none), amplitude of the modulation of the ground's damping (N s/m) and
+MODULATION_HZ, DAMPING_DEPTH, STIFFNESS_DEPTH, PHASE, IS_SQUARE_WAVE = range(5)
+"""Columns of `modulation`: frequency (Hz, 0 = none), amplitude of the modulation of the ground's damping (N s/m) and
 stiffness (N/m), phase (rad), 1 = square wave, 0 = sine."""
-AXIS, MOTOR_MASS, GAP, CONTACT, CONTACT_DAMPING = range(5)
+PLAY_AXIS, MOTOR_MASS, GAP, CONTACT_STIFFNESS, CONTACT_DAMPING = range(5)
 """Columns of `play`: axis (-1 = none), motor mass (kg), total gap (m), contact stiffness (N/m) and damping (N s/m)."""
 
 
@@ -44,8 +46,8 @@ class Mechanism(NamedTuple):
     """(3,), 1/m: relative change of the whole handle's inertia with the position along each axis"""
     axis_mass_per_m: FloatArray
     """(3,), kg/m: change of the mass for motion along an axis with the position along it"""
-    varying: FloatArray
-    """(3, 5), a row for each axis, columns above"""
+    modulation: FloatArray
+    """(3, 5), time-varying damping and stiffness, columns above"""
     play: FloatArray
     """(5,), columns above"""
     creep_stiffness: FloatArray
@@ -64,71 +66,73 @@ class Motion(NamedTuple):
     acceleration: FloatArray
     position: FloatArray
     velocity: FloatArray
-    lawful: FloatArray
+    law_force: FloatArray
     """N, force of the laws (`law_kernel`) alone, at the start of the sample."""
 
 
 @njit(cache=True, nogil=True)
-def integrate_motion(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Motion:
-    """Integrate the motion from rest. force: (samples * steps, 3), N.
+def integrate_motion(m: Mechanism, force: FloatArray, steps_per_sample: int, rate_hz: float) -> Motion:
+    """Integrate the motion from rest at 0. m: parameters; force: drive force, (samples * steps_per_sample, 3), N;
+    steps_per_sample: integration steps per sample; rate_hz: sample rate.
 
-    A sample is read just before the force of its own step acts, so its acceleration belongs to the previous force.
+    A sample is read just before the force of its integration step acts, so that its acceleration belongs to the force
+    of the previous step.
     """
-    n, samples, h = m.inverse_mass.shape[0], force.shape[0] // steps, 1.0 / (rate_hz * steps)
-    acceleration, position = np.zeros((samples, 3)), np.zeros((samples, 3))
-    velocity, lawful = np.zeros((samples, 3)), np.zeros((samples, 3))
+    n, sample_count, h = m.inverse_mass.shape[0], force.shape[0] // steps_per_sample, 1.0 / (rate_hz * steps_per_sample)
+    acceleration, position = np.zeros((sample_count, 3)), np.zeros((sample_count, 3))
+    velocity, law_force = np.zeros((sample_count, 3)), np.zeros((sample_count, 3))
     memory, law_n = np.zeros(m.laws.shape[0]), np.zeros(3)
     q, v, f, a = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     deflection, motor, creep = np.zeros(3), np.zeros(2), np.zeros(m.creep_stiffness.shape)
     drive, previous_drive, v_now = np.zeros(3), np.zeros(3), np.zeros(n)
-    for k in range(force.shape[0]):
+    for step in range(force.shape[0]):
         v_now[:] = v + 0.5 * h * a
         _set_linear_forces(m, q, v_now, f)
         _add_ground_forces(m, q, v_now, deflection, h, f)
-        _add_slow_forces(m, q, v_now, creep, k * h, f)
+        _add_slow_forces(m, q, v_now, creep, step * h, f)
         for j in range(3):
-            drive[j] = force[k, j]
+            drive[j] = force[step, j]
         if m.laws.shape[0] > 0:
-            sum_law_forces(m.laws, (q, v_now, drive), memory, k * h, law_n)
+            sum_law_forces(m.laws, (q, v_now, drive), memory, step * h, law_n)
             for index in range(m.laws.shape[0]):
                 memory[index] = advance_law_memory(m.laws[index], q, drive, memory[index], h)
             for j in range(3):
                 f[j] += law_n[j]
-        if m.play[AXIS] >= 0.0:
+        if m.play[PLAY_AXIS] >= 0.0:
             _apply_play(m.play, q, v, motor, drive, h)
-        if k % steps == 0:
-            _accelerate_before(m, (q, v_now, previous_drive), (memory, k * h, law_n), f, a)
+        if step % steps_per_sample == 0:
+            _compute_previous_acceleration(m, (q, v_now, previous_drive), (memory, step * h, law_n), f, a)
             for j in range(3):
-                acceleration[k // steps, j], position[k // steps, j] = a[j], q[j]
-                velocity[k // steps, j], lawful[k // steps, j] = v_now[j], law_n[j]
-        _accelerate(m, q, f, drive, a)
+                acceleration[step // steps_per_sample, j], position[step // steps_per_sample, j] = a[j], q[j]
+                velocity[step // steps_per_sample, j], law_force[step // steps_per_sample, j] = v_now[j], law_n[j]
+        _compute_acceleration(m, q, f, drive, a)
         for i in range(n):
             v[i] += h * a[i]
             q[i] += h * v[i]
         previous_drive[:] = drive
-    return Motion(acceleration, position, velocity, lawful)
+    return Motion(acceleration, position, velocity, law_force)
 
 
 @njit(cache=True, nogil=True)
-def _accelerate_before(
+def _compute_previous_acceleration(
     m: Mechanism,
     state: tuple[FloatArray, FloatArray, FloatArray],
     laws: tuple[FloatArray, float, FloatArray],
     f: FloatArray,
     a: FloatArray,
 ) -> None:
-    """Acceleration `a` (n,) under the drive force of the previous step, also in laws of the command. state: positions,
-    velocities, that drive force. laws: memory states, time (s), and the forces of the laws under the drive force of
-    this step, which `f` contains."""
+    """Compute the acceleration `a` (n,) under the drive force of the previous step, also in laws of the command. state:
+    positions, velocities, that drive force. laws: memory states, time (s), and the forces of the laws under the drive
+    force of this step, which `f` contains."""
     memory, t, law_n = laws
     if m.laws.shape[0] == 0:
-        _accelerate(m, state[0], f, state[2], a)
+        _compute_acceleration(m, state[0], f, state[2], a)
         return
     previous_law_n, previous_f = np.zeros(3), f.copy()
     sum_law_forces(m.laws, state, memory, t, previous_law_n)
     for j in range(3):
         previous_f[j] += previous_law_n[j] - law_n[j]
-    _accelerate(m, state[0], previous_f, state[2], a)
+    _compute_acceleration(m, state[0], previous_f, state[2], a)
 
 
 @njit(cache=True, nogil=True)
@@ -160,36 +164,38 @@ def _add_ground_forces(
 def _add_slow_forces(m: Mechanism, q: FloatArray, v: FloatArray, creep: FloatArray, t: float, f: FloatArray) -> None:
     """Add creep and time-varying forces to `f`. creep: relaxed part of the creep springs' deflection, updated; t: s."""
     for j in range(3):
-        for e in range(creep.shape[1]):
-            if m.creep_stiffness[j, e] != 0.0:
-                creep[j, e] += m.creep_share[e] * (q[j] - creep[j, e])
-                f[j] -= m.creep_stiffness[j, e] * (q[j] - creep[j, e])
-        row = m.varying[j]
-        if row[RATE] > 0.0:
-            swing = sin(2.0 * pi * row[RATE] * t + row[PHASE])
-            if row[SQUARE] > 0.0:
-                swing = 1.0 if swing > 0.0 else -1.0
-            f[j] -= swing * (row[DAMPING_DEPTH] * v[j] + row[STIFFNESS_DEPTH] * q[j])
+        for element in range(creep.shape[1]):
+            if m.creep_stiffness[j, element] != 0.0:
+                creep[j, element] += m.creep_share[element] * (q[j] - creep[j, element])
+                f[j] -= m.creep_stiffness[j, element] * (q[j] - creep[j, element])
+        modulation_row = m.modulation[j]
+        if modulation_row[MODULATION_HZ] > 0.0:
+            oscillation = sin(2.0 * pi * modulation_row[MODULATION_HZ] * t + modulation_row[PHASE])
+            if modulation_row[IS_SQUARE_WAVE] > 0.0:
+                oscillation = 1.0 if oscillation > 0.0 else -1.0
+            f[j] -= oscillation * (modulation_row[DAMPING_DEPTH] * v[j] + modulation_row[STIFFNESS_DEPTH] * q[j])
 
 
 @njit(cache=True, nogil=True)
 def _apply_play(play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float) -> None:
-    """Move the motor and replace its drive force by the contact force: a spring and a damper where the motor, relative
-    to the handle, is beyond half of the gap. motor: its position and velocity, updated."""
-    j = int(play[AXIS])
+    """Move the motor by one step of h seconds and replace its drive force (N) by the contact force: a spring and a
+    damper where the motor, relative to the handle, is beyond half of the gap. motor: its position and velocity,
+    updated."""
+    j = int(play[PLAY_AXIS])
     separation, closing = motor[0] - q[j], motor[1] - v[j]
     penetration = max(separation - 0.5 * play[GAP], 0.0) + min(separation + 0.5 * play[GAP], 0.0)
-    contact = play[CONTACT] * penetration
+    contact_n = play[CONTACT_STIFFNESS] * penetration
     if penetration != 0.0:
-        contact += play[CONTACT_DAMPING] * closing
-    motor[1] += h * (drive[j] - contact) / play[MOTOR_MASS]
+        contact_n += play[CONTACT_DAMPING] * closing
+    motor[1] += h * (drive[j] - contact_n) / play[MOTOR_MASS]
     motor[0] += h * motor[1]
-    drive[j] = contact
+    drive[j] = contact_n
 
 
 @njit(cache=True, nogil=True)
-def _accelerate(m: Mechanism, q: FloatArray, f: FloatArray, drive: FloatArray, a: FloatArray) -> None:
-    """Acceleration `a` (n,). A mass added to a single axis enters by the Sherman-Morrison formula."""
+def _compute_acceleration(m: Mechanism, q: FloatArray, f: FloatArray, drive: FloatArray, a: FloatArray) -> None:
+    """Compute the acceleration `a` (n,), m/s^2, from the forces `f` (n,) and the drive force (3,), N. A mass that is
+    added to a single axis enters by the Sherman-Morrison formula."""
     n = f.shape[0]
     inertia_factor = 1.0 + m.inertia_per_m[0] * q[0] + m.inertia_per_m[1] * q[1] + m.inertia_per_m[2] * q[2]
     for i in range(n):

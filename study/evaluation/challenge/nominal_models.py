@@ -42,9 +42,9 @@ def draw_calibration(
         stiffness_n_per_m=float(np.diag(bench.stiffness).mean() * random.uniform(0.033, 0.075)),
         modes=MODES_TOLERANCE,
     )
-    deviations = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
-    errors = random.normal(size=9) * np.repeat(np.array(deviations, dtype=np.float64), 3)
-    return shift_diagonals(bench, errors * _make_axes_mask(axes)), tolerance
+    standard_deviations = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
+    parameter_errors = random.normal(size=9) * np.repeat(np.array(standard_deviations, dtype=np.float64), 3)
+    return shift_diagonals(bench, parameter_errors * _make_axes_mask(axes)), tolerance
 
 
 def retune(
@@ -58,7 +58,9 @@ def retune(
     commands = [plan.command[segment.start : segment.stop] for segment in fit_segments]
     channels, axes_mask = list(axes), _make_axes_mask(axes)
     noise = np.array(NOISE_MPS2)[channels]
-    measured = np.vstack([response[segment.start : segment.stop, channels] for segment in fit_segments]) / noise
+    measured_response = (
+        np.vstack([response[segment.start : segment.stop, channels] for segment in fit_segments]) / noise
+    )
     # Steps of the forward differences, chosen: kg, N s/m, N/m, for three axes each.
     difference_steps = np.repeat((1e-3, 1e-2, 1.0), 3)
     shift = np.zeros(9)
@@ -73,7 +75,7 @@ def retune(
         )
         return np.asarray(responses / noise)
 
-    jacobian = np.zeros((measured.size, 9))
+    jacobian = np.zeros((measured_response.size, 9))
     for iteration in range(MAX_ITERATIONS):
         prediction = predict_response(shift)
         if iteration < JACOBIAN_UPDATES:
@@ -82,7 +84,7 @@ def retune(
                 for difference_step, unit_vector in zip(difference_steps, np.eye(9), strict=True)
             ]
             jacobian = np.column_stack(columns) * axes_mask
-        shift_change = np.linalg.lstsq(jacobian, (measured - prediction).ravel(), rcond=None)[0]
+        shift_change = np.linalg.lstsq(jacobian, (measured_response - prediction).ravel(), rcond=None)[0]
         shift = _limit_shift(shift + shift_change, bench)
         if np.abs(shift_change / difference_steps).max() < 0.05:
             break
@@ -135,5 +137,5 @@ def _limit_shift(shift: FloatArray, bench: Bench) -> FloatArray:
 
 def _round_significant(matrix: FloatArray) -> FloatArray:
     """Round the entries of a matrix to `SIGNIFICANT_DIGITS` significant digits."""
-    texts = [[f"{value:.{SIGNIFICANT_DIGITS}g}" for value in row] for row in matrix]
-    return np.array(texts, dtype=np.float64)
+    rounded_texts = [[f"{value:.{SIGNIFICANT_DIGITS}g}" for value in row] for row in matrix]
+    return np.array(rounded_texts, dtype=np.float64)

@@ -11,8 +11,8 @@ from equalizer.signals.signal import FloatArray
 
 @njit(cache=True, nogil=True)
 def filter_first_order(samples: FloatArray, smoothing_factor: float) -> FloatArray:
-    """First-order low-pass y += smoothing_factor (x - y) per channel, with y = 0 before the first sample. samples:
-    (n, channels); smoothing_factor: 1 - exp(-2 pi f_c / sample rate), 0 to 1."""
+    """Apply the first-order low-pass y += smoothing_factor (x - y) per channel, with y = 0 before the first sample.
+    samples: (n, channels); smoothing_factor: 1 - exp(-2 pi f_c / sample rate), 0 to 1."""
     smoothed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         state = 0.0
@@ -24,8 +24,8 @@ def filter_first_order(samples: FloatArray, smoothing_factor: float) -> FloatArr
 
 @njit(cache=True, nogil=True)
 def apply_play_hysteresis(samples: FloatArray, half_width: float) -> FloatArray:
-    """Play operator per channel: the output is the previous output, clipped to within `half_width` of the input; it is
-    0 before the first sample. samples: (n, channels); half_width: in their unit."""
+    """Apply a play operator per channel: the output is the previous output, clipped to within `half_width` of the
+    input; it is 0 before the first sample. samples: (n, channels); half_width: in their unit."""
     output = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         state = 0.0

@@ -2,6 +2,7 @@
 
 The table was sealed by its SHA-256 before the diagnoses (`hapteq kit seal`). Its hash is checked first, so that labels
 that were changed afterwards are refused. `analysis.evaluation.blind_test.lab_kit` defines which diagnoses are right.
+Called by `study.cli.kit`.
 """
 
 import re
@@ -19,14 +20,14 @@ from analysis.evaluation.blind_test.lab_kit import (
     score_unanswered,
 )
 from study.errors import StudyError, WrongUseError
-from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
+from study.evaluation.kit.lab_kit import make_seal_path, read_labels, read_sealed_hash
 from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
 
-UNSCORED = "Nothing was scored, and nothing written."
-"""Part of every error message of this module: what was saved."""
+NOTHING_SCORED = "Nothing was scored, and nothing written."
+"""Part of every error message of this module: the statement on what was saved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,50 +47,54 @@ class KitScore:
 def score_kit(path: Path, diagnoses: Path, scores_path: Path, seal: str | None = None) -> KitScore:
     """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `scores_path` as CSV.
     diagnoses: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over
-    before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError."""
+    before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError where the
+    hashes differ, the table is invalid, no diagnosis is found, one is unusable, or the scores cannot be written."""
     digest = compute_sha256(path)
-    compared_with = _require_sealed(path, digest, seal)
+    compared_with = _require_sealed_hash(path, digest, seal)
     labels = read_labels(path)
-    diagnosis_of_labels = _read_diagnoses(diagnoses, labels)
-    rows = tuple(
+    label_diagnoses = _read_diagnoses(diagnoses, labels)
+    scored_labels = tuple(
         score_unanswered(label) if diagnosis is None else score_label(label, diagnosis)
-        for label, diagnosis in zip(labels, diagnosis_of_labels, strict=True)
+        for label, diagnosis in zip(labels, label_diagnoses, strict=True)
     )
-    write_text(scores_path, format_csv_table(rows, Scored))
-    return KitScore(rows, compute_kit_figures(rows), digest, compared_with)
+    write_text(scores_path, format_csv_table(scored_labels, Scored))
+    return KitScore(scored_labels, compute_kit_figures(scored_labels), digest, compared_with)
 
 
-def score_lines(score: KitScore) -> tuple[str, ...]:
-    """The score as lines for a terminal: rates, labels that were missed or have no diagnosis, and the hash."""
-    figures = (_format_figure(figure) for figure in score.figures)
-    rows = (_format_row(row) for row in score.rows if not row.right)
-    return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
+def format_score_lines(score: KitScore) -> tuple[str, ...]:
+    """Format the score as lines for a terminal: rates, labels that were missed or have no diagnosis, and the hash."""
+    figure_lines = (_format_figure(figure) for figure in score.figures)
+    missed_lines = (_format_missed_label(row) for row in score.rows if not row.right)
+    return (*figure_lines, *missed_lines, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
 
 
 def _format_figure(figure: IntervalEstimate) -> str:
-    """A rate in percent, with its 95 % confidence interval in brackets."""
+    """Format a rate in percent, with its 95 % confidence interval in brackets; "none" without a case."""
     if figure.value is None or figure.low is None or figure.high is None:
         return f"{figure.name}: none"
     interval = f"[{100 * figure.low:.0f}, {100 * figure.high:.0f}]"
     return f"{figure.name}: {figure.hits} of {figure.of}, {100 * figure.value:.0f} % {interval}"
 
 
-def _format_row(row: Scored) -> str:
-    """A label that was missed by its diagnosis, or has none."""
-    if row.verdict == MISSING:
-        return f"Missing: {row.recording}, {row.change}: no diagnosis; it counts as not right."
-    return f"Missed: {row.recording}, {row.change}: {row.verdict.replace('_', ' ')}, named {row.named or 'nothing'}."
+def _format_missed_label(scored_label: Scored) -> str:
+    """Format the line of a label that was missed by its diagnosis, or has none."""
+    if scored_label.verdict == MISSING:
+        return f"Missing: {scored_label.recording}, {scored_label.change}: no diagnosis; it counts as not right."
+    return (
+        f"Missed: {scored_label.recording}, {scored_label.change}: {scored_label.verdict.replace('_', ' ')}, "
+        f"named {scored_label.named or 'nothing'}."
+    )
 
 
 def _read_diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
-    """Diagnosis of each label, in order; None for a label without one. Raises StudyError where the folder is missing or
-    no label has a diagnosis."""
+    """Read the diagnosis of each label, in order; None for a label without one. Raises StudyError where the folder is
+    missing, no label has a diagnosis, or a diagnosis is unusable."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
             f"{folder} is no folder of diagnoses.",
             "Give --diagnoses the folder that holds one folder per recording, by its name.",
-            saved=UNSCORED,
+            saved=NOTHING_SCORED,
         )
     diagnoses = tuple(_read_one_diagnosis(folder, label.recording) for label in labels)
     if any(diagnosis is not None for diagnosis in diagnoses):
@@ -99,12 +104,13 @@ def _read_diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis 
         f"{folder} holds no {DIAGNOSIS_NAME} of any recording in the table, such as "
         f"{labels[0].recording}/{DIAGNOSIS_NAME}.",
         "Give --diagnoses the folder that holds one folder per recording, by its name.",
-        saved=UNSCORED,
+        saved=NOTHING_SCORED,
     )
 
 
 def _read_one_diagnosis(folder: Path, recording: str) -> Diagnosis | None:
-    """Diagnosis of a recording; None where its file is missing. Raises StudyError where the file is unusable."""
+    """Read the diagnosis of a recording; None where its file is missing. Raises StudyError where the file is
+    unusable."""
     path = folder / recording / DIAGNOSIS_NAME
     if not path.is_file():
         return None
@@ -115,14 +121,15 @@ def _read_one_diagnosis(folder: Path, recording: str) -> Diagnosis | None:
             f"{recording}/{error.title}",
             error.happened,
             f"Get {path.parent} again as `hapteq diagnose` wrote it, or move it away: then it counts as not right.",
-            saved=UNSCORED,
+            saved=NOTHING_SCORED,
         ) from error
 
 
-def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
-    """The hash with which the hash of the table was compared, in words. Raises StudyError where they differ, or without
-    a seal."""
-    seal_path = seal_of(path)
+def _require_sealed_hash(path: Path, digest: str, seal: str | None) -> str:
+    """Compare the hash of the table with `seal`, or without it with the seal file. Returns the source of the sealed
+    hash in words. Raises StudyError where the hashes differ or there is no seal file, WrongUseError where `seal` is no
+    hash."""
+    seal_path = make_seal_path(path)
     if seal is None:
         sealed_digest, source = read_sealed_hash(path), f"{seal_path.name} says"
         comparison = (
@@ -139,13 +146,13 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
         if sealed_digest
         else f"There is no seal in {seal_path.name}.",
         "Score the table as it was sealed before the diagnoses; changes made to it since cannot be trusted.",
-        saved=UNSCORED,
+        saved=NOTHING_SCORED,
     )
 
 
 def _parse_hash(seal_text: str) -> str:
-    """The hash in the value of --seal, which may be the whole line of the seal file. Raises WrongUseError without a
-    hash."""
+    """Parse the hash in the value of --seal, which may be the whole line of the seal file; returns it in lower case.
+    Raises WrongUseError where its first word is no SHA-256."""
     first_word = (seal_text.split() or [""])[0].lower()
     if re.fullmatch("[0-9a-f]{64}", first_word):
         return first_word
@@ -153,5 +160,5 @@ def _parse_hash(seal_text: str) -> str:
         "That is no SHA-256",
         f"--seal gives '{seal_text}'; a hash has 64 digits from 0 to 9 and a to f.",
         "Give the whole hash, as `hapteq kit seal` printed it.",
-        saved=UNSCORED,
+        saved=NOTHING_SCORED,
     )

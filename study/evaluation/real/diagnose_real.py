@@ -1,10 +1,10 @@
-"""Diagnosis of one recording of a real device.
+"""Diagnose one recording of a real device. Called by `real_recordings` (`hapteq real`).
 
 1. The recording is imported by its map. Its model is the map's, or a linear model or force balance fitted to it.
 2. `diagnose` searches for missing effects. Where a recording from before a known change exists, it is the reference.
-3. The resulting model is tested on further recordings, to which nothing is fitted but, where the map says so, a gain.
+3. The resulting model is tested on further recordings, to which at most a gain is fitted (`volume_free` in the map).
 
-A recording that cannot be diagnosed gets an answer all the same: refused, with the reason.
+A recording that cannot be diagnosed gets the answer "refused", with the reason.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
-from analysis.diagnosis.real_answer.answer_of_findings import describe_named_effects, make_real_answer
+from analysis.diagnosis.real_answer.make_real_answer import describe_named_effects, make_real_answer
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
@@ -48,25 +48,30 @@ class RealDiagnosis:
     findings: Findings | None
     """None where the recording was refused."""
     parents: tuple[Path, ...]
+    """Input files (`RealRecording.parents`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ImportedCase:
-    """The imported recording and what its diagnosis needs."""
+    """The imported recording with its model and reference recording."""
 
     recording: Recording
     model: MechanicalModel
+    """Model to be diagnosed, given or fitted to the recording."""
     balances: tuple[Balance, ...] | None
+    """Force balances fitted to the recording; None where none was fitted."""
     remarks: tuple[str, ...]
+    """Sentences on the import and on the model."""
     reference: Recording | None
     """Recording of the same device before the change, where there is one."""
 
 
-def report_crash(real_recording: RealRecording, crash: Exception) -> RealDiagnosis:
-    """Result for a recording at which the program crashed."""
-    error = f"{type(crash).__name__}: {crash}".rstrip(": .")
+def make_crash_result(real_recording: RealRecording, crash: Exception) -> RealDiagnosis:
+    """Make the result for a recording at which the program crashed: refused, with the exception as the reason."""
+    error_text = f"{type(crash).__name__}: {crash}".rstrip(": .")
     crash_text = (
-        f"The program crashed at this recording ({error}). That is a fault of the program; the others are answered."
+        f"The program crashed at this recording ({error_text}). "
+        "That is a fault of the program; the others are answered."
     )
     return RealDiagnosis(_make_refusal(real_recording, crash_text), None, real_recording.parents)
 
@@ -74,8 +79,8 @@ def report_crash(real_recording: RealRecording, crash: Exception) -> RealDiagnos
 def diagnose_real(
     real_recording: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress
 ) -> RealDiagnosis:
-    """Diagnose one recording. One that cannot be diagnosed is returned as refused, with the reason. Raises only
-    UserInterruptError."""
+    """Diagnose one recording. One that cannot be diagnosed is returned as refused, with the reason. Raises
+    UserInterruptError; any other exception is a fault of the program, see `make_crash_result`."""
     parents = real_recording.parents
     try:
         case = _import_case(real_recording, (time_left, guard), on_progress)
@@ -90,8 +95,8 @@ def diagnose_real(
         findings = diagnose((case.recording,), case.model, settings, map_forked, on_progress)
         findings = replace(findings, remarks=(*case.remarks, *findings.remarks))
         diagnosis = real_recording.found_map.source.map.diagnosis
-        names = (real_recording.folder.name, real_recording.name, real_recording.found_map.source.map.title)
-        answer = make_real_answer(findings, case.recording, names, diagnosis.nominal)
+        recording_names = (real_recording.folder.name, real_recording.name, real_recording.found_map.source.map.title)
+        answer = make_real_answer(findings, case.recording, recording_names, diagnosis.nominal)
     except StudyError as refusal:
         return RealDiagnosis(_make_refusal(real_recording, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (IncomparableRecordingsError, MechanicalModelError, np.linalg.LinAlgError) as refusal:
@@ -117,15 +122,17 @@ def _downgrade_if_remainder(answer: RealAnswer, pair: PairOutcome) -> RealAnswer
         or remaining_error <= EXPLAINED_ERROR * reference_error
     ):
         return answer
-    text = (
+    remainder_text = (
         f"Still unexplained: the error on held-out data is {100 * remaining_error:.3g} % of the signal; "
         f"before the change it was {100 * reference_error:.3g} %."
     )
-    return replace(answer, verdict="partly_explained", left=text, pair=replace(pair, verdict="partly_explained"))
+    return replace(
+        answer, verdict="partly_explained", left=remainder_text, pair=replace(pair, verdict="partly_explained")
+    )
 
 
 def import_real_recording(found_map: FoundMap) -> Recording:
-    """The one force-driven recording of a map. Raises StudyError."""
+    """Import the recording of a map, converted to a force-driven one. Raises StudyError where it cannot be imported."""
     recording = build_recording(found_map.source.map, found_map.files, lambda share: None).recording
     return convert_all_to_force_driven([recording])[0]
 
@@ -133,12 +140,12 @@ def import_real_recording(found_map: FoundMap) -> Recording:
 def _import_case(
     real_recording: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> _ImportedCase:
-    """Import the recording, its model and the recording made before. Raises StudyError where there is nothing to
+    """Import the recording, its model and the reference recording. Raises StudyError where there is nothing to
     diagnose."""
     on_progress("importing", 0.0)
     if skip_reason := real_recording.found_map.source.map.diagnosis.skip:
         raise make_not_diagnosable_error((skip_reason,))
-    # Of a real recording, for which there is no other, few cycles are a remark.
+    # A recording with few cycles is accepted with a remark, because a real one cannot be replaced by a longer one.
     try:
         prepared = prepare_recordings(
             (import_real_recording(real_recording.found_map),),
@@ -167,8 +174,8 @@ def _allows_force_balance(real_recording: RealRecording) -> bool:
 def _choose_model(
     real_recording: RealRecording, recording: Recording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
-    """The given model, else a linear model fitted to the recording, and its force balance where there is no reference
-    recording. Raises StudyError."""
+    """Choose the given model, else a linear model fitted to the recording, with a force balance where there is no
+    reference recording. Raises StudyError where the given model does not fit the channels, or none can be fitted."""
     given_model = real_recording.read_model()
     if given_model is None:
         diagnosis_input = DiagnosisInput((recording,), (real_recording.name,), real_recording.found_map.files, ())
@@ -185,7 +192,7 @@ def _choose_model(
 
 
 def _make_refusal(real_recording: RealRecording, answer: str) -> RealAnswer:
-    """The answer for a recording that is not diagnosed."""
+    """Make the answer for a recording that is not diagnosed. answer: the reason, as a sentence."""
     diagnosis = real_recording.found_map.source.map.diagnosis
     return RealAnswer(
         folder=real_recording.folder.name,
@@ -214,56 +221,60 @@ def _make_refusal(real_recording: RealRecording, answer: str) -> RealAnswer:
     )
 
 
-def _test_on_further(test: FoundMap, real_recording: RealRecording, findings: Findings) -> FurtherTest:
-    """Test on a further recording; nothing is fitted to it except, where the map says so, its gain. The models are as
-    recorded, so that the direction in which commands are counted was decided once, for all recordings of the device."""
-    title, has_free_gain = test.source.map.title, test.source.map.diagnosis.volume_free
+def _test_on_further(test_map: FoundMap, real_recording: RealRecording, findings: Findings) -> FurtherTest:
+    """Test the re-tuned and the improved model on a further recording; at most its gain is fitted to it (`volume_free`
+    in the map). The sign of the commands is not chosen again for this recording (turns=False): it was decided once, for
+    all recordings of the device. A recording that cannot be used gives a test with the problem as text."""
+    title, has_free_gain = test_map.source.map.title, test_map.source.map.diagnosis.volume_free
     try:
-        recording = import_real_recording(test)
+        recording = import_real_recording(test_map)
         if _allows_force_balance(real_recording):
-            (recording,) = convert_all_to_force_driven(convert_to_driven_motions((recording,), turns=False)[0])
-        retuned, after = (
+            (recording,) = convert_all_to_force_driven(convert_to_driven_motions((recording,), may_reverse=False)[0])
+        retuned_error, improved_error = (
             compute_prediction_error(recording, model, "all")
             for model in (_require_retuned(findings), findings.improved)
         )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
-        text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
-        return FurtherTest(test.name, title, "", None, None, problem=text)
+        error_label = problem.happened if isinstance(problem, StudyError) else f"{problem}."
+        return FurtherTest(test_map.name, title, "", None, None, problem=error_label)
     error_without, error_with = (
-        errors.with_gain if has_free_gain else errors.without_gain for errors in (retuned, after)
+        errors.with_gain if has_free_gain else errors.without_gain for errors in (retuned_error, improved_error)
     )
-    text = after.error + (", one factor fitted" if has_free_gain else "")
+    error_label = improved_error.error + (", one factor fitted" if has_free_gain else "")
     stretches = (
         ()
-        if has_free_gain or after.error == "predicted force"
-        else _full_record_stretches(test.name, recording, retuned, after)
+        if has_free_gain or improved_error.error == "predicted force"
+        else _make_full_record_stretches(test_map.name, recording, retuned_error, improved_error)
     )
-    return FurtherTest(test.name, title, text, error_without, error_with, stretches)
+    return FurtherTest(test_map.name, title, error_label, error_without, error_with, stretches)
 
 
-def _full_record_stretches(
-    name: str, recording: Recording, retuned: PredictionError, after: PredictionError
+def _make_full_record_stretches(
+    name: str, recording: Recording, retuned_error: PredictionError, improved_error: PredictionError
 ) -> tuple[HeldOutStretch, ...]:
-    """The whole recording as one held-out stretch per channel, with the errors of both models."""
-    seconds = len(recording) / recording.sample_rate_hz
+    """Make one held-out stretch per channel from the whole recording, with the errors of both models."""
+    duration_s = len(recording) / recording.sample_rate_hz
     return tuple(
-        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.error, improved.error)
-        for channel, improved in zip(retuned.channels, after.channels, strict=False)
+        HeldOutStretch(
+            name, channel.name, channel.unit, 0.0, duration_s, channel.signal, channel.error, improved_channel.error
+        )
+        for channel, improved_channel in zip(retuned_error.channels, improved_error.channels, strict=False)
     )
 
 
 def _require_retuned(findings: Findings) -> MechanicalModel:
+    """Return the re-tuned model, which the findings of an answered recording always have."""
     assert findings.retuned is not None
     return findings.retuned
 
 
 def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: Findings) -> PairOutcome:
-    """The recordings before and after a change of the device: what was named, and the errors of the model before and
-    after it was re-tuned and effects were added."""
+    """Compare the recordings before and after a change of the device: the named effects, and the errors of the model
+    before and after it was re-tuned and effects were added. Both recordings must exist."""
     assert real_recording.reference is not None and case.reference is not None
     given_errors = compute_prediction_error(case.recording, case.model, "test")
     reference_errors = compute_prediction_error(case.reference, case.model, "test")
-    errors = findings.diagnosis.fit.test
+    test_errors = findings.diagnosis.fit.test
     return PairOutcome(
         changed=real_recording.changed,
         before=_join_file_names(real_recording.reference.files),
@@ -273,11 +284,12 @@ def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: 
         returned=findings.diagnosis.returned_set,
         as_before=given_errors.without_gain,
         gain=given_errors.with_gain,
-        retuned=errors.retuned,
-        with_effects=errors.after if findings.diagnosis.effects else None,
+        retuned=test_errors.retuned,
+        with_effects=test_errors.after if findings.diagnosis.effects else None,
         expected_left=reference_errors.without_gain,
     )
 
 
 def _join_file_names(files: Sequence[Path]) -> str:
+    """Join the names of files with commas."""
     return ", ".join(path.name for path in files)

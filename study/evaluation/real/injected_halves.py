@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.bases import bases_of
+from analysis.diagnosis.contrast.bases import build_bases
 from analysis.diagnosis.contrast.compared_base import Base
 from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
@@ -18,17 +18,17 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
 MAX_SAMPLES = 5_000
-"""Largest number of samples of a half, and of the lead recorded before it."""
+"""Largest number of samples of a half, and of the lead recorded before it. Chosen: bounds the time of a diagnosis."""
 MIN_LENGTH_RATIO = 0.6
-"""Shortest half as a fraction of the longest possible, where halves are stretches."""
+"""Shortest half as a fraction of the longest possible, where halves are stretches. Chosen."""
 MIN_PARTS = 4
-"""From this number of parts on, halves may also be drawn from parts."""
+"""Smallest number of parts from which halves may also be drawn from parts. Chosen: two in each half."""
 
 
 def draw_halves(recording: Recording, random: np.random.Generator) -> tuple[Recording, Recording]:
-    """Draw two adjoining stretches of the recording, or two random sets of its parts. Returns the half that stays
-    intact and the half for the fault, in random order. Both are without roles: the fit samples are drawn anew in
-    each."""
+    """Draw two adjoining stretches of the recording, or, with probability 1/2 from `MIN_PARTS` parts on, two random
+    sets of its parts. Returns the half that stays intact and the half for the fault, in random order. Both are without
+    roles: the fit samples are drawn anew in each."""
     without_roles = replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
     parts = find_parts(without_roles)
     if len(parts) >= MIN_PARTS and random.random() < 0.5:
@@ -80,8 +80,8 @@ def _join_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recor
 
 
 def _cut_half_with_lead(recording: Recording, start: int, stop: int) -> Recording:
-    """Cut the samples start to stop, and put what was recorded before them in front, outside all segments: a half
-    begins in the middle of a motion, and with the lead a simulation can start from rest."""
+    """Cut the samples start to stop, and keep up to `MAX_SAMPLES` samples before them as a lead, outside all segments:
+    a half begins in the middle of a motion, and with the lead a simulation can start from rest."""
     lead_samples = min(start, MAX_SAMPLES)
     lead_and_half = cut_part(recording, start - lead_samples, stop)
     half_segments = [
@@ -106,15 +106,15 @@ def _cut_half_with_lead(recording: Recording, start: int, stop: int) -> Recordin
 
 
 def blank_lead_responses(recording: Recording) -> Recording:
-    """The recording with NaN as response and position in its lead, the samples before the first segment; the command
-    there is kept."""
+    """Replace response and position by NaN in the lead, the samples before the first segment; the command there is
+    kept. Returns a new recording."""
     lead_samples = min((segment.start for segment in recording.segments), default=0)
     position = None if recording.position is None else _blank_lead(recording.position, lead_samples)
     return replace(recording, response=_blank_lead(recording.response, lead_samples), position=position)
 
 
 def _blank_lead(signal: Signal, lead_samples: int) -> Signal:
-    """The signal with NaN in its first `lead_samples` samples."""
+    """Replace the first `lead_samples` samples by NaN in a copy of the signal."""
     samples = signal.samples.copy()
     samples[:lead_samples] = np.nan
     return replace(signal, samples=samples)
@@ -123,7 +123,7 @@ def _blank_lead(signal: Signal, lead_samples: int) -> Signal:
 def compute_held_out_change(intact: Recording, faultless: Recording, faulty: Recording) -> float | None:
     """Compute the visibility of a fault: ratio of the prediction error on the half with the fault to that on the same
     half without it, for a model fitted to the intact half; in the axis or channel where it differs most from 1, by its
-    logarithm. None where no model can be fitted.
+    logarithm. None where no model can be fitted. The limits 1e-300 and 1e-12 only avoid a division by zero and log(0).
 
     The model is the baseline of a comparison: forces along the motion where they balance, otherwise an autoregression
     of each reading. It contains no faults.
@@ -132,29 +132,29 @@ def compute_held_out_change(intact: Recording, faultless: Recording, faulty: Rec
     if not faultless_parts or not faulty_parts or not intact_parts:
         return None
     try:
-        bases = next(bases_of(intact_parts, ()))[0]
-        ratios = [
+        bases = next(build_bases(intact_parts, ()))[0]
+        error_ratios = [
             _measure_error(base, intact_parts, faulty_parts)
             / max(_measure_error(base, intact_parts, faultless_parts), 1e-300)
             for base in bases
         ]
     except (np.linalg.LinAlgError, ValueError):
         return None
-    return max(ratios, key=lambda ratio: abs(np.log(max(ratio, 1e-12))))
+    return max(error_ratios, key=lambda ratio: abs(np.log(max(ratio, 1e-12))))
 
 
-def _measure_error(base: Base, clean_parts: tuple[Part, ...], other_parts: tuple[Part, ...]) -> float:
-    """Rms residual, on the other parts, of a base model fitted to the clean ones by least squares; in the unit of the
-    model's first column."""
-    clean_rows, other_rows = _stack_rows(base, clean_parts), _stack_rows(base, other_parts)
-    column_rms = np.sqrt(np.mean(clean_rows**2, axis=0))
+def _measure_error(base: Base, fitted_parts: tuple[Part, ...], tested_parts: tuple[Part, ...]) -> float:
+    """Compute the rms residual on the tested parts of a base model fitted to the fitted parts by least squares, in the
+    unit of the model's first column."""
+    fitted_rows, tested_rows = _stack_rows(base, fitted_parts), _stack_rows(base, tested_parts)
+    column_rms = np.sqrt(np.mean(fitted_rows**2, axis=0))
     column_rms = np.where(column_rms > 0, column_rms, 1.0)
-    weights = solve_residual_weights((clean_rows / column_rms).T @ (clean_rows / column_rms)) / column_rms
-    return float(np.sqrt(np.mean((other_rows @ weights * column_rms[0]) ** 2)))
+    weights = solve_residual_weights((fitted_rows / column_rms).T @ (fitted_rows / column_rms)) / column_rms
+    return float(np.sqrt(np.mean((tested_rows @ weights * column_rms[0]) ** 2)))
 
 
 def _stack_rows(base: Base, parts: tuple[Part, ...]) -> FloatArray:
-    """(n, k): rows of the model's regression at the valid samples of all parts."""
+    """Stack the rows (n, k) of the model's regression at the valid samples of all parts."""
     return np.vstack(
         [part[mask] for part, mask in zip(base.build_rows(parts), base.mask_valid_samples(parts), strict=True)]
     )

@@ -1,7 +1,7 @@
-"""Inventory of a folder of real recordings: sub-folders of recordings with maps that say how to read them.
+"""Inventory of a folder of real recordings: sub-folders of recordings with import maps.
 
-A map may also say that a recording only tests another's diagnosis (`tests`), and that two were made before and after a
-change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`.
+A map may also state that a recording only tests the diagnosis of another one (`tests`), and that two were made before
+and after a change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from analysis.reports.real_report import UnusableInput
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.errors import StudyError
 from study.importing.map_library import FoundMap, find_maps_for_folder, make_map_from_headers
-from study.importing.model_library import model_for
+from study.importing.model_library import find_model_path
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 
@@ -23,7 +23,7 @@ class RealRecording:
     folder: Path
     """Sub-folder in which it lies."""
     found_map: FoundMap
-    """Its files, and the map that says how to read them."""
+    """Its files, and their import map."""
     tests: tuple[FoundMap, ...] = ()
     """Recordings of the same device that are only predicted."""
     reference: FoundMap | None = None
@@ -63,9 +63,10 @@ class RealRecording:
         return tuple(path for test in self.tests for path in (*test.files, test.source.path))
 
     def _find_model_path(self) -> Path | None:
-        """Path of the model that the map names; None where it names none. Raises StudyError for an unknown model."""
+        """Find the path of the model that the map names; None where it names none. Raises StudyError for an unknown
+        model."""
         model_name = self.found_map.source.map.diagnosis.model
-        return model_for(model_name, self.folder) if model_name else None
+        return find_model_path(model_name, self.folder) if model_name else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,7 @@ class RealFolder:
 
     recordings: tuple[RealRecording, ...]
     troubles: tuple[UnusableInput, ...]
-    """Why a sub-folder could not be used, by its name."""
+    """Sub-folders that could not be used, with the reason."""
 
 
 def read_real_folder(folder: Path) -> RealFolder:
@@ -103,12 +104,13 @@ def read_real_folder(folder: Path) -> RealFolder:
 
 
 def _describe_problem(problem: StudyError | OSError) -> str:
-    """Why a sub-folder could not be used, as a sentence."""
+    """Describe why a sub-folder could not be used, as a sentence."""
     return problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
 
 
 def _select_recordings(folder: Path, found_maps: Sequence[FoundMap]) -> list[RealRecording]:
-    """The recordings of a sub-folder that are to be diagnosed. found_maps: all of its recordings with their maps."""
+    """Select the recordings of a sub-folder that are to be diagnosed: those that do not only test another one.
+    found_maps: all of its recordings with their maps."""
     recordings = []
     for found_map in found_maps:
         if found_map.source.map.diagnosis.tests and any(_is_test_of(found_map, candidate) for candidate in found_maps):
@@ -120,7 +122,7 @@ def _select_recordings(folder: Path, found_maps: Sequence[FoundMap]) -> list[Rea
 
 
 def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
-    """Whether `test` only tests what was found in `base`. With one recording per file, the file names must agree up
+    """Whether `test` only tests the diagnosis of `base`. With one recording per file, the file names must agree up
     to the first underscore."""
     tested_name = test.source.map.diagnosis.tests
     if not tested_name or base.source.map.diagnosis.tests:
@@ -132,8 +134,8 @@ def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
 
 
 def _find_pair(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
-    """The recording before a change of the device and the change in words, as the map states; None and nothing where
-    the map states none, or that recording is not there."""
+    """Find the recording before a change of the device, and the change in words, as the map states them; None and an
+    empty text where the map states none or that recording is missing."""
     for pair in found_map.source.map.diagnosis.pair:
         if found_map.files[0].match(pair.after):
             reference = next(

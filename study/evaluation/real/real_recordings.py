@@ -23,7 +23,7 @@ from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import StudyError, UserInterruptError, WrongUseError, convert_interrupts
 from study.evaluation.bank.ask_engine import Workers
-from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
+from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, make_crash_result
 from study.evaluation.real.inject_real import load_carriers, run_injections
 from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
 from study.evaluation.real.reuse_answers import (
@@ -267,7 +267,7 @@ def _diagnose_and_write(
     except Exception as crash:
         if not guard.enabled:
             raise
-        return write_result(report_crash(real_recording, crash))
+        return write_result(make_crash_result(real_recording, crash))
 
 
 def _write_diagnosis(folder: Path, result: RealDiagnosis, origin: Provenance) -> None:

@@ -1,4 +1,5 @@
-"""Lines for the terminal that summarise the diagnosis of a folder of real recordings (`hapteq real`)."""
+"""Format the lines for the terminal that summarise the diagnosis of a folder of real recordings. Called by
+`study.cli.real` (`hapteq real`)."""
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import format_error
@@ -8,30 +9,30 @@ from analysis.reports.real_report import VERDICT_WORDS
 from study.evaluation.real.write_real import WrittenReal
 
 
-def real_lines(written: WrittenReal) -> tuple[str, ...]:
-    """Lines for the terminal: an answer per recording, what could not be used, injected faults, and the paths
-    written."""
-    results = written.results
+def format_real_lines(written_results: WrittenReal) -> tuple[str, ...]:
+    """Format the lines: an answer per recording, unusable sub-folders with the reason, rates of injected faults that
+    were found, and the paths of page and table."""
+    results = written_results.results
     troubles = tuple(f"Could not be used: {trouble.location}: {trouble.reason}" for trouble in results.troubles)
     figures = score_injections(results.injected) if results.injected else ()
     injected_lines = tuple(f"Injected: {figure.name}: {format_rate(figure)}" for figure in figures)
     lines = (*(_format_answer(answer) for answer in results.answers), *troubles, *injected_lines)
-    return (*lines, "", f"Page: {written.page}", f"Table: {written.table}")
+    return (*lines, "", f"Page: {written_results.page}", f"Table: {written_results.table}")
 
 
 def _format_answer(real_answer: RealAnswer) -> str:
-    """One recording: verdict, effects, held-out errors as fractions of the signal (model as given, re-tuned, with the
-    effects, black box), and duration in seconds; the answer in words where no error was measured."""
+    """Format the line of one recording: verdict, effects, held-out errors as fractions of the signal (model as given,
+    re-tuned, with the effects, black box), and duration in seconds; the answer in words where no error was measured."""
     effects_text = f": {', '.join(real_answer.effects)}" if real_answer.effects else ""
     if real_answer.verdict == "unexplained" and real_answer.candidates:
         effects_text = f", best candidate (not confirmed) {real_answer.candidates[0].effect}"
-    text = f"{real_answer.folder}, {real_answer.recording}: {VERDICT_WORDS[real_answer.verdict]}{effects_text}"
+    answer_text = f"{real_answer.folder}, {real_answer.recording}: {VERDICT_WORDS[real_answer.verdict]}{effects_text}"
     if real_answer.held_out is None:
-        return f"{text}. {real_answer.answer}"
+        return f"{answer_text}. {real_answer.answer}"
     errors = real_answer.held_out
     after_text = f", with what was found {format_error(errors.after)}" if real_answer.effects else ""
     black_box_text = "" if real_answer.black_box is None else f", black box {format_error(real_answer.black_box)}"
     return (
-        f"{text}. Held out: as given {format_error(errors.before)}, re-tuned {format_error(errors.retuned)}"
+        f"{answer_text}. Held out: as given {format_error(errors.before)}, re-tuned {format_error(errors.retuned)}"
         f"{after_text}{black_box_text} ({real_answer.seconds:.0f} s)."
     )

@@ -1,8 +1,8 @@
 """Play baseline methods of equalization on the simulated device, for comparison with the equalizer.
 
 Each method is played at the centre of the workspace, near its edge, and in a simulated hand. All baselines are designed
-from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them. Called by the
-reproduction of the figures (`study.evaluation.reproduction`).
+from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them. Called by
+`reproduce_paper`.
 """
 
 from collections.abc import Callable
@@ -50,13 +50,13 @@ def play_baselines(
 
     estimate: frequency response at the centre, including the spring. on_share: called with the fraction done, 0 to 1.
     """
-    inverses = compute_baseline_inverses(
+    baseline_inverses = compute_baseline_inverses(
         models.centre, estimate, _list_band_frequencies_hz(plan, models.centre.sample_rate_hz)
     )
-    row_count = len(_PLACEMENTS) * len(inverses) + 2
+    row_count = len(_PLACEMENTS) * len(baseline_inverses) + 2
     responses: list[PlayedResponse] = []
     for placement in _PLACEMENTS:
-        for inverse in inverses:
+        for inverse in baseline_inverses:
             row = PlaybackRow(
                 f"{inverse.name}, {placement.description}",
                 _make_driver(plan, inverse),
@@ -72,8 +72,8 @@ def play_baselines(
 
 
 def _make_equalizer_rows(placement: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
-    """The equalizer designed for a condition: from the model identified in the hand, or at the edge from the blended
-    models of other places; none at the centre."""
+    """Make the row of the equalizer designed for a condition: from the model identified in the hand, or at the edge
+    from the blended models of other places; none at the centre."""
     if placement.hand:
         return (PlaybackRow("model identified in the hand", make_single_model_driver(models.hand), hand=True),)
     if placement.place_m == EDGE:
@@ -86,8 +86,8 @@ def _make_equalizer_rows(placement: _Placement, models: PlacedModels) -> tuple[P
 
 
 def _list_band_frequencies_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
-    """(lines,): frequencies (Hz) of the spectral lines in the band, for the period of the plan.
-    rate_hz: sample rate."""
+    """List the frequencies (lines,), Hz, of the spectral lines in the band, for the period of the plan. rate_hz: sample
+    rate."""
     period_samples = round(plan.period_s * rate_hz)
     return np.asarray(
         np.fft.rfftfreq(period_samples, 1 / rate_hz)[mask_lines_in_band(plan.band_hz, period_samples, rate_hz)],
@@ -96,11 +96,11 @@ def _list_band_frequencies_hz(plan: ReproductionPlan, rate_hz: float) -> FloatAr
 
 
 def _make_driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
-    """The driver that multiplies the spectrum of the target acceleration by the inverse, line by line in the band, to
-    give the forces (n, axes), N; lines outside the band are zero."""
+    """Make the driver that multiplies the spectrum of the target acceleration by the inverse, line by line in the band,
+    to give the forces (n, axes), N; lines outside the band are zero."""
 
     def drive(target: Signal) -> FloatArray:
-        """Forces (n, axes), N, for a period of the target acceleration."""
+        """Compute the forces (n, axes), N, for a period of the target acceleration, m/s²."""
         band_lines = mask_lines_in_band(plan.band_hz, len(target), target.sample_rate_hz)
         spectrum = np.fft.rfft(target.samples, axis=0)
         forces = np.zeros((len(spectrum), inverse.response.shape[1]), dtype=complex)

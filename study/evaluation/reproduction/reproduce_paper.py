@@ -1,5 +1,10 @@
-"""Reproduce the published figures 1 to 5 on the simulated omega.3 (`hapteq reproduce`); recordings and models are
-cached."""
+"""Reproduce the published figures 1 to 5 on the simulated omega.3. Called by `study.cli.reproduce` (`hapteq
+reproduce`).
+
+Steps: record the device (`reproduce_recordings`), run the study with simulated participants, identify the models, play
+the equalizer and the baselines, write figures, document and page. Sessions, recordings and models are reused by the
+next run.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +26,7 @@ from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
 from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
 from study.evaluation.reproduction.reproduction_plan import INTERMEDIATE_PLACES, ReproductionPlan, StepProgress
-from study.evaluation.reproduction.reproduction_results import Results
+from study.evaluation.reproduction.reproduction_results import ReproductionResults
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
 from study.store.disk.file_errors import CannotWriteError, UnusableFileError
 from study.store.disk.provenance import compute_sha256
@@ -35,14 +40,15 @@ from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReproducedModel:
-    """A model behind figure 5: identified once from its recording and reused by the next run."""
+    """A model for figure 5, identified from a recording, with its held-out test."""
 
     model: IdentifiedModel
     """Includes the spring, so that playback under the same spring needs no separate compensation."""
     tested: HeldOutValidation | None
+    """Test on the held-out part of the recording; None where there is none."""
 
     def as_used_model(self, name: str) -> UsedModel:
-        """Summary for the report. name: of its recording."""
+        """Convert to the summary for the report. name: of its recording."""
         quality = self.model.quality
         assert quality is not None, "every model that is kept or made here has one"
         return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
@@ -52,7 +58,8 @@ def identify_or_load(
     plan: ReproductionPlan, cached: CachedRecording, on_share: Callable[[float], None]
 ) -> ReproducedModel:
     """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
-    quality, is replaced."""
+    quality, is replaced. on_share: called with the fraction done, 0 to 1. Raises StudyError where the identification
+    fails."""
     path = plan.models / cached.path.name
     model = _load_cached_model(path, plan, cached.path)
     if model is None:
@@ -64,8 +71,8 @@ def identify_or_load(
 
 
 def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
-    """The cached model, if it was identified from the recording `source` with the order and band of the plan and states
-    its quality; else None."""
+    """Load the cached model, if it was identified from the recording `source` with the order and band of the plan and
+    states its quality; else None."""
     try:
         model = read_identified_model(path) if path.exists() else None
     except UnusableFileError:
@@ -77,19 +84,27 @@ def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> Iden
 
 
 def use_excitation_as_command(recording: Recording) -> Recording:
-    """The recording from excitation to response, so that the spring is part of the device."""
+    """Replace the command by the excitation, where there is one, so that the spring is part of the device."""
     return replace(recording, command=recording.excitation or recording.command)
 
 
-SUBJECT_S, RECORDING_S, MODEL_S, PLAYING_S, BASELINES_S, WRITING_S = 5.0, 2.0, 12.0, 8.0, 12.0, 8.0
-"""Approximate duration of each step (s), for the progress only."""
+(
+    SUBJECT_DURATION_S,
+    RECORDING_DURATION_S,
+    MODEL_DURATION_S,
+    PLAYING_DURATION_S,
+    BASELINES_DURATION_S,
+    WRITING_DURATION_S,
+) = 5.0, 2.0, 12.0, 8.0, 12.0, 8.0
+"""Approximate duration of each step (s), the first per simulated participant, for the progress only."""
 
 CENTRE_NAME, FRICTIONLESS_NAME, HAND_NAME = "centre", "frictionless", "hand"
 """Recordings at the centre, without friction and with a hand, and the models of them."""
 
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
-    """Make all figures. `on_progress(share)`, 0 to 1. Resumable after UserInterruptError. Raises StudyError."""
+    """Make all figures. on_progress: called with the fraction done, 0 to 1. After UserInterruptError, the next call
+    continues. Raises StudyError where a step fails."""
     requests = _list_requests(plan)
     model_names = _list_model_names()
     steps = StepProgress(_estimate_step_durations_s(plan, requests, model_names), on_progress)
@@ -109,7 +124,7 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
 
 
 def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
-    """All recordings that the figures need, by name."""
+    """List the recordings that the figures need, by name."""
     protocols = plan.protocols
     requests = (
         RecordingRequest("ellipsoid", protocols.ellipsoid),
@@ -126,26 +141,26 @@ def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
 
 
 def _list_intermediate_names() -> tuple[str, ...]:
-    """Names of the recordings at the intermediate places."""
+    """List the names of the recordings at the intermediate places."""
     return tuple(f"between_{number}" for number in range(1, len(INTERMEDIATE_PLACES) + 1))
 
 
 def _list_model_names() -> tuple[str, ...]:
-    """Names of the recordings from which a model is identified."""
+    """List the names of the recordings from which a model is identified."""
     return (CENTRE_NAME, *_list_intermediate_names(), FRICTIONLESS_NAME, HAND_NAME)
 
 
 def _estimate_step_durations_s(
     plan: ReproductionPlan, requests: Mapping[str, RecordingRequest], model_names: tuple[str, ...]
 ) -> dict[str, float]:
-    """Approximate duration (s) by step, for the progress."""
+    """Estimate the duration (s) of each step, by its name, for the progress."""
     return {
-        **{f"recording {name}": RECORDING_S for name in requests},
-        "study": SUBJECT_S * plan.subjects / plan.workers,
-        **{f"model {name}": MODEL_S for name in model_names},
-        "playing": PLAYING_S,
-        "baselines": BASELINES_S,
-        "writing": WRITING_S,
+        **{f"recording {name}": RECORDING_DURATION_S for name in requests},
+        "study": SUBJECT_DURATION_S * plan.subjects / plan.workers,
+        **{f"model {name}": MODEL_DURATION_S for name in model_names},
+        "playing": PLAYING_DURATION_S,
+        "baselines": BASELINES_DURATION_S,
+        "writing": WRITING_DURATION_S,
     }
 
 
@@ -173,7 +188,7 @@ def _collect_results(
     identified: Mapping[str, ReproducedModel],
     collected: CollectedTrials,
     steps: StepProgress,
-) -> Results:
+) -> ReproductionResults:
     """Compute all figures. Raises StudyError where a recording does not suffice for its figure."""
     models = PlacedModels(
         centre=identified[CENTRE_NAME].model,
@@ -193,7 +208,7 @@ def _collect_results(
             "Take other recording protocols, or another folder with --out.",
             saved=f"Sessions, recordings and models are in {plan.output_folder}.",
         ) from problem
-    return Results(
+    return ReproductionResults(
         study=analyse_study(collected.trials, collected.protocol),
         ellipsoids=ellipsoid_results,
         device=device,
@@ -210,11 +225,11 @@ def _collect_results(
 
 
 def _measure_device(recording: Recording) -> MeasuredDevice:
-    """Frequency response of the sweep, its resonances and the onset of coupling."""
+    """Estimate the frequency response of the sweep, its resonances and the onset of coupling."""
     response = estimate_transfer((recording,))
     return MeasuredDevice(response, find_resonances(response), find_coupling_onset(response))
 
 
 def _measure_ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:
-    """Acceleration ellipsoid of each stimulus of the recording."""
+    """Compute the acceleration ellipsoid of each stimulus of the recording."""
     return compute_ellipsoids(recording, read_sensor_frame(recording))

@@ -37,7 +37,7 @@ PLAYED_PERIODS = 2
 FADE_S = 0.5
 """Duration of the fade-in of the periodic forces (s). Chosen."""
 WAVE_SEED = 5
-"""Seed of the wanted acceleration, the same for all rows, so that they can be compared."""
+"""Seed of the wanted acceleration, the same for all rows, so that they can be compared. Chosen."""
 
 Driver = Callable[[Signal], FloatArray]
 """Converts one period of wanted accelerations (period, 3), m/s², to the forces (period, 3) that should cause it, up to
@@ -62,7 +62,7 @@ class PlaybackRow:
 
 
 def drive_without_equalizer(target: Signal) -> FloatArray:
-    """Driver without an equalizer: forces (period, 3) equal to the wanted accelerations, up to a common factor."""
+    """Drive without an equalizer: forces (period, 3) equal to the wanted accelerations, up to a common factor."""
     return target.samples
 
 
@@ -88,7 +88,7 @@ def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n:
     scaled to the peak `peak_n` (N), and the wanted acceleration by the same factor."""
     rate_hz = device.info.sample_rate_hz
     target_wave = make_target_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
-    targets, delivered, total_clipped = [], [], 0
+    targets, delivered_accelerations, total_clipped_ticks = [], [], 0
     for axis in range(3):
         samples = np.zeros((len(target_wave), 3))
         samples[:, axis] = target_wave
@@ -96,9 +96,9 @@ def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n:
         scale = peak_n / float(np.linalg.norm(period_force, axis=1).max())
         true_acceleration, clipped_ticks = _play_to_steady_state(device, scale * period_force)
         targets.append(scale * target_wave)
-        delivered.append(true_acceleration)
-        total_clipped += clipped_ticks
-    frequency_hz, response = estimate_response(np.array(targets), delivered, plan.band_hz, rate_hz)
+        delivered_accelerations.append(true_acceleration)
+        total_clipped_ticks += clipped_ticks
+    frequency_hz, response = estimate_response(np.array(targets), delivered_accelerations, plan.band_hz, rate_hz)
     return PlayedResponse(
         name=row.name,
         device=device.info.name,
@@ -108,14 +108,14 @@ def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n:
         frequency_hz=frequency_hz,
         response=response,
         peak_force_n=peak_n,
-        clipped_ticks=total_clipped,
+        clipped_ticks=total_clipped_ticks,
     )
 
 
 def _play_to_steady_state(device: Device, period_force: FloatArray) -> tuple[FloatArray, int]:
-    """Play `PLAYED_PERIODS` periods: true acceleration of the handle in the last, (period, 3) in m/s², and the ticks at
-    which a cap limited the force, summed over the three caps. period_force: (period, 3), N. Raises StudyError where the
-    device does not play to the end or reports no true acceleration."""
+    """Play `PLAYED_PERIODS` periods; returns the true acceleration of the handle in the last, (period, 3) in m/s², and
+    the number of ticks at which a cap limited the force, summed over the three caps. period_force: (period, 3), N.
+    Raises StudyError where the device does not play to the end or reports no true acceleration."""
     rate_hz = device.info.sample_rate_hz
     forces = apply_fades(np.tile(period_force, (PLAYED_PERIODS, 1)), round(FADE_S * rate_hz), 0)
     run = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))

@@ -1,6 +1,6 @@
 """Settings of `hapteq reproduce`, the folders of its results, and its overall progress.
 
-Used by all modules of this package; `study.cli.reproduce` makes the plan.
+`study.cli.reproduce` makes the plan; the modules of this package that record, play and write read it.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,8 +42,10 @@ class ReproductionPlan:
 
     output_folder: Path
     subjects: int = 10
+    """Number of simulated participants."""
     seed: int = 1
     workers: int = 2
+    """Number of worker processes."""
     protocols: ReproducedProtocols = ReproducedProtocols()
     order: int = 26
     """Order (number of states) of the identified models."""

@@ -1,4 +1,5 @@
-"""Results of a reproduction of the paper's five figures: what each step found, for document, figures and page."""
+"""Results of a reproduction of the paper's five figures: filled by `reproduce_paper`, and written by
+`write_reproduction` to document, figures and page."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from study.evaluation.reproduction.reproduce_equalized import EqualizedPlayback
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Results:
+class ReproductionResults:
     """Results of all steps of a reproduction."""
 
     study: StudyAnalysis
@@ -23,6 +24,7 @@ class Results:
     device: MeasuredDevice
     """Measured frequency responses of the simulated device (figures 1 and 4)."""
     device_name: str
+    """Name of the device in its recordings."""
     played: EqualizedPlayback
     """Playback with the equalizer (figure 5)."""
     baselines: tuple[PlayedResponse, ...]

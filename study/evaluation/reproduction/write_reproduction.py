@@ -1,4 +1,5 @@
-"""Write the results of a reproduction to its folder: figures, document of numbers (JSON), page (HTML)."""
+"""Write the results of a reproduction to its folder: figures, document of numbers (JSON), page (HTML). Called by
+`reproduce_paper`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from analysis.evaluation.reproduction.equalized_findings import make_equalized_f
 from analysis.evaluation.reproduction.played_response import make_played_row
 from analysis.evaluation.reproduction.response_findings import make_band_findings, make_response_findings
 from analysis.evaluation.reproduction.study_findings import find_direction_limit, make_study_findings
-from analysis.figures.reproduction_pictures import reproduction_pictures
+from analysis.figures.reproduction_pictures import make_reproduction_pictures
 from analysis.reports.reproduction_report import render_reproduction_report, summarise_figures
 from equalizer.identification.frequency_response.frequency_bands import (
     PUBLISHED_DIRECTION_LIMIT_HZ,
@@ -18,7 +19,7 @@ from equalizer.identification.frequency_response.frequency_bands import (
     compute_frequency_bands,
 )
 from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
-from study.evaluation.reproduction.reproduction_results import Results
+from study.evaluation.reproduction.reproduction_results import ReproductionResults
 from study.local_clock import format_local_now
 from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
@@ -43,16 +44,16 @@ class WrittenReproduction:
 
 
 def write_reproduction_folder(
-    plan: ReproductionPlan, results: Results, on_share: Callable[[float], None]
+    plan: ReproductionPlan, results: ReproductionResults, on_share: Callable[[float], None]
 ) -> WrittenReproduction:
     """Write figures, document and page, replacing those of an earlier run. on_share: called with the fraction done, 0
-    to 1. Raises CannotWriteError."""
+    to 1; the intermediate fractions are approximate. Raises CannotWriteError."""
     limit_hz = find_direction_limit(results.study)
     # Where the thresholds give no limit of direction, the published one separates the bands.
     used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
     bands = compute_frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
     reproduction = _make_document(plan, results, bands, limit_hz, used_limit_hz)
-    pictures = reproduction_pictures(
+    pictures = make_reproduction_pictures(
         results.study, results.ellipsoids, results.device, bands, used_limit_hz, results.played.rows
     )
     on_share(0.2)
@@ -71,13 +72,13 @@ def write_reproduction_folder(
 
 def _make_document(
     plan: ReproductionPlan,
-    results: Results,
+    results: ReproductionResults,
     bands: tuple[FrequencyBand, ...],
     limit_hz: float | None,
     used_limit_hz: float,
 ) -> Reproduction:
-    """The document: findings on each figure, playback rows, baselines and models. limit_hz: limit of direction from the
-    thresholds, None without one; used_limit_hz: the limit that separates the bands (Hz)."""
+    """Make the document: findings on each figure, playback rows, baselines and models. limit_hz: limit of direction
+    from the thresholds, None without one; used_limit_hz: the limit that separates the bands (Hz)."""
     playback = results.played
     return Reproduction(
         device=results.device_name,
@@ -98,15 +99,16 @@ def _make_document(
     )
 
 
-def _make_equalization_findings(results: Results) -> FigureFindings:
-    """Findings on figure 5, with the errors of the tested models with and without friction where both are known."""
+def _make_equalization_findings(results: ReproductionResults) -> FigureFindings:
+    """Make the findings on figure 5, with the errors of the tested models with and without friction where both are
+    known."""
     with_friction, frictionless = results.tested, results.tested_frictionless
     errors = (with_friction.error, frictionless.error) if with_friction and frictionless else None
     return make_equalized_findings(results.played.rows, errors, (*results.remarks, *results.played.remarks))
 
 
 def _format_provenance(provenance: Provenance) -> dict[str, str]:
-    """Provenance as entries of the last section of the page."""
+    """Format the provenance as entries, by their names, of the last section of the page."""
     return {
         "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in provenance.parents),
         "study protocol": f"hash {provenance.protocol_hash}",

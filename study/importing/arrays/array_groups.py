@@ -31,8 +31,8 @@ class RunGroups:
 def find_runs(arrays: Mapping[str, npt.NDArray[Any]], min_samples: int) -> RunGroups:
     """Find the runs in a file, by the separator that gives the largest number of arrays in runs. Each run must contain
     an array of at least `min_samples` values; without two such runs the result is empty. arrays: by name."""
-    long_names = [name for name, array in arrays.items() if array.size >= min_samples]
-    candidates = [_group_arrays(tuple(arrays), long_names, separator) for separator in _SEPARATORS]
+    long_array_names = [name for name, array in arrays.items() if array.size >= min_samples]
+    candidates = [_group_arrays(tuple(arrays), long_array_names, separator) for separator in _SEPARATORS]
     return max(candidates, key=lambda groups: len(groups.prefixes) * len(groups.names))
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_comment, is_number, is_text, split_row
+from study.importing.arrays.table_cells import MISSING, Line, has_number, is_comment, is_number, is_text, split_row
 from study.importing.arrays.table_layout import TableLayout, find_layout
 from study.importing.arrays.table_marks import NO_THOUSANDS
 from study.importing.arrays.table_text import read_text
@@ -38,7 +38,7 @@ _NUMBER_FIELD = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;
 """Matches a line with a field that is a number, with any delimiter between its fields."""
 _GROUPED_NUMBER = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
 """Matches a number with thousands separators, which is not read."""
-_MISSING_FIELDS = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
+_MISSING_FIELDS = [*MISSING, *(word.upper() for word in MISSING), "NaN", "None", "Null"]
 """Fields that stand for a missing sample."""
 
 
@@ -138,7 +138,7 @@ def _rename_in_seconds(name: str, names: Iterable[str]) -> str:
 
 def _find_number(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
     """Find the first number in a column that was recognised as words: the problem, empty without a number."""
-    numbers = column.fillna("").map(lambda field: holds_number([field.strip()], layout.decimal)).to_numpy()
+    numbers = column.fillna("").map(lambda field: has_number([field.strip()], layout.decimal)).to_numpy()
     if not numbers.any():
         return FaultyColumn()
     number = body[int(np.argmax(numbers))][0]
@@ -146,7 +146,7 @@ def _find_number(column: "pd.Series[str]", name: str, body: list[Line], layout: 
 
 
 def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
-    return column.str.strip().str.lower().isin(EMPTY)
+    return column.str.strip().str.lower().isin(MISSING)
 
 
 def convert_times(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
@@ -221,7 +221,7 @@ def _find_comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
     omitted = [line for line in below if line[0] > first]
     for number, line in below if layout.delimiter != " " else ():
         fields = split_row(line, layout.delimiter)
-        is_data = any(fields[1:]) if number > first else holds_number(fields[1:], layout.decimal)
+        is_data = any(fields[1:]) if number > first else has_number(fields[1:], layout.decimal)
         if len(fields) >= width > 1 and is_data:
             raise ValueError(
                 f"line {number} begins with '{line.lstrip()[0]}' as a comment does, but has the fields of a row; "
@@ -282,7 +282,7 @@ def _parse_numbers(
     fields = column.str.strip()
     if layout.decimal == ",":
         fields = fields.str.replace(".", " ", regex=False).str.replace(",", ".", regex=False)
-    missing = fields.str.lower().isin(EMPTY)
+    missing = fields.str.lower().isin(MISSING)
     values = pd.to_numeric(fields.where(~missing), errors="coerce")
     unparsed = (values.isna() & ~missing).to_numpy()
     stamps = fields.map(is_stamp).to_numpy() & unparsed if unparsed.any() else unparsed

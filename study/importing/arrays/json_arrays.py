@@ -19,16 +19,17 @@ from study.regular_file import open_regular, read_regular
 from study.store.disk.strict_json import load_json
 
 Array = npt.NDArray[Any]
+"""Array of numbers or texts, or a placeholder (an object array with one entry) for one that is not read."""
 MAX_JSON_BYTES = 2**26
-"""Largest JSON file in bytes: parsed, it takes about twenty times as much memory."""
+"""Largest JSON file in bytes (64 MiB). Chosen: parsed, it takes about twenty times as much memory."""
 _MAX_OBJECTS, _MAX_VALUES = 2**21, 2**24
-"""Most objects and lists of a file, each of which takes hundreds of bytes of memory, and most values of it."""
-_OWN_PREFIX = "hapteq"
-"""Beginning of the names of hapteq's own formats."""
-_OWN_FORMAT_PATTERN = re.compile(rb'"format"\s*:\s*"hapteq')
+"""Most objects and lists of a file, each of which takes hundreds of bytes of memory, and most values of it. Chosen."""
+_HAPTEQ_FORMAT_PREFIX = "hapteq"
+"""Beginning of the names of the formats that hapteq writes."""
+_HAPTEQ_FORMAT_PATTERN = re.compile(rb'"format"\s*:\s*"hapteq')
 """Bytes in which a document declares one of these formats."""
 _SEARCHED_BYTES = 4096
-"""Bytes at the start of a file that are searched for `_OWN_FORMAT_PATTERN`."""
+"""Bytes at the start of a file that are searched for `_HAPTEQ_FORMAT_PATTERN`."""
 _UNIT_KEYS = ("unit", "units")
 """Keys that state the unit of the values in the same object."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
@@ -36,13 +37,14 @@ _VALUE_KEYS = ("values", "value", "data", "samples")
 
 
 def read_json_arrays(path: Path) -> dict[str, Array]:
-    """Arrays of a JSON file by name. Raises OSError; ValueError with the problem."""
+    """Read the arrays of a JSON file, by name. Raises OSError; ValueError, with the problem as text, where the file is
+    no JSON, a document of hapteq, or too large."""
     try:
         text = read_regular(path, MAX_JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as problem:
         raise ValueError(f"it is no UTF-8 text (byte {problem.start}), as JSON is; save it as UTF-8") from problem
     document = _parse(text)
-    if isinstance(document, dict) and str(document.get("format", "")).startswith(_OWN_PREFIX):
+    if isinstance(document, dict) and str(document.get("format", "")).startswith(_HAPTEQ_FORMAT_PREFIX):
         raise ValueError(f"it is a hapteq document ({document['format']}), and holds no recording")
     arrays = dict(_find_arrays(document, ()))
     parent_paths = {key_path[:-1] for key_path, array in arrays.items() if array.size > 1}
@@ -53,15 +55,15 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
     }
 
 
-def is_own_document(path: Path) -> bool:
-    """Whether the beginning of a JSON file declares one of our own formats."""
+def is_hapteq_document(path: Path) -> bool:
+    """Whether the beginning of a JSON file declares a format that hapteq writes."""
     with open_regular(path) as file:
-        return _OWN_FORMAT_PATTERN.search(file.read(_SEARCHED_BYTES)) is not None
+        return _HAPTEQ_FORMAT_PATTERN.search(file.read(_SEARCHED_BYTES)) is not None
 
 
 def _parse(text: str) -> Any:
-    """The document of a JSON text, or the records of JSON Lines. Raises ValueError for another text, or too much
-    content."""
+    """Parse a JSON text to its document, or JSON Lines to a list of records. Raises ValueError for another text, or too
+    much content."""
     if text.count("{") + text.count("[") > _MAX_OBJECTS or text.count(",") > _MAX_VALUES:
         raise ValueError(f"it has more than {_MAX_OBJECTS} records or {_MAX_VALUES} values; save it as .csv or .npz")
     try:
@@ -78,7 +80,7 @@ def _parse(text: str) -> Any:
 
 
 def _parse_record(number: int, line: str) -> Any:
-    """The record on one line. Raises ValueError unless it is a JSON object."""
+    """Parse the record on one line. Raises ValueError unless it is a JSON object."""
     try:
         record = load_json(line, with_nan=True)
     except ValueError as problem:
@@ -89,7 +91,8 @@ def _parse_record(number: int, line: str) -> Any:
 
 
 def _find_arrays(value: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Arrays in a JSON value, each with the path of keys that leads to it; a value outside any object is `data`."""
+    """Find the arrays in a JSON value, each with the path of keys that leads to it; a value outside any object is
+    `data`."""
     match value:
         case dict():
             yield from _find_arrays_in_object(value, key_path)
@@ -104,8 +107,8 @@ def _find_arrays(value: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[
 def _find_arrays_in_object(
     value: Mapping[str, Any], key_path: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Arrays of an object, each with its path of keys. `{"unit": "N", "values": [...]}` is one array, with the unit in
-    brackets behind its name."""
+    """Find the arrays of an object, each with its path of keys. `{"unit": "N", "values": [...]}` is one array, with the
+    unit in brackets behind its name."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     list_keys = [key for key, entry in value.items() if isinstance(entry, list)]
     values_key = list_keys[0] if len(list_keys) == 1 else next((key for key in _VALUE_KEYS if key in list_keys), "")
@@ -121,8 +124,8 @@ def _find_arrays_in_object(
 
 
 def _make_sibling_placeholder(entry: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Placeholder for an entry in the same object as values and their unit, such as a description. Raises ValueError
-    unless the entry is a text or null: a number, such as a scale, may change the values."""
+    """Make the placeholder for an entry in the same object as values and their unit, such as a description. Raises
+    ValueError unless the entry is a text or null: a number, such as a scale, may change the values."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
         name = "/".join(key_path[:-1])
         raise ValueError(
@@ -133,8 +136,8 @@ def _make_sibling_placeholder(entry: Any, key_path: tuple[str, ...]) -> Iterator
 
 
 def _collect_columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
-    """One column for each key of any record, None where a record lacks it; objects inside a record are read one level
-    deep, as `imu.x`. Raises ValueError with too many keys or values."""
+    """Collect one column for each key of any record, None where a record lacks it; objects inside a record are read one
+    level deep, as `imu.x`. Raises ValueError with too many keys or values."""
     rows = [dict(_flatten_record(record)) for record in records]
     keys = dict.fromkeys(key for record in rows for key in record)
     if len(keys) > MAX_COLUMNS or len(keys) * len(rows) > _MAX_VALUES:
@@ -145,7 +148,7 @@ def _collect_columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
 
 
 def _flatten_record(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Keys and values of a record; those of an object inside it as `key.inner`."""
+    """Yield keys and values of a record; those of an object inside it as `key.inner`."""
     for key, value in record.items():
         if isinstance(value, dict):
             yield from ((f"{key}.{inner_key}", entry) for inner_key, entry in value.items())
@@ -154,8 +157,8 @@ def _flatten_record(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _make_array(value: Any) -> Array:
-    """Array of an entry: numbers, NaN where a value is missing; texts, which may be dates, where any value is not a
-    number; a placeholder where there is no rectangular array of numbers."""
+    """Convert an entry to an array: numbers, NaN where a value is missing; texts, which may be dates, where any value
+    is not a number; a placeholder where there is no rectangular array of numbers."""
     if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
         if all(isinstance(entry, str) or entry is None for entry in value):
             return _convert_texts(["" if entry is None else entry.strip() for entry in value])
@@ -170,7 +173,7 @@ def _make_array(value: Any) -> Array:
 
 
 def _convert_texts(texts: list[str]) -> Array:
-    """Array of numbers (NaN where missing) if each text is a number or missing; otherwise of the texts."""
+    """Convert texts to numbers (NaN where missing) if each is a number or missing; otherwise to an array of texts."""
     if all(is_number(text, ".") for text in texts):
         return np.array([np.nan if is_empty(text) else float(text) for text in texts])
     return np.array(texts)

@@ -2,7 +2,8 @@
 
 They are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
 memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; texts, objects, functions
-and sparse matrices are replaced by placeholders with their kind. Format: MAT-File Level 5, MathWorks, 2010.
+and sparse matrices are replaced by placeholders with their kind, a complex array by 0j. Format: MAT-File Level 5,
+MathWorks, 2010.
 """
 
 import math
@@ -19,10 +20,11 @@ from study.regular_file import read_regular
 from study.store.disk.declared_size import SizeLimit
 
 Array = npt.NDArray[Any]
+"""Array of numbers or texts, or a placeholder (an object array with one entry) for one that is not read."""
 MAX_MAT_BYTES = 2**32
-"""Largest file that is read (4 GiB)."""
+"""Largest file that is read (4 GiB). Chosen."""
 MAX_STRUCTURE_DEPTH = 32
-"""Deepest nesting of structures."""
+"""Deepest nesting of structures and cells. Chosen: far below Python's recursion limit."""
 _HEADER_BYTES = 128
 """Length of a MAT-file's header."""
 _COMPRESSED, _MATRIX = 15, 14
@@ -48,7 +50,7 @@ _CONVERSIONS = {
 
 
 def suggest_conversion(name: str, kind: str) -> str:
-    """Advice with the Matlab statement that converts an array before it is saved; empty where none is known. kind: the
+    """Suggest the Matlab statement that converts an array before it is saved; empty where none is known. kind: the
     description of its kind, from `find_unread_reason`."""
     for pattern, statement in _CONVERSIONS.items():
         if pattern in kind:
@@ -61,7 +63,7 @@ CELL_ENTRY_PREFIX = re.compile(r"\d+-of-\d+/")
 
 
 class _CellArrays(tuple[Array, ...]):
-    """Similar arrays of a MATLAB cell array, each of which is read as a run of its own."""
+    """Similar arrays of a MATLAB cell array, each of which is read as a separate run."""
 
 
 class _ElementReader:
@@ -95,7 +97,7 @@ class _ElementReader:
         return data_type, _ElementReader(self.content[start : start + size], self.order)
 
     def read_numbers(self) -> Array:
-        """Numbers of the next element. Raises ValueError if it is of another data type."""
+        """Read the numbers of the next element. Raises ValueError if its data type is not numeric."""
         data_type, element = self.read_element()
         if data_type not in _NUMBER_TYPES:
             raise ValueError(f"an element of the type {data_type} is found where numbers are needed")
@@ -103,7 +105,8 @@ class _ElementReader:
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
-    """Arrays by name: fields of structures as `data.u`, entries of a cell as `2-of-6/u`. Raises ValueError, OSError."""
+    """Read all arrays of a file by name: fields of structures as `data.u`, entries of a cell as `2-of-6/u`. Raises
+    OSError; ValueError where the file is no MAT file of version 5, damaged or too large."""
     content = read_regular(path, MAX_MAT_BYTES)
     if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
@@ -132,8 +135,8 @@ def _decompress(compressed: _ElementReader, limit: SizeLimit) -> _ElementReader:
 
 
 def _read_matrix(element: _ElementReader, depth: int) -> tuple[str, Any]:
-    """Name and value of a miMATRIX element: an array, a dict of arrays for a structure, or the arrays of a cell. depth:
-    level of nesting, 0 for a variable. Raises ValueError where it is damaged or too deep."""
+    """Read name and value of a miMATRIX element: an array, a dict of arrays for a structure, or the arrays of a cell.
+    depth: level of nesting, 0 for a variable. Raises ValueError where it is damaged or too deep."""
     if depth > MAX_STRUCTURE_DEPTH:
         raise ValueError(f"its structures are nested more than {MAX_STRUCTURE_DEPTH} levels deep")
     if not element.remaining:
@@ -157,12 +160,13 @@ def _read_matrix(element: _ElementReader, depth: int) -> tuple[str, Any]:
 
 
 def _make_placeholder(kind: str) -> Array:
-    """Placeholder for an array that is left out, with its kind as text."""
+    """Make the placeholder for an array that is left out, with its kind as text."""
     return np.array(kind, dtype=object)
 
 
 def _read_numeric(element: _ElementReader, shape: tuple[int, ...], number_type: str) -> Array:
-    """A numeric array; Matlab stores columns first. Raises ValueError where its shape and its numbers do not agree."""
+    """Read a numeric array; Matlab stores columns first. Raises ValueError where its shape and its numbers do not
+    agree."""
     values = element.read_numbers()
     if math.prod(shape) != len(values) or min(shape, default=0) < 0:
         raise ValueError(f"an array of the shape {shape} has {len(values)} numbers")
@@ -170,8 +174,8 @@ def _read_numeric(element: _ElementReader, shape: tuple[int, ...], number_type: 
 
 
 def _read_structures(element: _ElementReader, count: int, depth: int) -> dict[str, Any]:
-    """Fields of a structure by name; for an array of structures, those of each under its number, as in `signals.2`.
-    Raises ValueError where it is damaged."""
+    """Read the fields of a structure by name; for an array of structures, those of each under its number, as in
+    `signals.2`. Raises ValueError where it is damaged."""
     name_length = int(element.read_numbers()[0])
     name_bytes = bytes(element.read_element()[1].content)
     if name_length < 1 or len(name_bytes) % name_length:
@@ -189,8 +193,8 @@ def _read_structures(element: _ElementReader, count: int, depth: int) -> dict[st
 
 
 def _read_cells(element: _ElementReader, count: int, depth: int) -> Any:
-    """Arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side; otherwise
-    a placeholder. Raises ValueError where it is damaged."""
+    """Read the arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side;
+    otherwise a placeholder. Raises ValueError where it is damaged."""
     if count * 8 > element.remaining:
         raise ValueError(f"a cell of {count} arrays is longer than the rest of the file")
     arrays = [_read_field(element, f"{number}", depth) for number in range(1, count + 1)]
@@ -207,7 +211,8 @@ def _read_cells(element: _ElementReader, count: int, depth: int) -> Any:
 
 
 def _read_field(element: _ElementReader, field_name: str, depth: int) -> Any:
-    """Value of the next field or entry. word: its name, for messages."""
+    """Read the value of the next field or entry. field_name: its name, for messages. Raises ValueError where it is no
+    array."""
     data_type, nested = element.read_element()
     if data_type != _MATRIX:
         raise ValueError(f"the field '{field_name}' of a structure or cell is damaged")

@@ -25,6 +25,7 @@ from study.store.disk.file_errors import DAMAGE_ERRORS, CannotReadError, Unusabl
 from study.store.disk.hdf5_file import is_hdf5
 
 Array = npt.NDArray[Any]
+"""Array of numbers or texts, or a placeholder (an object array with one entry) for one that is not read."""
 READABLE_ENDINGS = (
     ".csv, .txt, .tsv, .dat (tables), .xlsx, .xlsm, .json, .jsonl, .ndjson, .npz, .npy, .mat, .h5 and .hdf5"
 )

@@ -1,4 +1,7 @@
-"""Fields of a text table: split a row into fields, and classify each as number, text, unit, time stamp or missing."""
+"""Fields of a text table: split a row into fields, and classify each as number, text, unit, time stamp or missing.
+
+Called by `table_marks`, `table_layout` and `csv_arrays`; `json_arrays` and `workbook_arrays` classify texts with it.
+"""
 
 import csv
 import re
@@ -12,16 +15,16 @@ Line = tuple[int, str]
 
 NOT_AVAILABLE = "#n/a"
 """Error value of spreadsheets for a missing number."""
-EMPTY = (
+MISSING = (
     "", "nan", "-nan", "na", "n/a", "n.a.", NOT_AVAILABLE, "null", "none", "-", "--", "---", "1.#qnan", "-1.#qnan",
     "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)",
 )  # fmt: skip
 """Fields, in lower case, that stand for a missing number."""
-COMMENTS = ("#", "%")
+COMMENT_MARKS = ("#", "%")
 """Marks with which a comment line begins."""
-_ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
+_SPREADSHEET_ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """Cells of a spreadsheet that look like the beginning of a comment but are not."""
-_LONGEST_ERROR = 8
+_LONGEST_ERROR_LENGTH = 8
 """Characters of a spreadsheet's longest error value, such as `#DIV/0!`."""
 _NUMBER_LIKE = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
 """A field that begins like a number, date or clock time; `rest` is the text behind that."""
@@ -32,7 +35,7 @@ _BRACKETED = re.compile(r"[\[(].*[\])]")
 def is_comment(line: str) -> bool:
     """Whether a line begins with # or %, and not with an error value of a spreadsheet, such as `#N/A`."""
     text = line.lstrip()
-    return text.startswith(COMMENTS) and not text[:_LONGEST_ERROR].lower().startswith(_ERRORS)
+    return text.startswith(COMMENT_MARKS) and not text[:_LONGEST_ERROR_LENGTH].lower().startswith(_SPREADSHEET_ERRORS)
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
@@ -53,24 +56,24 @@ def split_row(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(field: str, decimal: str) -> bool:
-    """Whether a field is a number, or empty. With a decimal comma, a field with a point is no number: the point would
-    separate thousands."""
+    """Whether a field is a number (also infinite) or stands for a missing one. decimal: decimal sign; with a comma, a
+    field with a point is no number: the point would separate thousands."""
     if "_" in field:  # Python reads 1_000 as 1000, but in files it is a label
         return False
     try:
         float(field.replace(".", " ").replace(",", ".") if decimal == "," else field)
     except ValueError:
-        return field.lower() in EMPTY
+        return field.lower() in MISSING
     return True
 
 
 def is_empty(field: str) -> bool:
     """Whether a field is empty or stands for a missing value, such as `nan` or `n/a`, in upper or lower case."""
-    return field.lower() in EMPTY
+    return field.lower() in MISSING
 
 
 def count_filled_fields(fields: Sequence[str]) -> int:
-    """Number of fields, without empty ones at the end."""
+    """Count the fields, without empty ones at the end."""
     return max((count for count, field in enumerate(fields, start=1) if field), default=0)
 
 
@@ -91,9 +94,9 @@ def is_unit(text: str) -> bool:
     return True
 
 
-def holds_data(fields: Sequence[str], decimal: str) -> bool:
+def has_data(fields: Sequence[str], decimal: str) -> bool:
     """Whether any field is a number in any notation, a date or a clock time, none of which occurs in a header."""
-    return holds_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
+    return has_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
 
 
 def _is_spelled_number(field: str) -> bool:
@@ -102,27 +105,32 @@ def _is_spelled_number(field: str) -> bool:
     return match is not None and not match["rest"]
 
 
-def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()) -> bool:
-    """Whether a row consists of numbers, or of dates and clock times with at least one number. texts: indices of
-    columns of words, which are ignored."""
-    values = [field for column, field in enumerate(fields) if column not in texts and not is_stamp(field)]
+def are_numbers(fields: Sequence[str], decimal: str, text_columns: Collection[int] = ()) -> bool:
+    """Whether a row consists of numbers, or of dates and clock times with at least one number.
+    text_columns: indices of columns of words, which are ignored."""
+    values = [field for column, field in enumerate(fields) if column not in text_columns and not is_stamp(field)]
     return all(is_number(field, decimal) for field in values) and not all(map(is_empty, values))
 
 
-def holds_number(fields: Sequence[str], decimal: str) -> bool:
+def has_number(fields: Sequence[str], decimal: str) -> bool:
     """Whether any field is a number; fields that stand for a missing value do not count."""
     return any(not is_empty(field) and is_number(field, decimal) for field in fields)
 
 
-def first_numbers(rows: Sequence[Line], delimiter: str, decimal: str, texts: Collection[int] = ()) -> int | None:
-    """Index of the first row of numbers, or of the first of the rows directly above it in which every number is
-    missing; None without a row of numbers."""
-    split = (split_row(text, delimiter) for _, text in rows)
-    first_row = next(((k, len(row)) for k, row in enumerate(split) if are_numbers(row, decimal, texts)), None)
+def find_first_number_row(
+    rows: Sequence[Line], delimiter: str, decimal: str, text_columns: Collection[int] = ()
+) -> int | None:
+    """Find the index of the first row of numbers, or of the first of the rows directly above it that are as wide and in
+    which every number is missing; None without a row of numbers."""
+    split_rows = (split_row(text, delimiter) for _, text in rows)
+    first_row = next(
+        ((row_index, len(row)) for row_index, row in enumerate(split_rows) if are_numbers(row, decimal, text_columns)),
+        None,
+    )
     index, width = first_row or (None, 0)
     while index:
-        above = split_row(rows[index - 1][1], delimiter)
-        if len(above) != width or not all(is_empty(field) or is_stamp(field) for field in above):
+        fields_above = split_row(rows[index - 1][1], delimiter)
+        if len(fields_above) != width or not all(is_empty(field) or is_stamp(field) for field in fields_above):
             break
         index -= 1
     return index

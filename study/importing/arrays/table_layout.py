@@ -1,7 +1,8 @@
 """Detect the layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
 
 The rows of numbers are found first, because every table has them. The row above them is the header, or a row of units
-with the header above it; rows further up are remarks. Called by `csv_arrays`.
+with the header above it; rows further up are remarks. Called by `csv_arrays`; `json_arrays` calls
+`append_units`.
 """
 
 import re
@@ -11,13 +12,13 @@ from itertools import pairwise, takewhile
 
 from equalizer.signals.units import normalise_unit, parse_unit
 from study.importing.arrays.table_cells import (
-    COMMENTS,
-    EMPTY,
+    COMMENT_MARKS,
+    MISSING,
     Line,
     count_filled_fields,
-    first_numbers,
-    holds_data,
-    holds_number,
+    find_first_number_row,
+    has_data,
+    has_number,
     is_comment,
     is_number,
     is_text,
@@ -29,7 +30,7 @@ from study.importing.arrays.time_stamps import is_stamp
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import is_peak_value, parse_signal_name
 
-_UNITLESS = (*EMPTY, "1")
+_UNITLESS = (*MISSING, "1")
 """Entries of a row of units that state none."""
 _BRACKETED = re.compile(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\[\]()]*[\])]")
 """A name with its unit in brackets. The match begins at the start of the text or at a bracket; otherwise a search would
@@ -53,14 +54,15 @@ class TableLayout:
 
 
 def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
-    """Layout from the lines that are not empty, comments included: marks, first row of numbers, remarks below the rows,
-    empty fields at the ends of rows, then header and units. Rows between header and numbers that are data with an
-    invalid field count as data. Raises ValueError for contradictions."""
+    """Find the layout of a table. lines: its lines that are not empty, comments included. In this order: delimiter and
+    decimal sign, first row of numbers, remarks below the rows, empty fields at the ends of rows, header and units. Rows
+    between header and numbers that are data with an invalid field count as data. Raises ValueError without a line, for
+    an ambiguous comma or point, and where header and row of units contradict each other."""
     rows = [line for line in lines if not is_comment(line[1])]
     if not rows:
         raise ValueError("it holds no lines")
     marks = find_marks(rows, settings)
-    first_row = first_numbers(rows, marks.delimiter, marks.decimal, marks.texts)
+    first_row = find_first_number_row(rows, marks.delimiter, marks.decimal, marks.texts)
     if first_row is None:
         return _make_named_layout(rows, first_row, marks, settings)
     kept_rows, notes = _drop_trailing_remarks(rows, first_row, marks)
@@ -97,22 +99,22 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
 
 
 def _make_named_layout(rows: Sequence[Line], first_row: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
-    """Layout of a table whose map names its columns, or that has no row of numbers. In the latter case the header is
-    the first row as wide as the last."""
+    """Make the layout of a table whose map names its columns, or that has no row of numbers. In the latter case the
+    header is the first row as wide as the last."""
     width = len(split_row(rows[-1][1], marks.delimiter))
     wide_rows = [index for index, (_, text) in enumerate(rows) if len(split_row(text, marks.delimiter)) == width]
     rows = rows[0 if settings.names else wide_rows[0] :]
     first_fields = split_row(rows[0][1], marks.delimiter)
     names = settings.names or tuple(_name_columns(first_fields))
     if first_row is None or any(
-        holds_number(split_row(text, marks.delimiter), marks.decimal) for _, text in rows[:first_row]
+        has_number(split_row(text, marks.delimiter), marks.decimal) for _, text in rows[:first_row]
     ):
         first_row = 0 if all(is_number(field, marks.decimal) for field in first_fields) else 1
     return TableLayout(marks.delimiter, marks.decimal, names, rows[first_row:], marks.texts)
 
 
 def _strip_empty_ends(body: Sequence[Line], delimiter: str, min_columns: int) -> Sequence[Line]:
-    """The rows without the delimiters with which every row ends, as long as at least `min_columns` columns remain."""
+    """Strip the delimiters with which every row ends, as long as at least `min_columns` columns remain."""
     if delimiter == " ":
         return body
     surplus_delimiters = len(split_row(body[0][1], delimiter)) - max(min_columns, 1)
@@ -127,34 +129,36 @@ def _strip_empty_ends(body: Sequence[Line], delimiter: str, min_columns: int) ->
 def _drop_trailing_remarks(
     rows: Sequence[Line], first_row: int, marks: TableMarks
 ) -> tuple[Sequence[Line], tuple[str, ...]]:
-    """The rows without lines of words below the last row, such as `End of file`; and a sentence about each of these
-    lines."""
-    width, end_row = len(split_row(rows[first_row][1], marks.delimiter)), len(rows)
-    while end_row > first_row + 1:
-        fields = [field for field in split_row(rows[end_row - 1][1], marks.delimiter) if field]
+    """Drop lines of words below the last row of numbers, such as `End of file`. Returns the remaining rows, and a
+    sentence about each dropped line."""
+    width, row_stop = len(split_row(rows[first_row][1], marks.delimiter)), len(rows)
+    while row_stop > first_row + 1:
+        fields = [field for field in split_row(rows[row_stop - 1][1], marks.delimiter) if field]
         if len(fields) == width or not all(map(is_text, fields)):
             break
-        end_row -= 1
-    return rows[:end_row], tuple(f"Left out: line {number}, '{text.strip()[:60]}'." for number, text in rows[end_row:])
+        row_stop -= 1
+    return rows[:row_stop], tuple(
+        f"Left out: line {number}, '{text.strip()[:60]}'." for number, text in rows[row_stop:]
+    )
 
 
 def _count_faulty_rows(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
-    """Number of rows directly above the first row of numbers that are data with an invalid cell."""
+    """Count the rows directly above the first row of numbers that are data with an invalid cell."""
     rows = (split_row(text, marks.delimiter) for _, text in reversed(rows_above))
-    return sum(1 for _ in takewhile(lambda fields: len(fields) == width and holds_data(fields, marks.decimal), rows))
+    return sum(1 for _ in takewhile(lambda fields: len(fields) == width and has_data(fields, marks.decimal), rows))
 
 
 def _strip_comment(line: str) -> str:
-    """The line without the comment mark at its start."""
-    return line.strip().lstrip("".join(COMMENTS)).strip() if is_comment(line) else line
+    """Strip the comment mark from the start of a line."""
+    return line.strip().lstrip("".join(COMMENT_MARKS)).strip() if is_comment(line) else line
 
 
 def _collect_header_rows(
     lines: Sequence[Line], rows: Sequence[Line], first_row: int, delimiter: str
 ) -> list[list[str]]:
-    """Fields of the header lines: lines that are not comments, and a comment below them that states units; comments if
-    there are no others. A line whose first field is only a comment mark, with as many fields as columns, is a header
-    too: the mark is a name."""
+    """Collect the fields of the header lines: lines that are not comments, and a comment below them that states units;
+    comments if there are no others. A line whose first field is only a comment mark, with as many fields as columns, is
+    a header too: the mark is a name."""
     min_width = len(split_row(_strip_empty_ends(rows[first_row:], delimiter, 1)[0][1], delimiter))
     widths = range(min_width, len(split_row(rows[first_row][1], delimiter)) + 1)
     header_fields = [
@@ -177,22 +181,26 @@ def _collect_header_rows(
 
 def _is_marked_header(fields: list[str], widths: range, delimiter: str) -> bool:
     """Whether the first field of a line is only a comment mark, and the line is as wide as a row."""
-    return delimiter != " " and len(fields) in widths and fields[0] in COMMENTS and not any(map(is_comment, fields[1:]))
+    return (
+        delimiter != " "
+        and len(fields) in widths
+        and fields[0] in COMMENT_MARKS
+        and not any(map(is_comment, fields[1:]))
+    )
 
 
 def _find_header_row(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
-    """Index of the first row above the numbers with the same width, without a number and not of units; otherwise 0."""
+    """Find the index of the first row above the numbers with the same width, without a number and not of units;
+    otherwise 0."""
     split_rows = [split_row(text, marks.delimiter) for _, text in rows_above]
-    is_header = [
-        len(row) == width and not holds_number(row, marks.decimal) and not _are_units(row) for row in split_rows
-    ]
+    is_header = [len(row) == width and not has_number(row, marks.decimal) and not _are_units(row) for row in split_rows]
     return is_header.index(True) if True in is_header else 0
 
 
 def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> list[str]:
-    """A header row with as many fields as a row of numbers, where it can be converted: without empty fields at its end;
+    """Convert a header row to as many fields as a row of numbers, where possible: without empty fields at its end;
     with names that contain the delimiter joined again, if each ends with its unit in brackets; or with a name added for
-    a date next to a clock time. Otherwise the row as it is."""
+    a date next to a clock time. Otherwise the row is returned unchanged."""
     width = len(fields)
     if len(header) > width and not any(header[width:]):
         return header[:width]
@@ -209,14 +217,14 @@ def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> lis
 def _split_header_and_units(
     rows_above: Sequence[list[str]], width: int, decimal: str
 ) -> tuple[list[str] | None, list[str] | None]:
-    """Header and row of units from the rows directly above the numbers. The header is None without a row of the right
-    width that holds no data; the units are None without a row of units."""
+    """Split the rows directly above the numbers into header and row of units. The header is None without a row of the
+    right width that holds no data; the units are None without a row of units."""
     full_rows = [fields if len(fields) == width else None for fields in rows_above]
     last_row = full_rows[-1] if full_rows else None
     header = full_rows[-2] if len(full_rows) > 1 else None
     if last_row and len(full_rows) > 1 and _are_units(last_row):  # a row of units is not the header
-        return (header, last_row) if header and not holds_data(header, decimal) else (None, None)
-    return (None if last_row is None or holds_data(last_row, decimal) else last_row), None
+        return (header, last_row) if header and not has_data(header, decimal) else (None, None)
+    return (None if last_row is None or has_data(last_row, decimal) else last_row), None
 
 
 def _are_units(fields: Sequence[str]) -> bool:
@@ -229,18 +237,19 @@ def _are_units(fields: Sequence[str]) -> bool:
 
 
 def _strip_brackets(field: str) -> str:
-    """Text of a field without the round or square brackets around it."""
+    """Strip round or square brackets around the text of a field."""
     match = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", field)
     return match[1] if match else field
 
 
 def _name_columns(header: Sequence[str]) -> list[str]:
-    """Names of the columns; `column3` where the third has none."""
+    """Name the columns by their header; `column3` where the third has none."""
     return [name or f"column{number}" for number, name in enumerate(header, start=1)]
 
 
 def append_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
-    """Names with their units in brackets. Raises ValueError where a name states another unit."""
+    """Append to each name its unit in brackets; units None: no row of units. Raises ValueError where a name states
+    another unit."""
     if units is None:
         return list(header)
     names = []

@@ -10,8 +10,8 @@ from study.importing.arrays.table_cells import (
     Line,
     are_numbers,
     count_filled_fields,
-    first_numbers,
-    holds_number,
+    find_first_number_row,
+    has_number,
     is_empty,
     is_text,
     split_row,
@@ -22,7 +22,7 @@ from study.importing.map_format.signal_words import parse_signal_name
 _DELIMITERS = (",", ";", "\t", "|", " ")
 """Delimiters that are tried, in this order."""
 _SAMPLE_ROWS = 32
-"""Approximate number of rows on which delimiters and decimal signs are tried, spread over the table."""
+"""Approximate number of rows on which delimiters and decimal signs are tried, spread over the table. Chosen."""
 _POINT_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 """A number whose points may separate thousands."""
 NO_THOUSANDS = "write numbers without signs between thousands"
@@ -31,7 +31,7 @@ NO_THOUSANDS = "write numbers without signs between thousands"
 
 @dataclass(frozen=True, slots=True)
 class TableMarks:
-    """Delimiter and decimal sign of a text table."""
+    """Delimiter, decimal sign and columns of words of a text table."""
 
     delimiter: str
     decimal: str
@@ -52,7 +52,7 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
         if not number_rows:
             continue
         columns = Counter(map(len, number_rows)).most_common(1)[0][0]
-        first_row = first_numbers(rows, delimiter, decimal)
+        first_row = find_first_number_row(rows, delimiter, decimal)
         header = rows[first_row - 1][1] if first_row else ""
         header_fields = split_row(header, delimiter)
         has_fitting_fields = len(header_fields) == columns or count_filled_fields(header_fields) == max(
@@ -80,13 +80,13 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
 
 
 def _select_number_rows(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:
-    """Fields of the rows that consist of numbers, apart from columns of words."""
+    """Select the rows that consist of numbers, apart from columns of words; returns their fields."""
     split_rows = (split_row(text, marks.delimiter) for _, text in sample)
     return [fields for fields in split_rows if are_numbers(fields, marks.decimal, marks.texts)]
 
 
 def _list_mark_pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]]:
-    """Possible pairs of delimiter and decimal sign. Both may be a comma where fields are quoted."""
+    """List the possible pairs of delimiter and decimal sign. Both may be a comma where fields are quoted."""
     has_quotes = any('"' in text for _, text in sample)
     for decimal in (settings.decimal,) if settings.decimal else (".", ","):
         for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
@@ -105,8 +105,8 @@ def _has_delimiter_comma(header: str, decimal: str, columns: int) -> bool:
 
 
 def _find_marks_with_texts(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
-    """The marks with the most columns of numbers where other columns hold words; None if there are none. Only the lower
-    half of the rows is used, which is below any header."""
+    """Find the marks with the most columns of numbers where other columns hold words; None if there are none. Only the
+    lower half of the rows is used, which is below any header."""
     most_number_columns, marks = 0, None
     for delimiter, decimal in _list_mark_pairs(sample, settings):
         rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
@@ -114,14 +114,14 @@ def _find_marks_with_texts(sample: Sequence[Line], settings: CsvMap) -> TableMar
         text_columns = frozenset(column for column, fields in enumerate(columns) if any(map(is_text, fields)))
         are_texts = all(is_text(field) or is_empty(field) for column in text_columns for field in columns[column])
         if are_texts and rows and all(are_numbers(row, decimal, text_columns) for row in rows):
-            number_columns = sum(holds_number(fields, decimal) for fields in columns)
+            number_columns = sum(has_number(fields, decimal) for fields in columns)
             if number_columns > most_number_columns:
                 most_number_columns, marks = number_columns, TableMarks(delimiter, decimal, text_columns)
     return marks
 
 
 def _refuse_ambiguous_commas(sample: Sequence[Line], marks: TableMarks) -> None:
-    """Raises ValueError where each comma in a number may separate thousands, as in 1,250 but not in 0,250."""
+    """Raise ValueError where each comma in a number may separate thousands, as in 1,250 but not in 0,250."""
     numbered_rows = [(number, split_row(text, marks.delimiter)) for number, text in sample]
     comma_fields = [
         (number, field)
@@ -139,7 +139,7 @@ def _refuse_ambiguous_commas(sample: Sequence[Line], marks: TableMarks) -> None:
 
 
 def _refuse_ambiguous_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
-    """Raises ValueError where each point in a column may separate thousands, as in a column with 1.886 and 946."""
+    """Raise ValueError where each point in a column may separate thousands, as in a column with 1.886 and 946."""
     columns = list(zip(*_select_number_rows(sample, marks), strict=False))
     for column in (column for column, fields in enumerate(columns) if _may_be_thousands(fields)):
         all_fields = [fields[column] for fields in _select_number_rows(rows, marks) if len(fields) > column]
@@ -164,12 +164,13 @@ def _may_be_thousands(fields: Sequence[str]) -> bool:
 
 
 def _guess_delimiter(sample: Sequence[Line], decimal: str) -> str:
-    """The delimiter that splits most rows of the lower half into the same number of fields, for a precise error
+    """Guess the delimiter that splits most rows of the lower half into the same number of fields, for a precise error
     message."""
     lower_rows = [text for _, text in sample[len(sample) // 2 :]]
 
     def rank_delimiter(delimiter: str) -> tuple[int, int]:
-        """Number of rows with the most common number of fields, and that number; (0, 1) if rows are not split."""
+        """Rank a delimiter by the number of rows with the most common number of fields, and that number; (0, 1) if rows
+        are not split."""
         width, rows = Counter(len(split_row(text, delimiter)) for text in lower_rows).most_common(1)[0]
         return (rows, width) if width > 1 else (0, 1)
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from study.importing.arrays.csv_arrays import FaultyColumn, Table, read_lines
-from study.importing.arrays.table_cells import Line, holds_number, is_comment
+from study.importing.arrays.table_cells import Line, has_number, is_comment
 from study.importing.map_format.import_map import CsvMap
 from study.regular_file import read_regular
 from study.store.disk.declared_size import DeclaredSizeError, SizeLimit
@@ -52,32 +52,34 @@ class _PercentNumber(float):
 
 
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
-    """Read the arrays of a workbook; only the sheet that `settings.sheet` names, if any. Raises OSError; ValueError
-    with the sheet and the problem."""
+    """Read the arrays of a workbook; only the sheet that `settings.sheet` names, if any. Raises OSError; ValueError,
+    with the sheet and the problem, where it is no workbook, too large, or has no rows of numbers."""
     book = _open_workbook(read_regular(path))
     try:
-        hidden = [sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible" and not settings.sheet]
-        visible = [sheet for sheet in book.worksheets if sheet.title not in hidden]
-        sheets = {sheet.title: _read_rows(sheet) for sheet in visible if settings.sheet in ("", sheet.title)}
+        hidden_names = [
+            sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible" and not settings.sheet
+        ]
+        visible_sheets = [sheet for sheet in book.worksheets if sheet.title not in hidden_names]
+        sheets = {sheet.title: _read_rows(sheet) for sheet in visible_sheets if settings.sheet in ("", sheet.title)}
     finally:
         book.close()
     if not sheets and settings.sheet:
         raise ValueError(f"it has no sheet '{settings.sheet}'; there are {', '.join(book.sheetnames) or 'none'}")
     numeric_sheets = {name: rows for name, rows in sheets.items() if any(_is_numeric_row(cells) for _, cells in rows)}
     if not numeric_sheets:
-        raise ValueError(f"no sheet of it{' that is not hidden' if hidden else ''} holds rows of numbers")
+        raise ValueError(f"no sheet of it{' that is not hidden' if hidden_names else ''} holds rows of numbers")
     tables = {name: _make_table(name, rows, settings) for name, rows in numeric_sheets.items()}
-    omitted = tuple(
+    omission_notes = tuple(
         f"Left out: the sheet '{name}' holds no rows of numbers." for name in sheets if name not in numeric_sheets
     )
-    omitted += tuple(f"Left out: the sheet '{name}' is hidden." for name in hidden)
+    omission_notes += tuple(f"Left out: the sheet '{name}' is hidden." for name in hidden_names)
     if len(tables) == 1:
         (single_table,) = tables.values()
-        return replace(single_table, notes=(*omitted, *single_table.notes))
+        return replace(single_table, notes=(*omission_notes, *single_table.notes))
     return Table(
         {f"{name}/{key}": array for name, table in tables.items() for key, array in table.by_name.items()},
         tuple(f"{name}/{key}" for name, table in tables.items() for key in table.clocks),
-        (*omitted, *(f"{name}: {note}" for name, table in tables.items() for note in table.notes)),
+        (*omission_notes, *(f"{name}: {note}" for name, table in tables.items() for note in table.notes)),
     )
 
 
@@ -156,7 +158,7 @@ def _iterate_rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
 
 
 def _read_cell(cell: Any) -> Any:
-    """Value of a cell; a `_PercentNumber` for a number that is displayed as a percentage."""
+    """Read the value of a cell; a `_PercentNumber` for a number that is displayed as a percentage."""
     value = cell.value
     return _PercentNumber(value) if isinstance(value, int | float) and "%" in cell.number_format else value
 
@@ -170,13 +172,13 @@ def _is_numeric_row(cells: Sequence[Any]) -> bool:
 
 def _is_numeric_text(cell: Any) -> bool:
     """Whether a cell is a text that is a number, with decimal point or comma."""
-    return isinstance(cell, str) and any(holds_number([cell.strip()], mark) for mark in (".", ","))
+    return isinstance(cell, str) and any(has_number([cell.strip()], mark) for mark in (".", ","))
 
 
 def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMap) -> Table:
     """Read the columns of one sheet. rows: row numbers and values. Raises ValueError with the sheet and the problem."""
     width = max(len(cells) for _, cells in rows)
-    percents = {
+    percent_columns = {
         column
         for _, cells in rows
         for column, cell in enumerate(cells)
@@ -188,31 +190,31 @@ def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: 
     sheet_hint = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
     try:
         table = read_lines(
-            [_make_line(number, cells, width, (percents, decimal or ".")) for number, cells in rows],
+            [_make_line(number, cells, width, (percent_columns, decimal or ".")) for number, cells in rows],
             replace(settings, delimiter=_DELIMITER, decimal=decimal),
         )
     except ValueError as problem:
         raise ValueError(f"sheet '{name}', {problem}{sheet_hint}") from problem
-    faulty = {
+    faulty_columns = {
         key: np.array(FaultyColumn(f"sheet '{name}', {array.item()}{sheet_hint}"), dtype=object)
         for key, array in table.by_name.items()
         if array.dtype.kind == "O"
     }
-    return replace(table, by_name={**table.by_name, **faulty})
+    return replace(table, by_name={**table.by_name, **faulty_columns})
 
 
 def _count_cells(cells: Sequence[Any]) -> int:
-    """Number of cells up to the last filled one; 0 if all are empty."""
+    """Count the cells up to the last filled one; 0 if all are empty."""
     return max((count for count, cell in enumerate(cells, start=1) if cell is not None), default=0)
 
 
 def _make_line(number: int, cells: Sequence[Any], width: int, number_format: tuple[Collection[int], str]) -> Line:
     """Convert a row to a numbered line of text with `width` fields. number_format: indices of columns of percentages,
     whose numbers are written as displayed (times 100), and the decimal sign."""
-    percents, decimal = number_format
+    percent_columns, decimal = number_format
     fields = [
         f"{cell * 100:.15g}".replace(".", decimal)
-        if isinstance(cell, _PercentNumber) and column in percents
+        if isinstance(cell, _PercentNumber) and column in percent_columns
         else _format_cell(cell, decimal)
         for column, cell in enumerate(cells)
     ]

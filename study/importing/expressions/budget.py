@@ -2,7 +2,7 @@
 
 A definition may use another one twice, and that one a third one twice: a chain of 40 such definitions computes
 2^40 = 10^12 values, although the map is short. Therefore the cost is counted during evaluation, not estimated from the
-text. Called by `expression` and `namespace`.
+text. Called by `expression` and `namespace`; `build_recording` makes one budget per import.
 """
 
 from collections.abc import Iterator
@@ -32,30 +32,30 @@ class Budget:
         self._held = 0
         self._depth = 0
 
-    def add_allowance(self, numbers: int) -> None:
+    def add_allowance(self, number_count: int) -> None:
         """Add the allowance for files that hold this many numbers."""
-        self._max_held = min(MAX_HELD_NUMBERS, self._max_held + HELD_PER_NUMBER * numbers)
-        self._remaining_cost += COMPUTED_PER_NUMBER * numbers
+        self._max_held = min(MAX_HELD_NUMBERS, self._max_held + HELD_PER_NUMBER * number_count)
+        self._remaining_cost += COMPUTED_PER_NUMBER * number_count
 
-    def spend(self, numbers: float, expression: str, cost_per_number: int = 1) -> None:
+    def spend(self, number_count: float, expression: str, cost_per_number: int = 1) -> None:
         """Count the cost before an array of this many numbers is computed. expression: its text, for messages;
         cost_per_number: in additions. Raises ImportProblemError where a limit would be exceeded."""
-        if self._held + numbers > self._max_held:
+        if self._held + number_count > self._max_held:
             raise ImportProblemError(f"'{expression}' would give more than {self._max_held} numbers")
-        self._remaining_cost -= _OPERATION_COST + cost_per_number * int(numbers)
+        self._remaining_cost -= _OPERATION_COST + cost_per_number * int(number_count)
         if self._remaining_cost < 0:
             raise ImportProblemError(
                 f"'{expression}' takes too long: it and what it uses compute far more numbers than the file holds"
             )
 
     @contextmanager
-    def hold_numbers(self, numbers: int) -> Iterator[None]:
+    def hold_numbers(self, number_count: int) -> Iterator[None]:
         """Count a value of this many numbers as held while the block runs."""
-        self._held += numbers
+        self._held += number_count
         try:
             yield
         finally:
-            self._held -= numbers
+            self._held -= number_count
 
     @contextmanager
     def enter_nesting(self, expression: str, levels: int = 1) -> Iterator[None]:

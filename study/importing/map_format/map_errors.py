@@ -9,16 +9,16 @@ from analysis.wording import format_sentence
 from study.errors import StudyError, WrongUseError
 
 _MAX_WORD_LENGTH = 60
-"""Largest number of characters of a name that are compared and shown."""
+"""Largest number of characters of a name that are compared and shown. Chosen."""
 _MAX_SENTENCE_LENGTH = 2000
-"""Largest number of characters of a message."""
+"""Approximate largest number of characters of a message. Chosen."""
 _MAX_NAMES = 500
-"""Largest number of known names with which an unknown name is compared."""
+"""Largest number of known names with which an unknown name is compared. Chosen."""
 _LONG_QUOTATION = re.compile(rf"(?<!\w)'([^']{{{_MAX_WORD_LENGTH}}})[^']+'(?!\w)")
 """A quotation that is longer than a message may show."""
 
 NOTHING_WRITTEN = "Nothing was written."
-"""Statement of import errors on what was saved."""
+"""Part of every import error: the statement on what was saved."""
 
 
 class ImportProblemError(ValueError):
@@ -65,9 +65,9 @@ def _format_problem(problem: str) -> str:
 
 def suggest_name(word: str, known_names: Iterable[str]) -> str:
     """Make the clause "; did you mean 'x'" with the known name x that is most similar; empty without a similar name."""
-    names = list(islice(known_names, _MAX_NAMES))  # comparing a name of a million letters would take minutes
+    compared_names = list(islice(known_names, _MAX_NAMES))  # comparing a name of a million letters would take minutes
     matches = (
-        get_close_matches(word[:_MAX_WORD_LENGTH], names, n=1)
-        or [name for name in names if name.lower() == word.lower()][:1]
+        get_close_matches(word[:_MAX_WORD_LENGTH], compared_names, n=1)
+        or [name for name in compared_names if name.lower() == word.lower()][:1]
     )
     return f"; did you mean '{matches[0]}'" if matches else ""

@@ -34,8 +34,8 @@ class PartFiles:
 
 
 def assign_files(import_map: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...]:
-    """Parts in the order of the recording, with their files. Raises ImportProblemError for a superfluous or missing
-    file, and for several files where the map makes a recording of each."""
+    """Assign the files to the parts, in the order of the recording. Raises ImportProblemError for a superfluous or
+    missing file, and for several files where the map makes a recording of each."""
     ordered_paths = _order_files(import_map, files)
     if import_map.separate and len(ordered_paths) > 1:
         names = ", ".join(path.name for path in ordered_paths)
@@ -55,7 +55,7 @@ def assign_files(import_map: ImportMap, files: Sequence[Path]) -> tuple[PartFile
 
 
 def _order_files(import_map: ImportMap, files: Sequence[Path]) -> list[Path]:
-    """Files in the order of the map's patterns; those of one pattern in the given order. Raises ImportProblemError for
+    """Order the files by the map's patterns; those of one pattern in the given order. Raises ImportProblemError for
     a file that fits no pattern."""
     ranked_paths = []
     for path in files:
@@ -69,7 +69,8 @@ def _order_files(import_map: ImportMap, files: Sequence[Path]) -> list[Path]:
 
 
 def _assign_parallel(import_map: ImportMap, files: Sequence[Path]) -> PartFiles:
-    """A single part with a file for each clock, recorded in parallel."""
+    """Make a single part with a file for each clock, recorded in parallel. Raises ImportProblemError where a clock has
+    none or several."""
     by_clock = {}
     for clock in import_map.clock:
         (path,) = _find_single_file(clock.file or "*", files, f"clock '{clock.name}'")
@@ -78,7 +79,8 @@ def _assign_parallel(import_map: ImportMap, files: Sequence[Path]) -> PartFiles:
 
 
 def _assign_sequential(import_map: ImportMap, files: Sequence[Path]) -> Iterator[PartFiles]:
-    """A part for each file, in the order of the map's parts; all clocks are in the same file."""
+    """Make a part for each file, in the order of the map's parts; all clocks are in the same file. Raises
+    ImportProblemError where no file fits a part."""
     for part in import_map.part or (PartMap(),):
         matching_paths = [path for path in files if fnmatchcase(path.name, part.file)]
         if not matching_paths:
@@ -88,7 +90,8 @@ def _assign_sequential(import_map: ImportMap, files: Sequence[Path]) -> Iterator
 
 
 def _find_single_file(pattern: str, files: Sequence[Path], subject: str) -> list[Path]:
-    """List with the single file that fits a pattern. Raises ImportProblemError where none or several fit."""
+    """Find the single file that fits a pattern, as a list of one. Raises ImportProblemError where none or several
+    fit."""
     matching_paths = [path for path in files if fnmatchcase(path.name, pattern)]
     if len(matching_paths) != 1:
         raise ImportProblemError(
@@ -98,5 +101,5 @@ def _find_single_file(pattern: str, files: Sequence[Path], subject: str) -> list
 
 
 def _list_names(files: Sequence[Path]) -> str:
-    """Names of the files, for messages."""
+    """List the names of the files, for messages."""
     return ", ".join(path.name for path in files)

@@ -22,14 +22,21 @@ class AnswerHealth:
     felt_whole: bool
     """Whether the stimulus was complete until the answer: no fault had ended it."""
     ticks: Count
+    """Ticks of the control loop, missed ones included."""
     missed_ticks: Count
+    """Ticks that were not run in time."""
     stimulus_clipped: Count
+    """Ticks in which the stimulus was limited to its cap."""
     total_clipped: Count
+    """Ticks in which the sum of all forces was limited to the total cap."""
     slew_limited: Count
+    """Ticks in which the change of the force was limited."""
     sensor_clipped: Count
+    """Ticks with an accelerometer channel at its limit."""
     peak_command_n: Magnitude
     """Largest norm of a commanded force (N)."""
     late_ticks: Count | None = None
+    """Ticks that ended after the next one was due."""
     latest_s: Seconds | None = None
     """Longest time from when a tick was due to the end of its work (s). This field and `late_ticks` are null in logs of
     older versions."""

@@ -1,4 +1,4 @@
-"""The log of a session in words: one plain sentence per fact.
+"""Describe the log of a session in words: one sentence per event. Called by `study.workflows.views.view_session`.
 
 Answers to questions about health are left out. The direction of a trial that does not count (yet) is left out, too: the
 trial may be repeated, and the participant may see the text. Runs and trials count from 1 here, as on the screen of the
@@ -35,40 +35,44 @@ from study.session.facts.events import (
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.local_time import Zone, split_time_in_zone, to_utc
 
-_Key = tuple[int, int, int]
+_PresentationKey = tuple[int, int, int]
 """Run, trial and attempt of a presentation."""
 
 
 def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...]:
-    """One line per event, oldest first: local time and a sentence. A line with the date precedes each change of date or
-    UTC offset."""
+    """Describe each event in a line, oldest first: time in `zone` and a sentence. A line with the date comes first, and
+    before each change of date or UTC offset."""
     events = tuple(events)
-    measured_keys = {_key(event) for event in events if isinstance(event, TrialMeasured)}
-    presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in measured_keys}
+    measured_keys = {_get_presentation_key(event) for event in events if isinstance(event, TrialMeasured)}
+    presentations = {
+        _get_presentation_key(presentation): presentation
+        for presentation in events
+        if isinstance(presentation, TrialPresented) and _get_presentation_key(presentation) in measured_keys
+    }
     lines: list[str] = []
-    text = ""
+    last_date_line = ""
     for event in events:
-        date, time, offset = split_time_in_zone(event.utc, zone)
-        day = f"{date} (times are UTC {offset})" if offset else ""
-        if day and day != text:
-            text = day
-            lines.append(day)
-        lines.append(f"{time or date}  {_describe(event, presented)}")
+        date, time, utc_offset = split_time_in_zone(event.utc, zone)
+        date_line = f"{date} (times are UTC {utc_offset})" if utc_offset else ""
+        if date_line and date_line != last_date_line:
+            last_date_line = date_line
+            lines.append(date_line)
+        lines.append(f"{time or date}  {_describe_in_context(event, presentations)}")
     return tuple(lines)
 
 
 def describe_event(event: Event) -> str:
-    """One event alone. Direction and correctness of a trial, which depend on other events, are left out."""
-    return _describe(event, {})
+    """Describe one event alone. Direction and correctness of a trial, which depend on other events, are left out."""
+    return _describe_in_context(event, {})
 
 
-def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
-    """The sentence for an event. presented: the presentations of trials that count."""
+def _describe_in_context(event: Event, presentations: dict[_PresentationKey, TrialPresented]) -> str:
+    """Describe an event in a sentence. presentations: those of trials that count, by run, trial and attempt."""
     match event:
         case TrialPresented():
-            return _describe_presented(event, with_direction=_key(event) in presented)
+            return _describe_presented(event, with_direction=_get_presentation_key(event) in presentations)
         case AnswerGiven():
-            return _describe_answer(event, presented.get(_key(event)))
+            return _describe_answer(event, presentations.get(_get_presentation_key(event)))
         case TrialMeasured():
             return _describe_measured(event)
         case TrialSpoiled():
@@ -80,7 +84,7 @@ def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
 
 
 def _describe_other(event: Event) -> str:
-    """The sentence for an event outside the trials."""
+    """Describe an event outside the trials."""
     match event:
         case SessionOpened() | SessionResumed() | SessionInterrupted() | SessionClosed():
             return _describe_sitting(event)
@@ -109,7 +113,7 @@ def _describe_other(event: Event) -> str:
 
 
 def _describe_accompanying(event: OnsetPulsed | MaskingPlayed | ProbePlayed | ProbeMeasured) -> str:
-    """The sentence for an event that accompanies the trials: onset pulse, masking noise, or probe."""
+    """Describe an event that accompanies the trials: onset pulse, masking noise, or probe."""
     if isinstance(event, ProbePlayed | ProbeMeasured):
         return _describe_probe(event)
     if isinstance(event, OnsetPulsed):
@@ -123,7 +127,7 @@ def _describe_accompanying(event: OnsetPulsed | MaskingPlayed | ProbePlayed | Pr
     return f"Masking noise on {_join_lines(event.output)}: {event.level_db:g} dB, {band}, seed {event.seed}."
 
 
-PROBES = {
+PROBE_PHRASES = {
     "hand": "Probe with the hand on the handle",
     "free": "Test whether the handle is free",
     "reference": "Reference without a hand",
@@ -132,23 +136,25 @@ PROBES = {
 
 
 def _describe_probe(event: ProbePlayed | ProbeMeasured) -> str:
+    """Describe that a probe was played, or whether its recording was kept."""
     if isinstance(event, ProbePlayed):
-        return f"{PROBES[event.kind]}, number {event.number + 1}: {event.level_n:.3g} N."
+        return f"{PROBE_PHRASES[event.kind]}, number {event.number + 1}: {event.level_n:.3g} N."
     recording_text = "kept" if event.recording else "not kept"
     reason = f": {_join_lines(event.trouble)}" if event.trouble else ""
     return f"The probe, number {event.number + 1}, was {recording_text}{reason}."
 
 
 def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:
+    """Describe the beginning or end of a session or sitting."""
     match event:
         case SessionOpened():
-            participant = f"simulated participant {event.observer}" if event.observer else "a person"
+            person_text = f"simulated participant {event.observer}" if event.observer else "a person"
             return (
-                f"Session {event.session} began: {event.subject}, {participant}, on {_describe_device(event.device)}."
+                f"Session {event.session} began: {event.subject}, {person_text}, on {_describe_device(event.device)}."
             )
         case SessionResumed():
-            mended = " An incomplete last line, left by a crash, was removed." if event.mended else ""
-            return f"The session was continued, on {_describe_device(event.device)}.{mended}"
+            mended_text = " An incomplete last line, left by a crash, was removed." if event.mended else ""
+            return f"The session was continued, on {_describe_device(event.device)}.{mended_text}"
         case SessionInterrupted():
             return f"The sitting ended: {event.reason}. The session can be resumed."
         case SessionClosed():
@@ -158,6 +164,7 @@ def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted
 
 
 def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
+    """Describe the stimulus of a trial; with_direction: also the right answer."""
     attempt_text = f", attempt {event.attempt + 1}" if event.attempt else ""
     stimulus_text = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
     if with_direction:
@@ -166,37 +173,37 @@ def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
     return f"{_describe_trial_place(event)} ({event.phase.value}{attempt_text}): {stimulus_text}."
 
 
-def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
-    """The answer, and whether it was right; the latter only if `presented` is given."""
+def _describe_answer(event: AnswerGiven, presentation: TrialPresented | None) -> str:
+    """Describe the answer, and whether it was right; the latter only if the presentation is given."""
     text = f"Answer {event.answer} after {event.response_time_s:.2f} s"
-    if presented is None:
+    if presentation is None:
         return f"{text}."
-    return f"{text}: {'right' if event.answer == presented.direction else 'wrong'}."
+    return f"{text}: {'right' if event.answer == presentation.direction else 'wrong'}."
 
 
 def _describe_measured(event: TrialMeasured) -> str:
-    """The delivered acceleration of a trial that counts, and its flags."""
+    """Describe the delivered acceleration of a trial that counts, and its flags."""
     if event.status == "unmeasured":
         return " ".join(("Counts, without a measurement.", *map(_make_sentence, event.flags)))
-    parts = []
+    acceleration_texts = []
     if event.delivered_mps2 is not None:
-        parts.append(f"{event.delivered_mps2:.2f} m/s² along the direction")
+        acceleration_texts.append(f"{event.delivered_mps2:.2f} m/s² along the direction")
     if event.off_axis_mps2 is not None:
-        parts.append(f"{event.off_axis_mps2:.2f} m/s² across")
-    measured = f"Delivered {', '.join(parts)}." if parts else "Counts."
-    return " ".join((measured, *map(_make_sentence, event.flags)))
+        acceleration_texts.append(f"{event.off_axis_mps2:.2f} m/s² across")
+    delivered_text = f"Delivered {', '.join(acceleration_texts)}." if acceleration_texts else "Counts."
+    return " ".join((delivered_text, *map(_make_sentence, event.flags)))
 
 
 def _describe_form(event: FormFilled) -> str:
-    """The outcome of a form, without the answers to questions about the participant."""
-    version = f", version {event.version}" if event.version else ""
-    ethics = f" (ethics approval {event.ethics_id})" if event.ethics_id else ""
+    """Describe the outcome of a form, without the answers to questions about the participant."""
+    version_text = f", version {event.version}" if event.version else ""
+    ethics_text = f" (ethics approval {event.ethics_id})" if event.ethics_id else ""
     match event.form:
         case "consent":
-            return f"Consent was {'given' if event.passed else 'not given'}{version}{ethics}."
+            return f"Consent was {'given' if event.passed else 'not given'}{version_text}{ethics_text}."
         case "exclusion":
             outcome = "nothing speaks against taking part" if event.passed else "the sitting cannot go on"
-            return f"The exclusion questions were answered{version}: {outcome}."
+            return f"The exclusion questions were answered{version_text}: {outcome}."
         case "setup":
             answers_text = "; ".join(
                 f"{key.replace('_', ' ')}: {_join_lines(answer)}" for key, answer in event.answers.items()
@@ -216,32 +223,38 @@ def _describe_form(event: FormFilled) -> str:
 
 
 def _describe_device(device: DeviceFacts) -> str:
+    """Describe a device by its name, and whether it is simulated."""
     return f"{device.name}{' (simulated, nothing moves)' if device.simulated else ''}"
 
 
 def _describe_trial_place(event: TrialPresented | TrialSpoiled) -> str:
+    """Describe run and trial, counted from 1."""
     return f"Run {event.run + 1}, trial {event.trial + 1}"
 
 
-def _key(event: TrialPresented | AnswerGiven | TrialMeasured) -> _Key:
+def _get_presentation_key(event: TrialPresented | AnswerGiven | TrialMeasured) -> _PresentationKey:
+    """Get run, trial and attempt of an event."""
     return event.run, event.trial, event.attempt
 
 
 def _format_seconds(seconds: float) -> str:
+    """Format a duration below 2 minutes in seconds, else in minutes."""
     if seconds < 120:
         return f"{seconds:.3g} s"
     return f"{seconds / 60:.0f} min"
 
 
 def _format_count(number: int, noun: str) -> str:
+    """Format a number with its noun, in the plural unless the number is 1."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _join_lines(text: str) -> str:
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    """Replace line breaks, other unprintable characters and repeated blanks by single blanks."""
+    return " ".join("".join(character if character.isprintable() else " " for character in text).split())
 
 
 def _make_sentence(text: str) -> str:
-    """A flag or finding as a sentence with capital and full stop."""
+    """Format a flag or finding as a sentence with capital and full stop; empty for an empty text."""
     line = _join_lines(text)
     return f"{line[:1].upper()}{line[1:]}{'' if line.endswith(('.', '!', '?')) else '.'}" if line else ""

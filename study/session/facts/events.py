@@ -1,8 +1,8 @@
 """Logged events of a session (its facts): one JSON line each in `events.jsonl`; their parser and formatter.
 
-A fact is what the program cannot recompute: what was opened, presented, answered, measured. Quantities that follow from
-facts (levels, reversals, thresholds) are computed from them (`study.session.state.fold`); where a fact states one of
-them, too, it serves as a check. `study.store.sessions.event_log` writes and reads the log.
+A fact is an observation that the program cannot recompute, such as a presented stimulus, an answer or a measurement.
+Quantities that follow from facts (levels, reversals, thresholds) are computed from them (`study.session.state.fold`);
+where a fact states one of them, too, it serves as a check. `study.store.sessions.event_log` writes and reads the log.
 
 In all events, `run`, `trial` and `attempt` are indices from 0, `utc` is the wall-clock time, and `monotonic_s` is as in
 `sitting_events`. Units are in the names; ranges are in `fact_types`.
@@ -186,15 +186,19 @@ class TrialMeasured:
     flags: tuple[str, ...] = ()
     recording: RecordingPath | None = None
     sha256: Sha256 | None = None
+    """Hash of the file `recording`; null where none was kept."""
     delivered_mps2: Measured | None = None
     off_axis_mps2: Measured | None = None
     """Amplitudes of the delivered acceleration at the stimulus frequency (m/s²), along the direction (`delivered_mps2`)
     and across it. These and the next two as in `study.session.stimulus.delivered`; null where not measured."""
     displacement_mm: Measured | None = None
+    """Amplitude of the displacement along the direction (mm)."""
     harmonics_mps2: Magnitude | None = None
+    """Root of the summed squares of the amplitudes at 2 to 5 times the stimulus frequency (m/s²)."""
     missed_ticks: Count | None = None
     late_ticks: Count | None = None
     latest_s: Seconds | None = None
+    """These three as in `AnswerHealth`, at the end of the stimulus."""
     vibrated_s: Seconds | None = None
     """Duration of the vibration (s), fades included, for the vibration dose."""
     offset_mm: Magnitude | None = None
@@ -216,6 +220,7 @@ class TrialSpoiled:
     trial: Index
     attempt: Index
     reason: str
+    """Cause of the void presentation, a clause."""
     missed_ticks: Count | None = None
     late_ticks: Count | None = None
     latest_s: Seconds | None = None

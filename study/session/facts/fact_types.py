@@ -11,21 +11,21 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-_ISO_8601 = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,6})?(Z|[+-]\d\d:\d\d)", re.ASCII)
+_ISO_8601_PATTERN = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,6})?(Z|[+-]\d\d:\d\d)", re.ASCII)
 """Matches a date, time and UTC offset in ASCII digits."""
 _ACCEPTED_YEARS = range(1970, 3000)
 """Years for which conversion to local time and differences cannot leave the range of `datetime`."""
 
-_RECORDING_PATH = re.compile(r"recordings/[A-Za-z0-9][A-Za-z0-9_.-]{0,199}\.h5", re.ASCII)
+_RECORDING_PATH_PATTERN = re.compile(r"recordings/[A-Za-z0-9][A-Za-z0-9_.-]{0,199}\.h5", re.ASCII)
 """Matches the path of a recording inside a session's folder."""
-_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,199}", re.ASCII)
+_FILE_NAME_PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,199}", re.ASCII)
 """Matches the name of a file without a path, as hapteq writes it."""
 
 
 def check_utc_time(text: str) -> str:
     """Return the text unchanged. Raises ValueError unless it is a valid date and time with UTC offset, in the accepted
     years."""
-    if not _ISO_8601.fullmatch(text):
+    if not _ISO_8601_PATTERN.fullmatch(text):
         raise ValueError("is no time with date and UTC offset in ISO 8601")
     if datetime.fromisoformat(text).year not in _ACCEPTED_YEARS:
         raise ValueError(f"lies outside the years {_ACCEPTED_YEARS.start} to {_ACCEPTED_YEARS.stop - 1}")
@@ -34,14 +34,14 @@ def check_utc_time(text: str) -> str:
 
 def _check_recording_path(text: str) -> str:
     """Return the text unchanged. Raises ValueError unless it is the path of a recording."""
-    if not _RECORDING_PATH.fullmatch(text):
+    if not _RECORDING_PATH_PATTERN.fullmatch(text):
         raise ValueError("is no file in the session's folder recordings")
     return text
 
 
 def _check_file_name(text: str) -> str:
     """Return the text unchanged. Raises ValueError unless it is the name of a file."""
-    if not _FILE_NAME.fullmatch(text):
+    if not _FILE_NAME_PATTERN.fullmatch(text):
         raise ValueError("is no file name in the session's folder")
     return text
 

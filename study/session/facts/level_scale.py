@@ -2,7 +2,8 @@
 
 Levels remain forces in newtons, so that cap, steps and rules do not change: a level is the larger of the two forces
 that the directions need for the same acceleration. Both directions therefore reach the cap at the same acceleration.
-The facts are written into the log when a session is opened; `due_trial` and the modules of trials convert levels.
+The facts are written into the log when a session is opened; `due_trial` and, in `study.workflows.trial`, `demonstrate`
+and `ask_participant` convert levels.
 """
 
 from pydantic.dataclasses import dataclass
@@ -43,15 +44,16 @@ def convert_level_to_acceleration(
     Raises ValueError for a frequency without a scale."""
     if equalized is None:
         return None
-    scale = next((scale for scale in equalized.levels if scale.frequency_hz == frequency_hz), None)
-    if scale is None:
+    level_scale = next(
+        (level_scale for level_scale in equalized.levels if level_scale.frequency_hz == frequency_hz), None
+    )
+    if level_scale is None:
         raise ValueError(f"the session has no scale of levels for {frequency_hz} Hz")
-    return level_n / scale.n_per_mps2
+    return level_n / level_scale.n_per_mps2
 
 
 def convert_level_to_amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
     """Convert a level (N) to the amplitude of the stimulus: a force (N) without an equalizer, an acceleration (m/s^2)
-    with one. Raises ValueError for a
-    frequency without a scale."""
+    with one. Raises ValueError for a frequency without a scale."""
     acceleration_mps2 = convert_level_to_acceleration(equalized, level_n, frequency_hz)
     return level_n if acceleration_mps2 is None else acceleration_mps2

@@ -1,23 +1,25 @@
 """Elapsed time from a log: by the monotonic clock within a sitting, by the wall clock between sittings.
 
-The wall clock can be set forward and back at any moment; the monotonic clock cannot. Every entry carries both, so that
+The wall clock can be set forward and back at any moment; the monotonic clock cannot. Every entry states both, so that
 no exposure limit depends on the wall clock within a sitting. Between sittings only the wall clock is available: setting
-it forward there looks like elapsed time; setting it back is detected and counts as no time.
+it forward there cannot be distinguished from elapsed time; setting it back is detected and counts as no time.
 
-The monotonic clock stops while the computer sleeps: sleep within a sitting looks like a clock set forward. Called where
-a log is folded into a state (`study.session.state`) or watched (`study.session.watching`).
+The monotonic clock stops while the computer sleeps: sleep within a sitting cannot be distinguished from a clock set
+forward. Called where a log is folded into a state (`study.session.state`) or watched (`study.session.watching`,
+`study.workflows.views.watch_session`).
 """
 
 from dataclasses import dataclass
 from datetime import datetime
 
 MIN_STEP_S = 5.0
-"""Disagreement of the two clocks (s) above which the wall clock was set. NTP corrections are far smaller."""
+"""Disagreement of the two clocks (s) from which the wall clock counts as set. Chosen: far above the corrections of a
+running time service (NTP)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A moment of the log, by wall clock and monotonic clock."""
+    """Time of a log entry, by wall clock and monotonic clock."""
 
     utc: str
     """ISO 8601; empty where nothing was logged before."""
@@ -31,16 +33,16 @@ class ClockStep:
 
     utc: str
     """UTC time of the first entry after the step, by the clock as it was set."""
-    by_s: float
+    step_s: float
     """Size of the step in seconds; positive: forward."""
     between_sittings: bool
 
     @property
     def sentence(self) -> str:
         """Sentence for the experimenter."""
-        step_text = _format_duration(abs(self.by_s))
+        step_text = _format_duration(abs(self.step_s))
         limits = "Time limits and the vibration dose do not follow it; the times in the log do."
-        if self.by_s > 0:
+        if self.step_s > 0:
             return f"The computer's clock was set forward by {step_text}, or the computer slept that long. {limits}"
         if self.between_sittings:
             return (
@@ -51,8 +53,8 @@ class ClockStep:
 
 
 def compute_elapsed_s(start: Moment, end: Moment) -> float:
-    """Time between two moments (s), never negative. By the monotonic clock where both carry it, otherwise by the
-    wall clock."""
+    """Time between two entries (s), never negative: by the monotonic clock where both state it, which must then be of
+    the same sitting; otherwise by the wall clock, and 0 where `start.utc` is empty."""
     if start.monotonic_s is not None and end.monotonic_s is not None:
         return max(0.0, end.monotonic_s - start.monotonic_s)
     return max(0.0, compute_wall_clock_s(start.utc, end.utc))
@@ -63,8 +65,8 @@ def find_clock_step(start: Moment, end: Moment, between_sittings: bool = False) 
     be detected."""
     wall_s = compute_wall_clock_s(start.utc, end.utc)
     has_monotonic = start.monotonic_s is not None and end.monotonic_s is not None
-    by_s = wall_s - compute_elapsed_s(start, end) if has_monotonic else min(0.0, wall_s)
-    return ClockStep(end.utc, by_s, between_sittings) if abs(by_s) >= MIN_STEP_S else None
+    step_s = wall_s - compute_elapsed_s(start, end) if has_monotonic else min(0.0, wall_s)
+    return ClockStep(end.utc, step_s, between_sittings) if abs(step_s) >= MIN_STEP_S else None
 
 
 def compute_wall_clock_s(first_utc: str, second_utc: str) -> float:

@@ -1,6 +1,7 @@
 """Logged events of a sitting except its trials: forms, checks, demonstrations, probes, rests, pauses, notes, end.
 
-Each class with a field `event` is one kind of line of the session's log `events.jsonl`; `event` names the kind. `utc`
+Each class with a field `event` is one kind of line of the session's log `events.jsonl`; `event` names the kind, and
+`events` combines them with the events of trials in the type `Event`. `utc`
 is the wall-clock time, `monotonic_s` the session's monotonic clock (s; None where it was not logged). A unit that is
 not stated is given by the type of the field (`fact_types`) or the suffix of its name. A session and a sitting are
 defined in `study.session`.
@@ -177,8 +178,9 @@ class MaskingPlayed:
     level_db: float
     """Level in dB relative to the sound file that `hapteq noise` writes."""
     low_hz: FrequencyHz
+    """Lower end of the band of the noise."""
     high_hz: FrequencyHz
-    """Upper end of the band of the noise; `low_hz` is the lower end."""
+    """Upper end of the band of the noise."""
     seed: Count
     """Seed of the noise, which makes it reproducible."""
     trouble: str = ""

@@ -1,8 +1,9 @@
 """Vibration dose of the same hand in other sessions of the day.
 
 The daily exposure A(8) of hand-transmitted vibration (ISO 5349-1, `vibration_dose`) adds up over all sessions since
-the last night's rest, not per session. The dose is found when a sitting begins, logged in the event that begins it, and
-set in the state by `state` and `fold`.
+the last night's rest, not per session. When a sitting begins, `study.workflows.session.other_session_dose` computes the
+dose with `find_dose_elsewhere`; it is logged in the event that begins the sitting, and `state` and `fold` set it in the
+state with `set_dose_elsewhere`.
 """
 
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ from study.session.state.vibration_dose import NO_DOSE, Dose, sum_doses
 
 
 def find_dose_elsewhere(
-    sessions: Mapping[str, SittingState], own_session: str, utc: str, unread: tuple[str, ...] = ()
+    sessions: Mapping[str, SittingState], own_session: str, utc: str, unread_sessions: tuple[str, ...] = ()
 ) -> DoseElsewhere | None:
     """Vibration dose from the participant's other sessions since the last pause of at least `DAILY_REST_S` without
     vibration.
@@ -27,24 +28,25 @@ def find_dose_elsewhere(
     The sessions are searched backwards in time up to the first such pause, between two of them or after the last. Only
     the wall clock is known between sessions; where it was set back, no time is counted.
     """
-    present_states = {name: pass_time(sitting, Moment(utc), resumed=True) for name, sitting in sessions.items()}
-    exposed = {name: sitting for name, sitting in present_states.items() if sitting.still_s is not None}
+    current_states = {name: pass_time(sitting, Moment(utc), resumed=True) for name, sitting in sessions.items()}
+    moved_sessions = {name: sitting for name, sitting in current_states.items() if sitting.still_s is not None}
     counted_sessions: dict[str, SittingState] = {}
-    # Times before now (s): `still_s` since the last vibration, `began_s` since the earliest session counted so far.
-    began_s = 0.0
-    for name, sitting in sorted(exposed.items(), key=lambda item: item[1].still_s or 0.0):
+    # Times before now (s): `still_s` since the last vibration of a session, `earliest_start_s` since the first
+    # vibration of the earliest session counted so far.
+    earliest_start_s = 0.0
+    for name, sitting in sorted(moved_sessions.items(), key=lambda item: item[1].still_s or 0.0):
         still_s = sitting.still_s or 0.0
-        if still_s - began_s >= DAILY_REST_S:
+        if still_s - earliest_start_s >= DAILY_REST_S:
             break
         counted_sessions[name] = sitting
-        began_s = max(began_s, sitting.sitting_elapsed_s or still_s)
+        earliest_start_s = max(earliest_start_s, sitting.sitting_elapsed_s or still_s)
     counted_sessions.pop(own_session, None)
     if not counted_sessions:
-        return DoseElsewhere((), 0.0, 0.0, 0.0, 0.0, unread) if unread else None
+        return DoseElsewhere((), 0.0, 0.0, 0.0, 0.0, unread_sessions) if unread_sessions else None
     dose = sum_doses(*(sitting.dose for sitting in counted_sessions.values()))
     still_s = min(sitting.still_s or 0.0 for sitting in counted_sessions.values())
     return DoseElsewhere(
-        tuple(sorted(counted_sessions)), dose.squared_s, dose.vibrated_s, dose.unmeasured_s, still_s, unread
+        tuple(sorted(counted_sessions)), dose.squared_s, dose.vibrated_s, dose.unmeasured_s, still_s, unread_sessions
     )
 
 
@@ -53,12 +55,12 @@ def set_dose_elsewhere(sitting: SittingState, other_dose: DoseElsewhere | None) 
     later in another session, the time since its last motion is that one."""
     if other_dose is None:
         return replace(sitting, other_sessions_dose=NO_DOSE, unread_sessions=())
-    updated = replace(sitting, unread_sessions=other_dose.unread, other_sessions_dose=NO_DOSE)
+    updated_sitting = replace(sitting, unread_sessions=other_dose.unread, other_sessions_dose=NO_DOSE)
     if not other_dose.sessions:
-        return updated
+        return updated_sitting
     still_s = other_dose.still_s if sitting.still_s is None else min(sitting.still_s, other_dose.still_s)
     return replace(
-        updated,
+        updated_sitting,
         other_sessions_dose=Dose(other_dose.squared_s, other_dose.vibrated_s, other_dose.unmeasured_s),
         still_s=still_s,
     )

@@ -1,4 +1,9 @@
-"""The next trial: everything about a presentation that follows from rules, seed and position in the session."""
+"""Computation of the next trial: the presentation that follows from protocol, rules, seed and position in the session.
+
+Order: draw direction and polarity, compute the level by the staircase, practice or catch trial, rove the level, limit
+it by the safety cap. Called by `state`, from which `machine` takes the trial to present, and `presentation_check` the
+values that a logged trial must have.
+"""
 
 from dataclasses import dataclass
 
@@ -21,14 +26,14 @@ from study.session.facts.level_scale import convert_level_to_acceleration
 from study.session.state.rules import is_same_stimulus_repeated
 from study.session.stimulus.stimulus import compute_direction_angle_deg
 
-_ROVED = (Phase.TRAINING, Phase.TEST)
-"""Trial phases of staircases on directions. Catch trials are at full level, and detection trials ask for no
-direction."""
+_ROVED_PHASES = (Phase.TRAINING, Phase.TEST)
+"""Phases whose levels are roved: staircases on directions. Catch trials are at full level, and detection trials ask for
+no direction."""
 
 
 @dataclass(frozen=True, slots=True)
 class PresentTrial:
-    """Play this stimulus and ask for the answer."""
+    """A presentation: the stimulus to play and its correct answer. run, trial, attempt: indices from 0."""
 
     run: int
     trial: int
@@ -40,18 +45,20 @@ class PresentTrial:
     label: int
     """Number of the correct answer: of a direction or, in a detection run, of an interval."""
     direction: int
-    """The protocol's direction to play; differs from the label where labels are swapped."""
+    """The protocol's direction to play, 1 or 2; differs from the label where labels are swapped."""
     angle_deg: float
+    """Angle of the direction in the protocol's plane (degrees)."""
     polarity: int
+    """Sign of the first half period, +1 or -1."""
     wanted_mps2: float | None = None
-    """Wanted acceleration of the level; None where levels are commanded forces."""
+    """Target acceleration of the level (m/s²); None where levels are commanded forces."""
     nominal_n: float | None = None
-    """Level of the staircase, around which `level_n` was drawn; None without roving."""
+    """Level of the staircase (N), around which `level_n` was drawn; None without roving."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Position of a trial in a session."""
+    """Position of a trial in a session, and the state of the staircase there. trial, attempt: indices from 0."""
 
     run: Run
     trial: int
@@ -59,26 +66,31 @@ class Place:
     staircase: StaircaseState
 
 
-def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> PresentTrial:
-    """The presentation at this place."""
+def compute_due_trial(
+    protocol: StudyProtocol, opening_event: SessionOpened, rule: StaircaseRule, place: Place
+) -> PresentTrial:
+    """Compute the presentation at this place. With `is_same_stimulus_repeated`, every attempt has the draw of the
+    first attempt."""
     run, polarity = place.run, protocol.stimulus.onset_polarity
-    draws = 0 if is_same_stimulus_repeated(opened) else place.attempt
-    draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
-    label, direction = label_direction(draw.direction, has_swapped_labels(protocol, opened)), draw.direction
+    draw_index = 0 if is_same_stimulus_repeated(opening_event) else place.attempt
+    draw = draw_trial(protocol.schedule, polarity, opening_event.seed, run.index, place.trial, draw_index)
+    label, direction = label_direction(draw.direction, has_swapped_labels(protocol, opening_event)), draw.direction
     if run.phase is Phase.DETECTION:  # the answer is an interval; the direction does not matter
         label = draw.direction
-        direction = draw_detection_direction(opened.seed, run.index, place.trial, draws)
+        direction = draw_detection_direction(opening_event.seed, run.index, place.trial, draw_index)
     phase, level_db = run.phase, place.staircase.level_db
     force_n = level_n(rule, place.staircase)
     if run.practice:
-        force_n = draw_practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
+        force_n = draw_practice_level_n(protocol.practice, opening_event.seed, run.index, place.trial, draw_index)
         level_db = to_db(force_n)
-    elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
+    elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opening_event.seed, run.index, place.trial):
         phase, force_n, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
     nominal_n = None
-    if protocol.stimulus.rove_db and phase in _ROVED and not run.practice:
+    if protocol.stimulus.rove_db and phase in _ROVED_PHASES and not run.practice:
         nominal_n = force_n
-        drawn_n = rove_level_n(force_n, protocol.stimulus.rove_db, opened.seed, run.index, place.trial, draws)
+        drawn_n = rove_level_n(
+            force_n, protocol.stimulus.rove_db, opening_event.seed, run.index, place.trial, draw_index
+        )
         force_n = min(drawn_n, protocol.safety.stimulus_cap_n)
         level_db = to_db(force_n)
     return PresentTrial(
@@ -93,11 +105,13 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         direction=direction,
         angle_deg=compute_direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
-        wanted_mps2=convert_level_to_acceleration(opened.equalized, force_n, run.frequency_hz),
+        wanted_mps2=convert_level_to_acceleration(opening_event.equalized, force_n, run.frequency_hz),
         nominal_n=nominal_n,
     )
 
 
-def has_swapped_labels(protocol: StudyProtocol, opened: SessionOpened) -> bool:
+def has_swapped_labels(protocol: StudyProtocol, opening_event: SessionOpened) -> bool:
     """Whether the numbers 1 and 2 are exchanged for this participant."""
-    return are_labels_swapped(protocol.schedule, len(protocol.stimulus.frequencies_hz), opened.participant_number)
+    return are_labels_swapped(
+        protocol.schedule, len(protocol.stimulus.frequencies_hz), opening_event.participant_number
+    )

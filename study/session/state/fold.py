@@ -51,7 +51,8 @@ from study.session.state.state import SessionState, assign_place
 
 
 def apply_event(state: SessionState, event: Event) -> SessionState:
-    """Apply one event: the next state. Raises LogContradiction where the event cannot follow the previous ones."""
+    """Apply one event; returns the next state. Raises LogContradiction where the event cannot follow the previous
+    ones."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
     if state.is_finally_ineligible and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
@@ -76,8 +77,8 @@ def _advance_time(sitting: SittingState, event: Event) -> SittingState:
 
 
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
-    """Apply an event that is not part of a trial. Raises LogContradiction for a second opening, and as the functions
-    for single events."""
+    """Apply an event that is not part of a trial. Raises LogContradiction for a second opening, and where the function
+    for the event raises it."""
     match event:
         case RestTaken():
             return _apply_rest(state, event)
@@ -88,8 +89,8 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
             return _apply_preparation(state, event)
         case SessionResumed():
-            resumed = resume_sitting(state.sitting, state.answers)
-            return replace(state, sitting=set_dose_elsewhere(resumed, event.dose_elsewhere))
+            resumed_sitting = resume_sitting(state.sitting, state.answers)
+            return replace(state, sitting=set_dose_elsewhere(resumed_sitting, event.dose_elsewhere))
         case PlaceTaken():
             return _take_place(state, event)
         case SessionClosed():
@@ -104,8 +105,8 @@ def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
     """Apply a rest: no rest is due afterwards. Raises LogContradiction where none was due."""
     if state.rest_due_s <= 0:
         raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
-    rested = _set_probing(state, apply_break(state.sitting.probing, event, state.protocol.probes))
-    return replace(rested, rest_due_s=0.0)
+    rested_state = _set_probing(state, apply_break(state.sitting.probing, event, state.protocol.probes))
+    return replace(rested_state, rest_due_s=0.0)
 
 
 def _set_probing(state: SessionState, probing: ProbeState) -> SessionState:
@@ -124,17 +125,17 @@ def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> Ses
         return replace(
             state, sitting=replace(moved_sitting, probing=begin_probe(probing, event, state.protocol.probes))
         )
-    updated = _set_probing(state, end_probe(probing, event))
+    updated_state = _set_probing(state, end_probe(probing, event))
     if probing.open is None or probing.open.kind != "hand":
-        return updated
+        return updated_state
     # The dose is computed from the amplitude of a sine with the measured root mean square.
     amplitude_mps2 = None if event.rms_mps2 is None else math.sqrt(2) * event.rms_mps2
-    sitting = add_exposure(updated.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
-    return replace(updated, sitting=sitting)
+    sitting = add_exposure(updated_state.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
+    return replace(updated_state, sitting=sitting)
 
 
 def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
-    """Apply the participant's place in the balanced order. Raises LogContradiction where none was due."""
+    """Apply the participant's place in the counterbalanced order. Raises LogContradiction where none was due."""
     if state.trials or state.sitting.place_assigned or not is_place_assigned_later(state.opened):
         raise LogContradiction("a place in the order was taken where none was due")
     return assign_place(state, event.participant_number)
@@ -166,6 +167,6 @@ def _apply_preparation(
         case DemoFinished():
             return replace(state, sitting=finish_demo(state.sitting, event))
         case DemoPlayed():
-            amplitude = estimate_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
-            sitting = add_exposure(start_motion(state.sitting), event.frequency_hz, amplitude, event.seconds)
+            amplitude_mps2 = estimate_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
+            sitting = add_exposure(start_motion(state.sitting), event.frequency_hz, amplitude_mps2, event.seconds)
             return replace(state, sitting=replace(sitting, demo_count=sitting.demo_count + 1))

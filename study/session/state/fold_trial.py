@@ -1,4 +1,4 @@
-"""The fold of a trial's events (presented, answered, measured or void) into the state of a session.
+"""Application of a trial's events (presented, answered, measured or void) to the state of a session; called by `fold`.
 
 A trial is open from its presentation until it is measured or void. A measured trial moves the staircase and the place
 in the run; a void one is due again with the next attempt number. Each adds its vibration to the dose. An event that
@@ -38,25 +38,25 @@ from study.session.state.state import (
 
 
 def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
-    """The state with this trial open. Raises LogContradiction where another trial is open, no run is left, or the
-    trial differs from the draw that is due."""
+    """Open this trial. Raises LogContradiction where another trial is open, no run is left, or the trial differs from
+    the presentation that is due."""
     if state.presented is not None:
         raise LogContradiction(f"{describe_place(event)} presented while another trial is open")
     if state.finished:
         raise LogContradiction(f"{describe_place(event)} presented after the last run")
     check_presentation(event, find_due_presentation(state))
     repeat_cause = state.trials[-1].void_cause if state.attempt else None
-    row = _trial_row(state.opened, event, is_felt_by_person(state.opened), repeat_cause)
+    row = _make_trial_row(state.opened, event, is_felt_by_person(state.opened), repeat_cause)
     return replace(state, presented=event, trials=(*state.trials, row), sitting=start_motion(state.sitting))
 
 
-def _trial_row(
-    opened: SessionOpened, event: TrialPresented, was_felt: bool | None, repeat_cause: VoidCause | None
+def _make_trial_row(
+    opening_event: SessionOpened, event: TrialPresented, was_felt: bool | None, repeat_cause: VoidCause | None
 ) -> Trial:
     """Row of `trials.csv` at the presentation; answer and measurement are added later."""
     return Trial(
-        subject=opened.subject,
-        session=opened.session,
+        subject=opening_event.subject,
+        session=opening_event.session,
         run=event.run,
         trial=event.trial,
         attempt=event.attempt,
@@ -77,13 +77,13 @@ def _trial_row(
         angle_deg=event.angle_deg,
         wanted_mps2=event.wanted_mps2,
         repeat_cause=repeat_cause,
-        onset_s=compute_wall_clock_s(opened.utc, event.utc),
+        onset_s=compute_wall_clock_s(opening_event.utc, event.utc),
         nominal_n=event.nominal_n,
     )
 
 
 def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
-    """The open trial with its answer; the staircase moves when the trial is measured. Raises LogContradiction where
+    """Set the answer of the open trial; the staircase moves when the trial is measured. Raises LogContradiction where
     the trial is not open or has an answer."""
     presented = _require_open_trial(state, event)
     if state.answered is not None:
@@ -99,14 +99,15 @@ def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
 
 
 def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
-    """Close the answered trial: staircase, dose, and the next trial, rest or run. Raises LogContradiction."""
+    """Close the answered trial: staircase, dose, and the next trial, rest or run. Raises LogContradiction where the
+    trial is not open or has no answer."""
     presented = _require_open_trial(state, event)
     if state.answered is None:
         raise LogContradiction(f"{describe_place(event)} measured before it was answered")
-    stepped = _step_staircase(state, presented, correct=state.answered.answer == presented.direction)
+    stepped_state = _step_staircase(state, presented, correct=state.answered.answer == presented.direction)
     row = replace(
         _set_sensor_facts(state.trials[-1], event.sensor),
-        reversal=stepped.staircase.reversals > state.staircase.reversals,
+        reversal=stepped_state.staircase.reversals > state.staircase.reversals,
         delivered_mps2=event.delivered_mps2,
         off_axis_mps2=event.off_axis_mps2,
         displacement_mm=event.displacement_mm,
@@ -120,8 +121,8 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
     amplitude_mps2 = None
     if event.delivered_mps2 is not None:
         amplitude_mps2 = math.hypot(event.delivered_mps2, event.off_axis_mps2 or 0.0)
-    updated = replace(
-        _add_vibration(stepped, presented, amplitude_mps2, event.vibrated_s),
+    updated_state = replace(
+        _add_vibration(stepped_state, presented, amplitude_mps2, event.vibrated_s),
         presented=None,
         answered=None,
         trial=state.trial + 1,
@@ -129,7 +130,7 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
         trials=(*state.trials[:-1], row),
         rest_due_s=_find_rest_within_run(state.protocol, state.trial + 1),
     )
-    return _start_next_run(updated) if _is_run_over(updated) else updated
+    return _start_next_run(updated_state) if _is_run_over(updated_state) else updated_state
 
 
 def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
@@ -158,11 +159,12 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
 
 
 def _set_sensor_facts(row: Trial, sensor: SensorFacts | None) -> Trial:
-    """The row with what the accelerometer lost during the trial; unchanged without a sensor."""
+    """Set the packets, bytes and fraction of samples that the accelerometer lost in the trial; the row is unchanged
+    without a sensor."""
     if sensor is None:
         return row
-    missing, garbled_bytes = sensor.missing, sensor.spoiled_bytes
-    return replace(row, lost_packets=sensor.lost, garbled_bytes=garbled_bytes, acceleration_missing=missing)
+    missing_fraction, garbled_bytes = sensor.missing, sensor.spoiled_bytes
+    return replace(row, lost_packets=sensor.lost, garbled_bytes=garbled_bytes, acceleration_missing=missing_fraction)
 
 
 def _require_open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
@@ -195,11 +197,15 @@ def _is_run_over(state: SessionState) -> bool:
 
 def _start_next_run(state: SessionState) -> SessionState:
     """The state at the beginning of the next run, with the rest that is due before it (s); no rest after the last."""
-    last = state.run + 1 == len(state.runs)
-    # Practice runs are short: their rest is the time it takes to read how they went.
-    rest_s = 0.0 if last or state.runs[state.run].practice else state.protocol.rests.after_run_s
-    updated = replace(state, run=state.run + 1, trial=0, attempt=0, practice=PracticeState(), rest_due_s=rest_s)
-    return updated if last else replace(updated, staircase=begin_staircase(make_current_rule(updated)))
+    is_last_run = state.run + 1 == len(state.runs)
+    # No enforced rest after a practice run: it is short, and the participant reads its result afterwards.
+    rest_s = 0.0 if is_last_run or state.runs[state.run].practice else state.protocol.rests.after_run_s
+    updated_state = replace(state, run=state.run + 1, trial=0, attempt=0, practice=PracticeState(), rest_due_s=rest_s)
+    return (
+        updated_state
+        if is_last_run
+        else replace(updated_state, staircase=begin_staircase(make_current_rule(updated_state)))
+    )
 
 
 def _find_rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
@@ -209,11 +215,11 @@ def _find_rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
 
 
 def _add_vibration(
-    state: SessionState, presented: TrialPresented, amplitude_mps2: float | None, seconds: float | None
+    state: SessionState, presented: TrialPresented, amplitude_mps2: float | None, duration_s: float | None
 ) -> SessionState:
     """Add the vibration of a presentation to the dose, whether or not the trial counts. amplitude_mps2: None where it
-    was not measured, and is estimated; seconds: duration of the vibration."""
+    was not measured, and is estimated; duration_s: of the vibration; None where it was not logged."""
     if amplitude_mps2 is None:
         amplitude_mps2 = estimate_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
-    sitting = add_exposure(state.sitting, presented.frequency_hz, amplitude_mps2, seconds)
+    sitting = add_exposure(state.sitting, presented.frequency_hz, amplitude_mps2, duration_s)
     return replace(state, sitting=sitting)

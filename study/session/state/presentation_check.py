@@ -35,9 +35,9 @@ def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
         "nominal_n": (event.nominal_n, expected.nominal_n),
     }
     contradictions = [
-        f"{name} {logged} where {expected_value} is due"
-        for name, (logged, expected_value) in compared_values.items()
-        if not _is_equal(logged, expected_value)
+        f"{name} {logged_value} where {expected_value} is due"
+        for name, (logged_value, expected_value) in compared_values.items()
+        if not _is_equal(logged_value, expected_value)
     ]
     if contradictions:
         raise LogContradiction(
@@ -46,12 +46,12 @@ def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
         )
 
 
-def _is_equal(logged: str | float | None, expected_value: str | float | None) -> bool:
+def _is_equal(logged_value: str | float | None, expected_value: str | float | None) -> bool:
     """Whether the values are equal; floats up to 1e-9 relative or absolute, because the last bits of floating-point
     powers differ between computers."""
-    if isinstance(logged, float) and isinstance(expected_value, float):
-        return math.isclose(logged, expected_value, rel_tol=1e-9, abs_tol=1e-9)
-    return logged == expected_value
+    if isinstance(logged_value, float) and isinstance(expected_value, float):
+        return math.isclose(logged_value, expected_value, rel_tol=1e-9, abs_tol=1e-9)
+    return logged_value == expected_value
 
 
 def describe_place(event: TrialPresented | AnswerGiven | TrialMeasured | TrialSpoiled) -> str:

@@ -9,8 +9,8 @@ opening event.
 Version 2:
 
 * A void trial is presented again with the same stimulus: direction (or interval), level, polarity. With a new draw on
-  request, a participant could ask again when unsure and answer when sure; thresholds would be too low by about 2 dB
-  (simulated).
+  request, a participant could ask again when unsure and answer when sure; in simulations, thresholds were then too low
+  by about 2 dB.
 * This holds for every cause of a void trial. Pausing, leaving, Ctrl-C, a late answer, and pushing the handle until the
   safety layer releases it, are available to a participant like the repeat key; a new draw would have the same effect.
 * Only the repeat key is limited (`trial.repeats_per_run`): pausing and leaving are the participant's rights and are
@@ -31,17 +31,17 @@ LATEST_RULES: Literal[2] = 2
 """Version of the rules for new sessions."""
 
 
-def is_same_stimulus_repeated(opening: SessionOpened) -> bool:
-    """Whether a void trial is presented again with the same stimulus."""
-    return opening.rules >= 2
+def is_same_stimulus_repeated(opening_event: SessionOpened) -> bool:
+    """Whether a void trial is presented again with the same stimulus instead of a new draw."""
+    return opening_event.rules >= 2
 
 
-def is_refusal_final(opening: SessionOpened) -> bool:
+def is_refusal_final(opening_event: SessionOpened) -> bool:
     """Whether a refusal of consent or an exclusion is final and closes the session."""
-    return opening.rules >= 2
+    return opening_event.rules >= 2
 
 
-def is_place_assigned_later(opening: SessionOpened) -> bool:
+def is_place_assigned_later(opening_event: SessionOpened) -> bool:
     """Whether the participant number is assigned after the preparation of the sitting; never for simulated
     participants, who always take part."""
-    return opening.rules >= 2 and opening.observer is None
+    return opening_event.rules >= 2 and opening_event.observer is None

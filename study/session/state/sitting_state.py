@@ -157,7 +157,7 @@ def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
 
 def _sum_steps_s(steps: tuple[ClockStep, ...]) -> float:
     """Sum the steps of the clock (s); positive: forward."""
-    return sum(step.by_s for step in steps)
+    return sum(step.step_s for step in steps)
 
 
 def start_motion(sitting: SittingState) -> SittingState:

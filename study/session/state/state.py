@@ -16,7 +16,7 @@ from protocols.trial import Trial, VoidCause
 from study.session.facts.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import set_dose_elsewhere
-from study.session.state.due_trial import Place, PresentTrial, due_trial
+from study.session.state.due_trial import Place, PresentTrial, compute_due_trial
 from study.session.state.presentation_check import LogContradiction
 from study.session.state.rules import is_place_assigned_later, is_refusal_final, is_same_stimulus_repeated
 from study.session.state.sitting_state import SittingState
@@ -125,7 +125,7 @@ def make_current_rule(state: SessionState) -> StaircaseRule:
 def find_due_presentation(state: SessionState) -> PresentTrial:
     """The next presentation, determined by the staircase and the schedule of the current run."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
-    return due_trial(state.protocol, state.opened, make_current_rule(state), place)
+    return compute_due_trial(state.protocol, state.opened, make_current_rule(state), place)
 
 
 def count_repeats_left(state: SessionState) -> int | None:

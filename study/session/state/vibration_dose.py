@@ -59,11 +59,11 @@ def compute_hand_arm_weight(frequency_hz: float) -> float:
 
 
 def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
-    """Add a sinusoid to a dose: returns the dose after a sinusoid of this duration (s). amplitude_mps2: peak; None if
-    it was not measured.
+    """Add a sinusoid of this duration (s) to a dose; returns the sum. amplitude_mps2: peak; None if unknown, which adds
+    to `unmeasured_s` instead of `squared_s`.
 
-    Fades count at full amplitude, so the dose is overestimated, never underestimated. Raises ValueError for a negative
-    duration.
+    The fades are part of the duration, and count at full amplitude, so that they are overestimated. Raises ValueError
+    for a negative duration and, with a known amplitude, for a frequency that is not above 0.
     """
     if seconds < 0:
         raise ValueError(f"seconds is {seconds:g}; a vibration lasts 0 s or longer")
@@ -77,7 +77,7 @@ def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, 
 
 
 def sum_doses(*doses: Dose) -> Dose:
-    """Sum of the doses of a hand on a day."""
+    """Sum of the doses of a hand on a day; `NO_DOSE` without any."""
     return Dose(
         squared_s=sum(dose.squared_s for dose in doses),
         vibrated_s=sum(dose.vibrated_s for dose in doses),

@@ -17,10 +17,11 @@ from protocols.definition.study_contradictions import compute_highest_roved_n
 from protocols.definition.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
-"""Allowance for the centring spring (N/s): 150 N/m at 0.6 m/s (90 N/s), faster than a hand moves in a trial."""
+"""Allowance for the centring spring (N/s). Chosen: above 150 N/m at 0.6 m/s (90 N/s), faster than a hand moves in a
+trial."""
 
 SLEW_MARGIN = 1.05
-"""Factor on the steepest slope of the stimuli, for rounding and fades."""
+"""Factor on the steepest slope of the stimuli, for rounding. Chosen."""
 
 MULTISINE_PEAK_FACTOR = math.sqrt(2)
 """Bound of a multisine between its samples: with lines below a quarter of the rate the continuous signal exceeds the
@@ -48,6 +49,7 @@ class Limits:
     feedback_cap_n: float = SafetySettings.feedback_cap_n
     """Limit of the forces of spring and damper: of each alone, and of their sum."""
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
+    """Bounds of plausible position readings."""
 
 
 def make_study_limits(protocol: StudyProtocol) -> Limits:

@@ -3,7 +3,8 @@
 Only odd multiples of 1 / period are excited, so that even-order distortion appears at the even lines, and the lines of
 the axes are interleaved, so that one period gives the response to each axis (Pintelon and Schoukens, System
 Identification, 2nd ed., 2012, chapters 2 and 4). A probe is played with the hand on the handle, between trials; a
-reference is longer, at two levels, and played with no hand on the handle.
+reference is longer, at two levels, and played with no hand on the handle. Called by
+`study.workflows.trial.play_probe`.
 """
 
 import numpy as np
@@ -16,19 +17,19 @@ from protocols.definition.probes import LOWEST_LINE_HZ, PERIOD_S, ProbeSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 FADE_S = 0.25
-"""Duration of the raised-cosine fade at both ends (s), so that the onset excites few modes. Chosen by hand."""
-HELD_S = FADE_S + PERIOD_S + 0.1
-"""Time from the start until the program asks for the fade-out (s): fade-in, one whole period, and a margin of 0.1 s."""
-PHASES_SEED = 16
+"""Duration of the raised-cosine fade at both ends (s). Chosen: long enough that the onset excites few modes."""
+PROBE_HOLD_S = FADE_S + PERIOD_S + 0.1
+"""Time from the start of a probe to its fade-out (s): fade-in, one whole period, and a margin of 0.1 s (chosen)."""
+PHASE_SEED = 16
 """Seed of the phases, the same for every probe, so that probes can be compared line by line."""
 
 
 def make_probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
-    """One period, (n, 3), whose norm over the axes peaks at 1. Each axis has every third odd line from
-    `LOWEST_LINE_HZ` on."""
-    n = round(PERIOD_S * sample_rate_hz)
-    lines = list_lines_between(LOWEST_LINE_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
-    return make_interleaved_multisine(lines, n, 3, PHASES_SEED)
+    """One period, (n, 3), without unit, whose norm over the axes peaks at 1. Each axis has every third odd line between
+    `LOWEST_LINE_HZ` and `settings.to_hz`."""
+    period_samples = round(PERIOD_S * sample_rate_hz)
+    lines = list_lines_between(LOWEST_LINE_HZ, settings.to_hz, period_samples, sample_rate_hz, odd_only=True)
+    return make_interleaved_multisine(lines, period_samples, 3, PHASE_SEED)
 
 
 def make_probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
@@ -42,23 +43,35 @@ def make_probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz:
 
 def make_reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
     """The reference as commands (n, 3) in N, and its whole periods as segments: first at full level, then at half of
-    it, because a response that depends on the level shows friction. The last third of each part is held out, to test a
-    model."""
+    it, because a response that depends on the level shows friction. At each level, the last third of the periods
+    (rounded up) is reserved for the test of a model. There are at least 4 periods per level."""
     wave = make_probe_wave(settings, sample_rate_hz)
-    n, fade = len(wave), round(FADE_S * sample_rate_hz)
-    part = max(4, round(settings.reference_s / PERIOD_S / 2))
-    # Between the parts the level falls linearly over one period.
-    level = np.concatenate([np.ones(fade + part * n), np.linspace(1.0, 0.5, n), np.full(part * n + fade, 0.5)])
-    level_n = settings.reference_n * level
+    period_samples, fade_samples = len(wave), round(FADE_S * sample_rate_hz)
+    periods_per_level = max(4, round(settings.reference_s / PERIOD_S / 2))
+    # The level falls linearly from 1 to 1/2 over one period, which belongs to no segment.
+    level_fraction = np.concatenate(
+        [
+            np.ones(fade_samples + periods_per_level * period_samples),
+            np.linspace(1.0, 0.5, period_samples),
+            np.full(periods_per_level * period_samples + fade_samples, 0.5),
+        ]
+    )
+    level_n = settings.reference_n * level_fraction
     # A segment begins at the first sample of a period, after the fade.
-    periodic = wave[np.arange(-fade, len(level) - fade) % n]
-    forces = apply_fades(level_n[:, None] * periodic, fade, fade)
+    periodic_wave = wave[np.arange(-fade_samples, len(level_fraction) - fade_samples) % period_samples]
+    forces = apply_fades(level_n[:, None] * periodic_wave, fade_samples, fade_samples)
     segments = []
-    for start, peak_n in ((fade, settings.reference_n), (fade + (part + 1) * n, settings.reference_n / 2)):
-        middle, stop = start + (2 * part // 3) * n, start + part * n
+    for start, peak_n in (
+        (fade_samples, settings.reference_n),
+        (fade_samples + (periods_per_level + 1) * period_samples, settings.reference_n / 2),
+    ):
+        test_start, stop = (
+            start + (2 * periods_per_level // 3) * period_samples,
+            start + periods_per_level * period_samples,
+        )
         segments += [
-            Segment(start, middle, "multisine", peak_n, n, "fit"),
-            Segment(middle, stop, "multisine", peak_n, n, "test"),
+            Segment(start, test_start, "multisine", peak_n, period_samples, "fit"),
+            Segment(test_start, stop, "multisine", peak_n, period_samples, "test"),
         ]
     return _make_force_signal(forces, sample_rate_hz), tuple(segments)
 

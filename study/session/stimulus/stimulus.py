@@ -72,9 +72,9 @@ def make_held_stimulus(
     equalizer: Equalizer,
     sample_rate_hz: float,
 ) -> HeldStimulus:
-    """Compute the loop of one trial, and its onset where the equalizer has one. amplitude: peak, in N where the
-    equalizer takes a force, in m/s^2 where it takes an acceleration; its sign is the polarity of the onset.
-    unit_vector: (3,)."""
+    """Compute the loop of one trial, and its onset where the equalizer computes one. amplitude: peak, in N where the
+    equalizer takes a force, in m/s² where it takes an acceleration; its sign is the polarity. unit_vector: (3,),
+    the direction."""
     loop_samples = count_loop_samples(frequency_hz, sample_rate_hz)
     phase_rad = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(loop_samples)
     is_force = equalizer.takes == "force"

@@ -71,34 +71,34 @@ def measure_lateness(late_s: FloatArray, rate_hz: float) -> Lateness:
 
 
 def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
-    """Judge the wake-ups; too late is only a warning for a simulated device."""
-    value = (
+    """Judge the lateness of the wake-ups; for a simulated device, too late is only a warning."""
+    value_text = (
         f"half of the wake-ups within {lateness.median_ms:.2f} ms, 99 % within {lateness.p99_ms:.2f} ms, "
         f"the latest {lateness.longest_ms:.1f} ms"
     )
     if not lateness.too_late:
-        return DeviceFinding("Lateness", value, fine=True)
-    limit = f"99 % must come within {MAX_P99_TICKS * lateness.tick_ms:g} ms"
+        return DeviceFinding("Lateness", value_text, fine=True)
+    limit_text = f"99 % must come within {MAX_P99_TICKS * lateness.tick_ms:g} ms"
     if simulated:
-        value += f"; too late for a real device ({limit}); a simulated one waits"
+        value_text += f"; too late for a real device ({limit_text}); a simulated one waits"
     else:
-        value += f"; too late for this device ({limit})"
-    return DeviceFinding("Lateness", value, fine=False, advice=ADVICE, warning=simulated)
+        value_text += f"; too late for this device ({limit_text})"
+    return DeviceFinding("Lateness", value_text, fine=False, advice=ADVICE, warning=simulated)
 
 
 def judge_missed_ticks(
     missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None
 ) -> DeviceFinding:
-    """Judge missed ticks by the limit of late ticks; they have no separate limit. load_per_processor: None if unknown,
-    which counts as idle."""
-    share, limit = missed_ticks / max(ticks, 1), _choose_late_limit(load_per_processor)
-    fine = share <= limit
-    value = f"{missed_ticks} of {ticks} ({share:.2%})"
+    """Judge the number of missed ticks among `ticks`, by the allowed fraction of late ticks, which include them.
+    load_per_processor: None if unknown, which counts as idle."""
+    late_fraction, allowed_fraction = missed_ticks / max(ticks, 1), _choose_late_limit(load_per_processor)
+    is_within_limit = late_fraction <= allowed_fraction
+    value_text = f"{missed_ticks} of {ticks} ({late_fraction:.2%})"
     if simulated:
-        value += "; a simulated device's loop catches up, so it misses none"
-    elif not fine:
-        value += f"; at most {limit:.1%} are fine"
-    return DeviceFinding("Missed ticks", value, fine, "" if fine else ADVICE)
+        value_text += "; a simulated device's loop catches up, so it misses none"
+    elif not is_within_limit:
+        value_text += f"; at most {allowed_fraction:.1%} are fine"
+    return DeviceFinding("Missed ticks", value_text, is_within_limit, "" if is_within_limit else ADVICE)
 
 
 def _is_busy(load_per_processor: float | None) -> bool:
@@ -113,31 +113,31 @@ def _choose_late_limit(load_per_processor: float | None) -> float:
 
 
 def judge_late_ticks(late_ticks: int, latest_ms: float, ticks: int, load_per_processor: float | None) -> DeviceFinding:
-    """Judge late ticks of a real device. late_ticks: ticks whose work ended after the next tick was due, missed ones
-    included; latest_ms: longest time from when a tick was due to the end of its work; load_per_processor: None if
-    unknown, which counts as idle."""
-    share = late_ticks / max(ticks, 1)
-    busy, limit = _is_busy(load_per_processor), _choose_late_limit(load_per_processor)
-    fine = share <= limit
-    value = f"{late_ticks} of {ticks} ({share:.2%}) ended after the next was due, missed ones among them"
-    value += f"; the latest {latest_ms:.1f} ms after its time"
-    if share > MAX_LATE_SHARE:
+    """Judge the late ticks of a real device. late_ticks: of `ticks`, those whose work ended after the next tick was
+    due, missed ones included; latest_ms: longest time from when a tick was due to the end of its work;
+    load_per_processor: None if unknown, which counts as idle."""
+    late_fraction = late_ticks / max(ticks, 1)
+    is_busy, allowed_fraction = _is_busy(load_per_processor), _choose_late_limit(load_per_processor)
+    is_within_limit = late_fraction <= allowed_fraction
+    value_text = f"{late_ticks} of {ticks} ({late_fraction:.2%}) ended after the next was due, missed ones among them"
+    value_text += f"; the latest {latest_ms:.1f} ms after its time"
+    if late_fraction > MAX_LATE_SHARE:
         normal_limit = f"{MAX_LATE_SHARE:.1%}"
-        value += (
-            f"; at most {limit:.1%} are fine with all cores busy ({normal_limit} else)"
-            if busy
+        value_text += (
+            f"; at most {allowed_fraction:.1%} are fine with all cores busy ({normal_limit} else)"
+            if is_busy
             else f"; at most {normal_limit} are fine"
         )
-    return DeviceFinding("Late ticks", value, fine, "" if fine else ADVICE)
+    return DeviceFinding("Late ticks", value_text, is_within_limit, "" if is_within_limit else ADVICE)
 
 
 def judge_load(per_processor: float | None) -> DeviceFinding:
-    """Judge the load average per processor; None if unknown. A high load is only a warning, because the measured
-    lateness is decisive."""
+    """Judge the load average per processor, a fraction; None if unknown, which is fine. Above `LOAD_PER_PROCESSOR` is
+    only a warning, because the measured lateness is decisive."""
     if per_processor is None:
         return DeviceFinding("Load", "this system does not report it, so it was not checked", fine=True)
-    value = f"{per_processor:.0%} of what its processors can do, over the last minute"
+    value_text = f"{per_processor:.0%} of what its processors can do, over the last minute"
     if math.isfinite(per_processor) and per_processor <= LOAD_PER_PROCESSOR:
-        return DeviceFinding("Load", value, fine=True)
-    value += f"; above {LOAD_PER_PROCESSOR:.0%} trials may be cut short"
-    return DeviceFinding("Load", value, fine=False, advice="Close other programs.", warning=True)
+        return DeviceFinding("Load", value_text, fine=True)
+    value_text += f"; above {LOAD_PER_PROCESSOR:.0%} trials may be cut short"
+    return DeviceFinding("Load", value_text, fine=False, advice="Close other programs.", warning=True)

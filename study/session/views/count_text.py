@@ -1,4 +1,7 @@
-"""Number of answers in words with the right form of the verb, for messages at the end of a sitting."""
+"""Number of answers with the form of the verb that agrees with it, for messages at the end of a sitting.
+
+Called by `run_session`, `resume_session` and `end_sitting` of `study.workflows.session`.
+"""
 
 
 def format_answer_count(answers: int) -> str:

@@ -30,8 +30,8 @@ class FormKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """Least and largest valid value of a number, both included, in the unit that the question states."""
+class NumberLimits:
+    """Least and largest valid value of a numerical answer, both included, in the unit that the question states."""
 
     lowest: float
     highest: float
@@ -44,14 +44,14 @@ class FormField:
     key: str
     """Name of the answer in the log."""
     label: str
-    """The question, a whole sentence."""
+    """Text of the question, a whole sentence."""
     choices: tuple[str, ...] = ()
     """Valid answers, of which exactly one is given; empty for a number or free text."""
     needed: bool = True
     """Whether an answer is required; otherwise it may be empty."""
     codes: tuple[str, ...] = ()
     """Logged code of each choice, in the order of `choices`; empty: the choices are logged."""
-    limits: Limits | None = None
+    limits: NumberLimits | None = None
     """Limits of a number; None for a choice or free text."""
 
 
@@ -77,11 +77,12 @@ class FormReply:
 
 
 def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:
-    """Find the fields of the form without a valid answer in the reply, in their order."""
-    return tuple(field for field in form.fields if not has_answer(field, reply.answers.get(field.key, "").strip()))
+    """Find the fields of the form without a valid answer in the reply, in their order. Spaces around an answer are
+    ignored."""
+    return tuple(field for field in form.fields if not is_valid_answer(field, reply.answers.get(field.key, "").strip()))
 
 
-def has_answer(field: FormField, answer: str) -> bool:
+def is_valid_answer(field: FormField, answer: str) -> bool:
     """Whether an answer in the language shown is valid: one of the choices, a number within the limits, or any text. An
     empty answer is valid only where none is required."""
     if not answer:

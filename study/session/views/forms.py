@@ -11,7 +11,7 @@ from protocols.definition.preparation import ConsentSettings, SetupSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, encode_answers
+from study.session.views.form_views import Form, FormField, FormKind, FormReply, NumberLimits, encode_answers
 
 YES_NO = ("yes", "no")
 """Codes of the two answers as they are logged; the text that is shown depends on the language."""
@@ -214,6 +214,6 @@ def _make_question_field(question: Question, words: Words) -> FormField:
         meaning = {"low_end": question.ends[0], "high_end": question.ends[1]}
         steps = {"lowest": question.scale[0], "highest": question.scale[1]}
         label = f"{label} ({words.fill('form_scale', {**steps, **meaning})})"
-    limits = Limits(*question.number) if question.number else None
+    limits = NumberLimits(*question.number) if question.number else None
     choices = question.choices or question.steps
     return FormField(question.key, label, choices, needed=False, codes=question.codes, limits=limits)

@@ -17,7 +17,8 @@ TimePrecision = Literal["minutes", "seconds"]
 
 
 def to_utc(time: datetime) -> datetime:
-    """Convert a time to UTC, the time zone of logs and JSON."""
+    """Convert a time to UTC, the time zone of logs and JSON; a time without offset is taken as the computer's local
+    time."""
     return time.astimezone(UTC)
 
 
@@ -31,8 +32,8 @@ def format_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "minute
 
 
 def split_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "seconds") -> tuple[str, str, str]:
-    """Convert a UTC time (ISO 8601) to (date, time, offset) in local time; (the text, "", "") where it cannot be
-    converted."""
+    """Convert a time (ISO 8601, UTC where it states no offset) to (date, time, offset) in local time; (the text, "",
+    "") where it cannot be converted."""
     try:
         time = datetime.fromisoformat(utc)
         local = zone(time if time.tzinfo is not None else time.replace(tzinfo=UTC))
@@ -42,10 +43,10 @@ def split_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "seconds
     return local.date().isoformat(), local.time().isoformat(precision), f"{offset[:3]}:{offset[3:5]}"
 
 
-def format_times_in_zone(utcs: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
+def format_times_in_zone(utc_times: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
     """Format UTC times as a column of a table. Returns the most frequent offset, for the header ("" without times), and
     each time, with its own offset where that differs, such as in daylight saving time."""
-    local_times = [split_time_in_zone(utc, zone, "minutes") for utc in utcs]
+    local_times = [split_time_in_zone(utc, zone, "minutes") for utc in utc_times]
     offsets = Counter(offset for _, _, offset in local_times if offset)
     common_offset = offsets.most_common(1)[0][0] if offsets else ""
     return common_offset, tuple(

@@ -9,15 +9,15 @@ import re
 CODE_RULE = "a code has 1 to 16 letters and digits, at least one digit, such as P01"
 """Rule of a valid code in words, for messages."""
 
-_CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
+_CODE_PATTERN = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
 """Matches a valid code."""
-_NUMBERED_CODE = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
+_NUMBERED_CODE_PATTERN = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
 """Matches a code of letters and then 1 to 9 digits, from which the next code can be derived."""
 
 
 def is_code(text: str) -> bool:
     """Whether the text is a valid participant code."""
-    return _CODE.fullmatch(text) is not None
+    return _CODE_PATTERN.fullmatch(text) is not None
 
 
 def explain_invalid_code(text: str) -> str:
@@ -30,18 +30,19 @@ def explain_invalid_code(text: str) -> str:
 
 
 def suggest_code(used_codes: tuple[str, ...]) -> str:
-    """Suggest an unused code: the letters of the latest numbered code with their highest number plus 1, with at least
-    as many digits. P01 without a numbered code, or if the result were too long. used_codes: the latest first."""
+    """Suggest the next code: the letters of the latest numbered code with the highest number that follows them plus 1,
+    with at least as many digits. P01 without a numbered code, or if the result were too long. used_codes: the latest
+    first."""
     for code in used_codes:
-        match = _NUMBERED_CODE.fullmatch(code)
+        match = _NUMBERED_CODE_PATTERN.fullmatch(code)
         if match is None:
             continue
         letters, digit_count = match["letters"], len(match["digits"])
         numbers = [
             int(code_match["digits"])
-            for code_match in map(_NUMBERED_CODE.fullmatch, used_codes)
+            for code_match in map(_NUMBERED_CODE_PATTERN.fullmatch, used_codes)
             if code_match and code_match["letters"] == letters
         ]
-        proposed = f"{letters}{max(numbers) + 1:0{digit_count}d}"
-        return proposed if is_code(proposed) else "P01"
+        next_code = f"{letters}{max(numbers) + 1:0{digit_count}d}"
+        return next_code if is_code(next_code) else "P01"
     return "P01"

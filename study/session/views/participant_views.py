@@ -287,5 +287,7 @@ Reply = Answered | Unanswered
 def make_direction_picture(directions: TestDirections, labels_swapped: bool) -> DirectionPicture:
     """Make the picture of the two directions, at +45 and -45 degrees from the line of symmetry. labels_swapped: whether
     numbers 1 and 2 are exchanged for this participant."""
-    first, second = directions.symmetry_deg + 45.0, directions.symmetry_deg - 45.0
-    return DirectionPicture(directions.plane, (second, first) if labels_swapped else (first, second))
+    first_angle_deg, second_angle_deg = directions.symmetry_deg + 45.0, directions.symmetry_deg - 45.0
+    return DirectionPicture(
+        directions.plane, (second_angle_deg, first_angle_deg) if labels_swapped else (first_angle_deg, second_angle_deg)
+    )

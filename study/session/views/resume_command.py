@@ -1,4 +1,7 @@
-"""Command line that resumes an unfinished session, for the messages at the end of a sitting and the start screen."""
+"""Command line that resumes an unfinished session, for messages after a sitting or a failure of its process.
+
+Called by `run_session` and `end_sitting` of `study.workflows.session`, and by `study.tui.engine.client`.
+"""
 
 SIMULATED_DEVICE = "simulated"
 """Name of the simulated device, which `hapteq resume` opens without the option --device. Equal to
@@ -6,7 +9,7 @@ SIMULATED_DEVICE = "simulated"
 
 
 def format_resume_command(session_path: str, device_name: str) -> str:
-    """Format the command `hapteq resume`. session_path: of the session's folder; device_name: as `open_device` takes
-    it."""
+    """Format the command `hapteq resume`. session_path: of the session's folder, which is not quoted for a shell;
+    device_name: as `open_device` takes it."""
     option = "" if device_name == SIMULATED_DEVICE else f" --device {device_name}"
     return f"hapteq resume {session_path}{option}"

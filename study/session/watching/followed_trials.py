@@ -1,4 +1,4 @@
-"""Trials and runs of a followed session as the experimenter's view shows them; `make_watch_view` combines them.
+"""Trials and runs of a followed session as the experimenter's view shows them; called by `make_watch_view`.
 
 The direction of a trial is withheld until its answer counts, because an experimenter who knows the direction could
 reveal it to the participant.
@@ -13,48 +13,50 @@ from study.session.watching.followed_session import FollowedSession
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeResult, StaircasePoint, WatchedRun
 
 LAST_TRIALS = 40
-"""Number of latest trials that the experimenter's view lists."""
+"""Largest number of latest trials that the experimenter's view lists. Chosen."""
 
 
 def find_shown_run(state: SessionState) -> int | None:
     """Index of the run to plot: the current run while a trial is open or before the first answer of the session,
     otherwise the run of the latest counted answer. None for a finished session without answers."""
-    answered = [trial.run for trial in state.trials if trial.is_valid]
-    if not state.finished and (not answered or state.presented is not None):
+    counted_runs = [trial.run for trial in state.trials if trial.is_valid]
+    if not state.finished and (not counted_runs or state.presented is not None):
         return state.run
-    return answered[-1] if answered else None
+    return counted_runs[-1] if counted_runs else None
 
 
-def _select_counted(state: SessionState, run: int) -> list[Trial]:
-    """Trials of a run that count."""
+def _select_counted_trials(state: SessionState, run: int) -> list[Trial]:
+    """Trials of a run that count: answered and not void."""
     return [trial for trial in state.trials if trial.run == run and trial.is_valid]
 
 
 def collect_points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
-    """Counted trials of a run without catch trials, as points of its staircase. The open trial is left out even after
-    its answer, because it may still become void."""
+    """Counted trials of a run without catch trials, as points of its staircase; empty for None. The open trial is left
+    out even after its answer, because it may still become void."""
     if run is None:
         return ()
-    closed_trials = [t for t in _select_counted(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)]
+    closed_trials = [
+        t for t in _select_counted_trials(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)
+    ]
     return tuple(StaircasePoint(t.trial, t.staircase_n, bool(t.correct), t.reversal) for t in closed_trials)
 
 
 def _is_open(state: SessionState, trial: Trial) -> bool:
-    """Whether this is the presented trial, which is not completed."""
+    """Whether this is the open trial: presented, and neither measured nor void yet."""
     return state.presented is not None and trial is state.trials[-1]
 
 
-def next_level_n(state: SessionState, shown_run: int | None) -> float | None:
-    """Level of the next trial of the shown run (N); None if the run is over or is not the current one."""
+def find_next_level_n(state: SessionState, shown_run: int | None) -> float | None:
+    """Level of the next trial of the shown run (N); None if that is not the current run, or the session is finished."""
     if state.finished or shown_run != state.run:
         return None
     run = state.runs[state.run]
     return find_due_presentation(state).level_n if run.practice else level_n(make_current_rule(state), state.staircase)
 
 
-def make_run_line(state: SessionState, run: Run) -> WatchedRun:
+def make_watched_run(state: SessionState, run: Run) -> WatchedRun:
     """A run of the schedule with its status; trials and reversals are counted over its trials that count."""
-    counted_trials, rule = _select_counted(state, run.index), state.protocol.staircase
+    counted_trials, rule = _select_counted_trials(state, run.index), state.protocol.staircase
     return WatchedRun(
         run=run.index,
         phase="practice" if run.practice else run.phase.value,
@@ -67,7 +69,8 @@ def make_run_line(state: SessionState, run: Run) -> WatchedRun:
 
 
 def make_open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
-    """The presented trial without an answer; None if there is none. presented_s: seconds since its presentation."""
+    """The presented trial without an answer; None if there is none, or the session is closed. presented_s: seconds
+    since its presentation."""
     presented = state.presented
     if presented is None or state.answered is not None or state.closed:
         return None
@@ -82,11 +85,11 @@ def make_open_trial(state: SessionState, presented_s: float) -> OpenTrial | None
     )
 
 
-def list_last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
+def list_last_trials(session: FollowedSession) -> tuple[ClosedTrial, ...]:
     """Latest answered or void trials, at most `LAST_TRIALS`, newest first."""
-    rows = list(zip(watched.state.trials, watched.remarks, strict=True))[-LAST_TRIALS - 1 :]
+    rows = list(zip(session.state.trials, session.remarks, strict=True))[-LAST_TRIALS - 1 :]
     closed_trials = [
-        _make_closed_trial(watched.state, trial, remark)
+        _make_closed_trial(session.state, trial, remark)
         for trial, remark in rows
         if trial.status is not TrialStatus.OPEN
     ]
@@ -94,6 +97,7 @@ def list_last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
 
 
 def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
+    """Row of the table for a trial that is answered or void. remark: reason of a void trial, or another remark."""
     # The direction and correctness of a void trial stay hidden, because the same stimulus is presented again. They stay
     # hidden, too, until the health of the device is judged, because the trial may still become void.
     is_revealed = trial.is_valid and not _is_open(state, trial)
@@ -118,18 +122,20 @@ def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> Closed
 
 
 def collect_practice_results(state: SessionState) -> tuple[PracticeResult, ...]:
-    """Results of the practice runs before the current run."""
-    settings, lines = state.protocol.practice, []
+    """Results of the practice runs before the current run, over their latest `practice.of_last` answers."""
+    settings, results = state.protocol.practice, []
     for run in state.runs[: state.run]:
         if run.practice:
-            done = PracticeState(tuple(bool(trial.correct) for trial in _select_counted(state, run.index)))
-            answer_count = min(settings.of_last, len(done.correct))
-            lines.append(
+            practice_state = PracticeState(
+                tuple(bool(trial.correct) for trial in _select_counted_trials(state, run.index))
+            )
+            answer_count = min(settings.of_last, len(practice_state.correct))
+            results.append(
                 PracticeResult(
                     run.frequency_hz,
-                    count_right_of_last(settings, done),
+                    count_right_of_last(settings, practice_state),
                     answer_count,
-                    is_practice_passed(settings, done),
+                    is_practice_passed(settings, practice_state),
                 )
             )
-    return tuple(lines)
+    return tuple(results)

@@ -16,8 +16,8 @@ Activity = Literal[
 
 
 @dataclass(frozen=True, slots=True)
-class Live:
-    """Present state of a session. It contains no direction, because it can be read while a trial runs."""
+class LiveState:
+    """Present state of a session. It contains no direction of a stimulus, because it can be read during a trial."""
 
     utc: str
     """Time of this state (UTC, ISO 8601)."""

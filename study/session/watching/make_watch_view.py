@@ -1,4 +1,7 @@
-"""The experimenter's view of a followed session. Pure: the same session and time give the same view."""
+"""The experimenter's view of a followed session, computed from its log, its live state and the time.
+
+Called by `study.workflows.views.watch_session`. Without side effects: the same arguments give the same view.
+"""
 
 from dataclasses import dataclass
 
@@ -11,38 +14,41 @@ from study.session.watching.followed_session import FollowedSession
 from study.session.watching.followed_trials import (
     collect_points,
     collect_practice_results,
+    find_next_level_n,
     find_shown_run,
     list_last_trials,
     make_open_trial,
-    make_run_line,
-    next_level_n,
+    make_watched_run,
 )
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.watch_alarms import Situation, find_alarms
 from study.session.watching.watch_view import RUNNING_STATUSES, DriftRecord, Exposure, SittingStatus, WatchView
 
 
 @dataclass(frozen=True, slots=True)
 class LiveInfo:
-    """What is known about a session besides its log."""
+    """Information on a session from sources other than its log."""
 
-    live: Live | None = None
-    writer: bool | None = None
+    live: LiveState | None = None
+    """Live state; None without a readable one."""
+    has_writer: bool | None = None
     """Whether a program holds the session's lock; None if not checked."""
     problem: str = ""
     """Why the log cannot be followed any further; empty where it can."""
     drifts: tuple[DriftRecord, ...] = ()
+    """Changes of device or grip, measured by the probes."""
 
 
 def make_watch_view(
-    watched: FollowedSession, live_info: LiveInfo, now_utc: str, previous_view: WatchView | None = None
+    session: FollowedSession, live_info: LiveInfo, now_utc: str, previous_view: WatchView | None = None
 ) -> WatchView:
-    """The view at `now_utc`. previous_view: the last one, so that a lasting alarm keeps its start time."""
-    state, run = watched.state, find_shown_run(watched.state)
-    situation = _make_situation(watched, live_info, now_utc)
+    """Make the view at `now_utc` (ISO 8601). previous_view: the previous one, so that a lasting alarm keeps its start
+    time."""
+    state, shown_run = session.state, find_shown_run(session.state)
+    situation = _make_situation(session, live_info, now_utc)
     live, status = situation.live, situation.standing
-    activity, since_utc = _describe_activity(watched, live, status)
-    catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.is_valid]
+    activity, since_utc = _describe_activity(session, live, status)
+    catch_trials = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.is_valid]
     return WatchView(
         utc=now_utc,
         session=state.opened.session,
@@ -52,64 +58,67 @@ def make_watch_view(
         simulated=state.opened.device.simulated,
         observer=state.opened.observer,
         standing=status,
-        reason=_describe_reason(watched, status),
+        reason=_describe_reason(session, status),
         activity=activity,
-        activity_s=situation.open_s or _seconds_between(since_utc, now_utc),
-        runs=tuple(make_run_line(state, run) for run in state.runs),
-        shown_run=run,
-        points=collect_points(state, run),
-        next_level_n=next_level_n(state, run),
+        activity_s=situation.open_s or _compute_seconds_between(since_utc, now_utc),
+        runs=tuple(make_watched_run(state, run) for run in state.runs),
+        shown_run=shown_run,
+        points=collect_points(state, shown_run),
+        next_level_n=find_next_level_n(state, shown_run),
         cap_n=state.protocol.staircase.cap_n,
         open_trial=make_open_trial(state, situation.open_s),
-        last=list_last_trials(watched),
+        last=list_last_trials(session),
         answers=state.answers,
         exposure=situation.exposure,
-        catch_given=len(catches),
-        catch_lapses=sum(not trial.correct for trial in catches),
+        catch_given=len(catch_trials),
+        catch_lapses=sum(not trial.correct for trial in catch_trials),
         practice=collect_practice_results(state),
-        forms=watched.forms,
-        notes=watched.notes[::-1],
+        forms=session.forms,
+        notes=session.notes[::-1],
         gate_radius_mm=state.protocol.gate.radius_mm,
         live=live if status in RUNNING_STATUSES and situation.is_live_fresh else None,
         alarms=find_alarms(situation, previous_view.alarms if previous_view is not None else ()),
-        probes=len(watched.probes),
+        probes=len(session.probes),
         drifts=live_info.drifts,
     )
 
 
-def _make_situation(watched: FollowedSession, live_info: LiveInfo, now_utc: str) -> Situation:
-    live = _select_live(watched, live_info.live)
-    status = _find_status(watched, live, live_info.writer)
-    exposure = _compute_exposure(watched, live, status, now_utc)
-    return Situation(watched, live, live_info.problem, status, exposure, now_utc, live_info.drifts)
+def _make_situation(session: FollowedSession, live_info: LiveInfo, now_utc: str) -> Situation:
+    """Collect what the alarms are decided from."""
+    live = _select_live(session, live_info.live)
+    status = _find_status(session, live, live_info.has_writer)
+    exposure = _compute_exposure(session, live, status, now_utc)
+    return Situation(session, live, live_info.problem, status, exposure, now_utc, live_info.drifts)
 
 
-def _select_live(watched: FollowedSession, live: Live | None) -> Live | None:
-    """The live state, unless it is left over from an earlier sitting. Versions that log the monotonic clock remove
-    it before a sitting; for others the times decide."""
-    is_current = live is not None and (live.monotonic_s is not None or live.utc >= watched.sitting_utc)
+def _select_live(session: FollowedSession, live: LiveState | None) -> LiveState | None:
+    """The live state; None where it is of an earlier sitting. Versions that log the monotonic clock remove the live
+    state before a sitting; for older ones its time is compared with the beginning of the sitting."""
+    is_current = live is not None and (live.monotonic_s is not None or live.utc >= session.sitting_utc)
     return live if is_current else None
 
 
-def _find_status(watched: FollowedSession, live: Live | None, writer: bool | None) -> SittingStatus:
-    if watched.state.is_finally_ineligible:
-        return watched.state.sitting.ineligibility or "refused"
-    if watched.state.closed:
+def _find_status(session: FollowedSession, live: LiveState | None, has_writer: bool | None) -> SittingStatus:
+    """Status of the session, by its log, the lock (`LiveInfo.has_writer`) and the live state, in this order."""
+    if session.state.is_finally_ineligible:
+        return session.state.sitting.ineligibility or "refused"
+    if session.state.closed:
         return "finished"
-    if watched.end_reason:
+    if session.end_reason:
         return "stopped"
-    if writer is False:
+    if has_writer is False:
         return "not running"
     if live is not None and live.activity == "pause":
         return "paused"
-    resting = live.activity == "rest" if live is not None else watched.state.rest_due_s > 0
-    return "resting" if resting else "running"
+    is_resting = live.activity == "rest" if live is not None else session.state.rest_due_s > 0
+    return "resting" if is_resting else "running"
 
 
-def _describe_reason(watched: FollowedSession, status: SittingStatus) -> str:
+def _describe_reason(session: FollowedSession, status: SittingStatus) -> str:
+    """Reason of the status in words; empty for a running session."""
     match status:
         case "stopped":
-            return watched.end_reason
+            return session.end_reason
         case "not running":
             return "its program is gone; every answer is on disk"
         case "finished":
@@ -120,7 +129,7 @@ def _describe_reason(watched: FollowedSession, status: SittingStatus) -> str:
             return ""
 
 
-_WORDS = {
+_ACTIVITY_WORDS = {
     "preparing": "getting ready",
     "form": "filling in a form",
     "instructions": "reading the instructions",
@@ -136,21 +145,25 @@ _WORDS = {
 """Each `Activity` in words."""
 
 
-def _describe_activity(watched: FollowedSession, live: Live | None, status: SittingStatus) -> tuple[str, str]:
-    """Activity in words, and since when. The log takes precedence over `live`."""
-    state = watched.state
+def _describe_activity(session: FollowedSession, live: LiveState | None, status: SittingStatus) -> tuple[str, str]:
+    """Activity in words, and the UTC time at which it began. The log takes precedence over `live`."""
+    state = session.state
     if status not in RUNNING_STATUSES:
-        return status, watched.last_utc
+        return status, session.last_utc
     if state.presented is not None:
-        waiting = state.answered is None
-        return ("waiting for the answer" if waiting else "measuring"), (state.answered or state.presented).utc
+        is_unanswered = state.answered is None
+        return ("waiting for the answer" if is_unanswered else "measuring"), (state.answered or state.presented).utc
     if live is None:
-        return ("resting" if status == "resting" else "between two trials"), watched.last_utc
-    return _WORDS[live.activity], live.since_utc
+        return ("resting" if status == "resting" else "between two trials"), session.last_utc
+    return _ACTIVITY_WORDS[live.activity], live.since_utc
 
 
-def _compute_exposure(watched: FollowedSession, live: Live | None, status: SittingStatus, now_utc: str) -> Exposure:
-    state, limits = watched.state, watched.state.protocol.limits
+def _compute_exposure(
+    session: FollowedSession, live: LiveState | None, status: SittingStatus, now_utc: str
+) -> Exposure:
+    """Duration of the sitting and daily vibration dose with their limits: at `now_utc` while the session runs,
+    otherwise at the last entry of the log."""
+    state, limits = session.state, session.state.protocol.limits
     sitting = _advance_to_now(state.sitting, live, now_utc) if status in RUNNING_STATUSES else state.sitting
     return Exposure(
         elapsed_min=(sitting.sitting_elapsed_s or 0.0) / 60.0,
@@ -160,15 +173,17 @@ def _compute_exposure(watched: FollowedSession, live: Live | None, status: Sitti
     )
 
 
-def _advance_to_now(sitting: SittingState, live: Live | None, now_utc: str) -> SittingState:
-    """The sitting advanced to now, by the session's monotonic clock if its live state has it, otherwise by this
-    computer's clock."""
-    stamped = live is not None and live.monotonic_s is not None and sitting.last_moment.monotonic_s is not None
-    if live is not None and stamped:
+def _advance_to_now(sitting: SittingState, live: LiveState | None, now_utc: str) -> SittingState:
+    """Advance the sitting to the live state, where that and the log state the session's monotonic clock; otherwise to
+    `now_utc`, the wall clock of this computer."""
+    has_monotonic_time = (
+        live is not None and live.monotonic_s is not None and sitting.last_moment.monotonic_s is not None
+    )
+    if live is not None and has_monotonic_time:
         return pass_time(sitting, Moment(live.utc, live.monotonic_s))
     return pass_time(sitting, Moment(now_utc))
 
 
-def _seconds_between(since_utc: str, now_utc: str) -> float:
-    """Seconds between two times, never negative: the clocks of two computers differ."""
+def _compute_seconds_between(since_utc: str, now_utc: str) -> float:
+    """Seconds between two times; 0 instead of a negative value, which differing clocks of two computers can give."""
     return max(0.0, compute_wall_clock_s(since_utc, now_utc))

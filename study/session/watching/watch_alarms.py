@@ -11,35 +11,36 @@ from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, compute_elapsed_s, compute_wall_clock_s
 from study.session.facts.void_reasons import TOO_LITTLE_MOTION, is_computer_busy
 from study.session.watching.followed_session import FollowedSession
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, DriftRecord, Exposure, SittingStatus
 
 LIVE_TIMEOUT_S = 3.0
-"""Age of the live state (s) from which it is out of date. `live.json` is written about four times a second; a slow disk
-may delay it by a second or two."""
+"""Age of the live state (s) above which it is out of date. Chosen: `live.json` is written about four times a second,
+and a slow disk may delay it by a second or two."""
 _LIVE_ACTIVITIES = ("demo", "waiting for the handle", "rest", "probe", "reference")
 """Activities during which the session writes `live.json` continuously; it does not while a form or a notice is read."""
 HANDLE_AWAY_LIMIT_S = 2.0
-"""Time for which the handle may be away from its place before that is an alarm (s)."""
+"""Time (s) above which it is an alarm that the handle is outside the gate before a trial. Chosen."""
 ANSWER_ALARM_S = 60.0
-"""Time without an answer (s) after which the participant may need help; answers usually take seconds."""
+"""Time without an answer (s) above which there is an alarm, because the participant may need help. Chosen: answers
+usually take seconds."""
 END_REPORTED_S = 60.0
-"""Time for which the end of a sitting is reported (s)."""
+"""Time for which the end of a sitting is reported to a viewer who was not there before (s). Chosen."""
 CATCH_TRIAL_WINDOW, LAPSE_LIMIT = 5, 2
 """Alarm at `LAPSE_LIMIT` wrong answers among the last `CATCH_TRIAL_WINDOW` catch trials, which an attentive participant
-answers correctly, because they are at full level."""
+answers correctly, because they are at full level. Chosen."""
 TRIAL_WINDOW, VOID_LIMIT = 10, 3
-"""Alarm at `VOID_LIMIT` void trials among the last `TRIAL_WINDOW` presentations."""
+"""Alarm at `VOID_LIMIT` void trials among the last `TRIAL_WINDOW` presentations. Chosen."""
 WARNING_FRACTION = 0.8
-"""Fraction of a limit (time, dose) at which the experimenter is warned."""
+"""Fraction of a limit (time, dose) from which the experimenter is warned. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
     """State of a followed session at one time, from which all alarms are decided."""
 
-    watched: FollowedSession
-    live: Live | None
+    session: FollowedSession
+    live: LiveState | None
     problem: str
     """Why the log cannot be followed; empty where it can."""
     standing: SittingStatus
@@ -47,12 +48,12 @@ class Situation:
     now_utc: str
     """Present time, ISO 8601."""
     drifts: tuple[DriftRecord, ...] = ()
-    """Changes of device or grip that the probes showed."""
+    """Changes of device or grip, measured by the probes."""
 
     @property
     def trials(self) -> tuple[Trial, ...]:
         """All presentations of the session so far; the last may be open."""
-        return self.watched.state.trials
+        return self.session.state.trials
 
     @property
     def is_live_fresh(self) -> bool:
@@ -63,16 +64,16 @@ class Situation:
     def open_s(self) -> float:
         """How long the open trial has waited for its answer (s), by the session's monotonic clock if the live state has
         it; 0 without an open trial."""
-        state = self.watched.state
+        state = self.session.state
         if state.presented is None or state.answered is not None:
             return 0.0
-        presented_at = Moment(state.presented.utc, state.presented.monotonic_s)
-        is_stamped = (
-            self.live is not None and self.live.monotonic_s is not None and presented_at.monotonic_s is not None
+        presentation_moment = Moment(state.presented.utc, state.presented.monotonic_s)
+        has_monotonic_time = (
+            self.live is not None and self.live.monotonic_s is not None and presentation_moment.monotonic_s is not None
         )
-        if self.live is not None and is_stamped:
-            return compute_elapsed_s(presented_at, Moment(self.live.utc, self.live.monotonic_s))
-        return compute_elapsed_s(presented_at, Moment(self.now_utc))
+        if self.live is not None and has_monotonic_time:
+            return compute_elapsed_s(presentation_moment, Moment(self.live.utc, self.live.monotonic_s))
+        return compute_elapsed_s(presentation_moment, Moment(self.now_utc))
 
     def compute_seconds_since(self, utc: str) -> float:
         """Seconds from this UTC time (ISO 8601) to now; negative for a later one."""
@@ -110,23 +111,23 @@ def _check_live_state(situation: Situation) -> Alarm | None:
     if live is None or situation.is_live_fresh:
         return None
     is_updated = live.activity in _LIVE_ACTIVITIES or (
-        live.activity == "trial" and situation.watched.state.presented is not None
+        live.activity == "trial" and situation.session.state.presented is not None
     )
     return Alarm("silent", text, live.utc) if is_updated else None
 
 
 def _check_program_ended(situation: Situation) -> Alarm | None:
-    """Alarm where the program ended without logging the end of the sitting."""
+    """Alarm where the program ended without logging the end of the sitting (status "not running")."""
     if situation.standing != "not running":
         return None
-    last_utc = max(situation.watched.last_utc, situation.live.utc if situation.live is not None else "")
+    last_utc = max(situation.session.last_utc, situation.live.utc if situation.live is not None else "")
     return Alarm("gone", "The program that ran the session is gone. hapteq resume continues the session.", last_utc)
 
 
 def _check_sitting_ended(situation: Situation) -> Alarm | None:
     """Alarm where the end of the sitting was logged, with its reason."""
-    watched = situation.watched
-    return Alarm("ended", f"The sitting ended: {watched.end_reason}.", watched.last_utc) if watched.end_reason else None
+    session = situation.session
+    return Alarm("ended", f"The sitting ended: {session.end_reason}.", session.last_utc) if session.end_reason else None
 
 
 def _check_log(situation: Situation) -> Alarm | None:
@@ -153,7 +154,7 @@ def _check_sensor(situation: Situation) -> Alarm | None:
 def _check_handle(situation: Situation) -> Alarm | None:
     """Alarm where the handle is outside the gate: for longer than `HANDLE_AWAY_LIMIT_S` before a trial, or at any time
     during a trial."""
-    live, radius_mm = situation.live, situation.watched.state.protocol.gate.radius_mm
+    live, radius_mm = situation.live, situation.session.state.protocol.gate.radius_mm
     if live is None or not situation.is_live_fresh:
         return None
     is_waiting = live.activity == "waiting for the handle"
@@ -166,49 +167,60 @@ def _check_handle(situation: Situation) -> Alarm | None:
 
 def _check_adverse_events(situation: Situation) -> Alarm | None:
     """Alarm with the latest adverse event of this sitting."""
-    events = [note for note in situation.watched.notes[situation.watched.notes_before :] if note.adverse]
-    return Alarm("adverse", f"Adverse event: {events[-1].text}", events[-1].utc, event=True) if events else None
+    adverse_notes = [note for note in situation.session.notes[situation.session.notes_before :] if note.adverse]
+    return (
+        Alarm("adverse", f"Adverse event: {adverse_notes[-1].text}", adverse_notes[-1].utc, event=True)
+        if adverse_notes
+        else None
+    )
 
 
 def _check_time_limit(situation: Situation) -> Alarm | None:
     """Alarm where the time limit of the sitting is reached, or near (`WARNING_FRACTION`)."""
-    share, period = situation.exposure.time_share, f"the {situation.exposure.limit_min:g} minutes of a sitting"
-    if share >= 1:
+    limit_fraction, limit_text = (
+        situation.exposure.time_share,
+        f"the {situation.exposure.limit_min:g} minutes of a sitting",
+    )
+    if limit_fraction >= 1:
         return Alarm(
-            "time reached", f"{period[0].upper()}{period[1:]} are over: it ends after this trial.", situation.now_utc
+            "time reached",
+            f"{limit_text[0].upper()}{limit_text[1:]} are over: it ends after this trial.",
+            situation.now_utc,
         )
     return (
-        Alarm("time near", f"{share:.0%} of {period} are over.", situation.now_utc, urgent=False)
-        if share >= WARNING_FRACTION
+        Alarm("time near", f"{limit_fraction:.0%} of {limit_text} are over.", situation.now_utc, urgent=False)
+        if limit_fraction >= WARNING_FRACTION
         else None
     )
 
 
 def _check_dose(situation: Situation) -> Alarm | None:
     """Alarm where the vibration dose A(8) reached its limit, or is near it (`WARNING_FRACTION`)."""
-    share = situation.exposure.dose_share
-    if share >= 1:
+    limit_fraction = situation.exposure.dose_share
+    if limit_fraction >= 1:
         return Alarm(
             "dose reached", "The vibration dose is reached: the sitting ends after this trial.", situation.now_utc
         )
-    text = f"{share:.0%} of the vibration dose is reached."
-    return Alarm("dose near", text, situation.now_utc, urgent=False) if share >= WARNING_FRACTION else None
+    text = f"{limit_fraction:.0%} of the vibration dose is reached."
+    return Alarm("dose near", text, situation.now_utc, urgent=False) if limit_fraction >= WARNING_FRACTION else None
 
 
 def _check_catch_trials(situation: Situation) -> Alarm | None:
-    """Alarm where `LAPSE_LIMIT` of the latest `CATCH_TRIAL_WINDOW` catch trials were answered wrongly."""
+    """Alarm where at least `LAPSE_LIMIT` of the latest `CATCH_TRIAL_WINDOW` catch trials were answered wrongly."""
     trials = [trial for trial in situation.trials if trial.phase is Phase.CATCH and trial.is_valid][
         -CATCH_TRIAL_WINDOW:
     ]
-    lapses = sum(not trial.correct for trial in trials)
-    if lapses < LAPSE_LIMIT:
+    lapse_count = sum(not trial.correct for trial in trials)
+    if lapse_count < LAPSE_LIMIT:
         return None
-    text = f"{lapses} of the last {len(trials)} catch trials were wrong: is the participant tired, or the grip off?"
-    return Alarm("lapses", text, situation.watched.last_utc)
+    text = (
+        f"{lapse_count} of the last {len(trials)} catch trials were wrong: is the participant tired, or the grip off?"
+    )
+    return Alarm("lapses", text, situation.session.last_utc)
 
 
 def _check_void_trials(situation: Situation) -> Alarm | None:
-    """Alarm where `VOID_LIMIT` of the latest `TRIAL_WINDOW` presentations were void."""
+    """Alarm where at least `VOID_LIMIT` of the latest `TRIAL_WINDOW` presentations were void."""
     presentations = [trial for trial in situation.trials if trial.status is not TrialStatus.OPEN][-TRIAL_WINDOW:]
     void_count = sum(trial.status is TrialStatus.SPOILED for trial in presentations)
     if void_count < VOID_LIMIT:
@@ -217,29 +229,29 @@ def _check_void_trials(situation: Situation) -> Alarm | None:
         f"{void_count} of the last {len(presentations)} presentations were void, "
         f"the last because {_find_void_reason(situation)}."
     )
-    return Alarm("voids", text, situation.watched.last_utc)
+    return Alarm("voids", text, situation.session.last_utc)
 
 
 def _check_computer_load(situation: Situation) -> Alarm | None:
     """Alarm where some of the latest presentations were void because the computer was too busy."""
-    remarks = situation.watched.remarks[-TRIAL_WINDOW:]
+    remarks = situation.session.remarks[-TRIAL_WINDOW:]
     voids = sum(map(is_computer_busy, remarks))
     if not voids:
         return None
     void_text = f"{voids} of the last {len(remarks)} presentations {'was' if voids == 1 else 'were'} void because of it"
-    return Alarm("busy", f"The computer is too busy: {void_text}. Close other programs.", situation.watched.last_utc)
+    return Alarm("busy", f"The computer is too busy: {void_text}. Close other programs.", situation.session.last_utc)
 
 
 def _check_handle_motion(situation: Situation) -> Alarm | None:
     """Alarm where the handle moved less than with any hand in some of the latest presentations
     (`TOO_LITTLE_MOTION`)."""
-    remarks = situation.watched.remarks[-TRIAL_WINDOW:]
+    remarks = situation.session.remarks[-TRIAL_WINDOW:]
     still_count = sum(TOO_LITTLE_MOTION in remark for remark in remarks)
     if not still_count:
         return None
     text = f"In {still_count} of the last {len(remarks)} presentations {TOO_LITTLE_MOTION}"
     advice = "Pause, and look at motors, handle and accelerometer."
-    return Alarm("still", f"{text}. {advice}", situation.watched.last_utc)
+    return Alarm("still", f"{text}. {advice}", situation.session.last_utc)
 
 
 def _check_drift(situation: Situation) -> Alarm | None:
@@ -251,18 +263,18 @@ def _check_drift(situation: Situation) -> Alarm | None:
         f"Device or grip has changed by more than the analysis allows: {'; '.join(exceeded_limits)}. "
         "Pause, and look at both."
     )
-    return Alarm("drift", text, situation.watched.last_utc)
+    return Alarm("drift", text, situation.session.last_utc)
 
 
 def _find_void_reason(situation: Situation) -> str:
     """Reason of the latest void trial; at least one must exist."""
-    remarks = zip(situation.trials, situation.watched.remarks, strict=True)
+    remarks = zip(situation.trials, situation.session.remarks, strict=True)
     return [remark for trial, remark in remarks if trial.status is TrialStatus.SPOILED][-1]
 
 
 def _check_answer_time(situation: Situation) -> Alarm | None:
     """Alarm where the open trial has had no answer for longer than `ANSWER_ALARM_S`."""
-    state = situation.watched.state
+    state = situation.session.state
     if situation.standing != "running" or state.presented is None or state.answered is not None:
         return None
     if situation.open_s <= ANSWER_ALARM_S:

@@ -9,7 +9,7 @@ amplitudes, stated as force (N).
 from dataclasses import dataclass
 from typing import Literal
 
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 
 SittingStatus = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
 """Status of a session. `stopped`: the sitting was ended; `not running`: the program ended without logging the end. Both
@@ -231,7 +231,7 @@ class WatchView:
     """Notes of the log, newest first."""
     gate_radius_mm: float
     """Radius (mm) within which the handle must be for a trial to start; 0 without a gate."""
-    live: Live | None
+    live: LiveState | None
     """Live state; None where it is out of date or the program does not run."""
     alarms: tuple[Alarm, ...]
     """Present alarms."""

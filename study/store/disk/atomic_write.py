@@ -8,18 +8,18 @@ import secrets
 from contextlib import suppress
 from pathlib import Path
 
-from study.store.disk.file_errors import AlreadyThereError, CannotWriteError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError
 from study.store.disk.privacy import choose_file_mode
 
 
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
     """Write `content` to a temporary file in the same folder, sync it, and move it to `path`; its mode is
-    `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyThereError if the file exists and is
+    `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyExistsError if the file exists and is
     not to be replaced, CannotWriteError for any error of the operating system; the temporary file is then removed."""
     temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not overwrite:
-            raise AlreadyThereError(path)
+            raise AlreadyExistsError(path)
         open_flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         with os.fdopen(os.open(temporary_path, open_flags, choose_file_mode(path.parent)), "wb") as file:
             file.write(content)
@@ -48,7 +48,7 @@ def sync_folder(folder: Path) -> None:
 
 def _move_into_place(temporary_path: Path, path: Path, overwrite: bool) -> None:
     """Move the complete file to `path` (without `overwrite`: link it there). Without `overwrite`, raises
-    AlreadyThereError if `path` exists; on file systems without hard links, a file that another program creates between
+    AlreadyExistsError if `path` exists; on file systems without hard links, a file that another program creates between
     the check and the move is replaced. Other errors are OSError."""
     if overwrite:
         temporary_path.replace(path)
@@ -57,9 +57,9 @@ def _move_into_place(temporary_path: Path, path: Path, overwrite: bool) -> None:
         # Creating a hard link fails if another program has created the file in the meantime; a rename would replace it.
         path.hardlink_to(temporary_path)
     except FileExistsError as problem:
-        raise AlreadyThereError(path) from problem
+        raise AlreadyExistsError(path) from problem
     except OSError:
         # Some file systems (FAT, network shares) do not support hard links.
         if path.exists():
-            raise AlreadyThereError(path) from None
+            raise AlreadyExistsError(path) from None
         temporary_path.replace(path)

@@ -73,7 +73,7 @@ class CannotWriteError(StudyError):
         )
 
 
-class AlreadyThereError(StudyError):
+class AlreadyExistsError(StudyError):
     """A file exists under the name to be written, and overwriting was not requested."""
 
     def __init__(self, path: Path) -> None:
@@ -105,19 +105,19 @@ _CAPITALIZED_WORDS = {
 def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
     """Limit the problems in number and length: a damaged file may have a million problems or a name of a million
     letters. Of omitted problems the number is added."""
-    unlisted = len(problems) - _MAX_LISTED_PROBLEMS
-    remainder = (f"and {unlisted} more problems",) if unlisted > 0 else ()
-    shortened = (
+    unlisted_count = len(problems) - _MAX_LISTED_PROBLEMS
+    remaining_count_text = (f"and {unlisted_count} more problems",) if unlisted_count > 0 else ()
+    shortened_problems = (
         text if len(text) <= _MAX_PROBLEM_CHARACTERS else f"{text[:_MAX_PROBLEM_CHARACTERS]}…" for text in problems
     )
-    return (*islice(shortened, _MAX_LISTED_PROBLEMS), *remainder)
+    return (*islice(shortened_problems, _MAX_LISTED_PROBLEMS), *remaining_count_text)
 
 
 def _format_sentence(problem: str) -> str:
     """Format a problem as a sentence with capital letter and full stop; a key or name at its beginning keeps its
     case."""
-    capital = problem[:1].upper() if problem.partition(" ")[0] in _CAPITALIZED_WORDS else problem[:1]
-    return capital + problem[1:].rstrip(".") + "."
+    first_letter = problem[:1].upper() if problem.partition(" ")[0] in _CAPITALIZED_WORDS else problem[:1]
+    return first_letter + problem[1:].rstrip(".") + "."
 
 
 def _explain_read_failure(path: Path, error: OSError | UnicodeDecodeError) -> str:

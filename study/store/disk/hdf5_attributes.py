@@ -11,9 +11,9 @@ import h5py
 import numpy as np
 
 _MAX_ENTRIES = 1000
-"""Largest number of entries of an attribute that is read."""
+"""Largest number of entries of an attribute that is read. Chosen: bounds the memory of a damaged file."""
 _MAX_SHOWN_CHARACTERS = 100
-"""Number of characters of a value that a message shows."""
+"""Largest number of characters of a value that a message shows. Chosen."""
 
 
 class AttributeProblemError(ValueError):
@@ -77,7 +77,7 @@ def collapse_single_text(texts: tuple[str, ...]) -> str | tuple[str, ...]:
 
 
 def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
-    """Write an attribute of an HDF5 object: a text, or a list of texts."""
+    """Write an attribute of an HDF5 object: a text, or a list of texts; an existing one is replaced."""
     if isinstance(texts, str):
         owner.attrs[name] = texts
     else:

@@ -29,9 +29,9 @@ def check_contents(file: Any) -> None:
     """Check all datasets of an open file (`h5py.File`). Raises ValueError where a dataset or link lies in another file,
     a dataset is compressed more than once, or the file has more than `MAX_OBJECTS` objects; DeclaredSizeError, a
     ValueError, where the declared sizes exceed the limit. The messages are sentence fragments."""
-    limit = SizeLimit(file.id.get_filesize())
+    size_limit = SizeLimit(file.id.get_filesize())
     for name, dataset in iterate_datasets(file):
-        _check_dataset(name, dataset, limit)
+        _check_dataset(name, dataset, size_limit)
 
 
 def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
@@ -40,7 +40,7 @@ def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
 
     Replaces `h5py.Group.visititems`, which does not report external links and fails on damaged ones.
     """
-    visited: set[int] = set()
+    visited_addresses: set[int] = set()
     pending_groups = [("", file)]
     while pending_groups:
         path, group = pending_groups.pop()
@@ -50,10 +50,10 @@ def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
             if isinstance(link, h5py.ExternalLink):
                 raise ValueError(f"{name} is a link to another file ({link.filename}); copy the data into this one")
             entry = group[key] if isinstance(link, h5py.HardLink) else None
-            if entry is None or (address := h5py.h5o.get_info(entry.id).addr) in visited:
+            if entry is None or (address := h5py.h5o.get_info(entry.id).addr) in visited_addresses:
                 continue
-            visited.add(address)
-            if len(visited) > MAX_OBJECTS:
+            visited_addresses.add(address)
+            if len(visited_addresses) > MAX_OBJECTS:
                 raise ValueError(f"it holds more than {MAX_OBJECTS} objects")
             if isinstance(entry, h5py.Dataset):
                 yield name, entry
@@ -61,7 +61,7 @@ def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
                 pending_groups.append((f"{name}/", entry))
 
 
-def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
+def _check_dataset(name: str, dataset: Any, size_limit: SizeLimit) -> None:
     """Raise ValueError where the samples lie in other files or are compressed more than once, DeclaredSizeError where
     the dataset exceeds the rest of the limit, or a chunk exceeds it alone. limit: is reduced by the dataset's size."""
     properties = dataset.id.get_create_plist()
@@ -75,10 +75,10 @@ def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
     holds_python_objects = dataset.dtype.hasobject or dataset.dtype.names is not None
     # Numbers are read as float64 (8 bytes).
     element_bytes = _PYTHON_OBJECT_BYTES if holds_python_objects else max(8, dataset.dtype.itemsize)
-    limit.add_size(name, math.prod(dataset.shape) * element_bytes)
+    size_limit.add_size(name, math.prod(dataset.shape) * element_bytes)
     if dataset.chunks is not None:
         chunk_bytes = math.prod(dataset.chunks) * element_bytes
-        if chunk_bytes > limit.limit_bytes:
+        if chunk_bytes > size_limit.limit_bytes:
             raise DeclaredSizeError(f"{name} is stored in pieces of {chunk_bytes} bytes; save it in smaller ones")
         if h5py.h5z.FILTER_DEFLATE in filters and dataset.id.get_storage_size() * _MAX_DEFLATE_RATIO > MIN_LIMIT_BYTES:
             _check_chunks(name, dataset, chunk_bytes)
@@ -92,6 +92,7 @@ def _check_chunks(name: str, dataset: Any, chunk_bytes: int) -> None:
     large_chunk_offsets: list[tuple[int, ...]] = []
 
     def collect_large_chunk(chunk_info: Any) -> None:
+        """Collect the offset of a chunk that may exceed `MIN_LIMIT_BYTES` when it is decompressed."""
         if chunk_info.size * _MAX_DEFLATE_RATIO > MIN_LIMIT_BYTES:
             large_chunk_offsets.append(chunk_info.chunk_offset)
 

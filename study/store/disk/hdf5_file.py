@@ -110,7 +110,7 @@ def read_float_dataset(file: Any, name: str, shape_text: str) -> FloatArray:
 def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, sealed: bool = False) -> None:
     """Write an HDF5 file atomically. fill: writes the contents into the `h5py.File` that it is called with. That file
     is in memory, because on a full disk the HDF5 library would leave a damaged file. sealed: add the seal. Raises
-    AlreadyThereError where the file exists unless `overwrite`, CannotWriteError where it cannot be written."""
+    AlreadyExistsError where the file exists unless `overwrite`, CannotWriteError where it cannot be written."""
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", userblock_size=USER_BLOCK_BYTES if sealed else 0) as file:
         fill(file)

@@ -25,10 +25,10 @@ def write_json(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Write a document. payload: JSON values, in addition to format, version and provenance; a key of the same name
-    replaces format or version.
+    """Write a document. payload: JSON values, in addition to format, version and provenance. Its keys "format" and
+    "version" replace the arguments; its "provenance" is replaced by the argument, unless that is None.
 
-    Raises ValueError for NaN and infinity, which JSON does not have (write null), AlreadyThereError where the file
+    Raises ValueError for NaN and infinity, which JSON does not have (write null), AlreadyExistsError where the file
     exists unless `overwrite`, CannotWriteError where it cannot be written.
     """
     provenance_entry = {} if provenance is None else {"provenance": provenance.as_dict()}

@@ -21,7 +21,8 @@ from study.store.disk.privacy import make_folder
 
 def require_new_folder(folder: Path) -> None:
     """Check that results can be written to `folder`. Raises StudyError where it exists and is not an empty folder, or
-    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable."""
+    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable or one of them
+    cannot be read."""
     try:
         is_empty, exists, has_parent = (
             folder.is_dir() and not any(folder.iterdir()),

@@ -1,8 +1,8 @@
 """Access rights: participants' data are readable only by the account that recorded them.
 
 Folders of a study have mode 700 and their files 600, regardless of the umask. A new file elsewhere gets the usual
-rights (666 minus umask) where its folder is open to others, otherwise 600.
-Modules of `study.store` create files and folders by it; commands print its warnings.
+rights (666 minus umask) where its folder is open to others, otherwise 600. Called where files and folders are created
+(`study.store`, `study.workflows`); the commands and the screen show its warnings.
 """
 
 import contextlib
@@ -34,15 +34,15 @@ def choose_file_mode(folder: Path) -> int:
 
 def write_private(path: Path, content: bytes) -> None:
     """Write a file with mode 600, or replace the content of an existing file; not atomic and not synced. A symbolic
-    link in its place is refused, where the system can. Raises OSError."""
+    link in its place is refused on systems with O_NOFOLLOW. Raises OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     with os.fdopen(os.open(path, flags, PRIVATE_FILE), "wb") as file:
         file.write(content)
 
 
 def make_folder(folder: Path, *, private: bool = False) -> None:
-    """Create the folder and its missing parents. private: with mode 700; otherwise, new folders are private where their
-    parent is. Raises OSError."""
+    """Create the folder and its missing parents; existing ones are unchanged. private: with mode 700; otherwise, new
+    folders are private where their parent is. Raises OSError, FileExistsError where a file has this name."""
     if folder.is_dir():
         return
     parent = folder.absolute().parent
@@ -60,27 +60,28 @@ def close_to_others(folder: Path, *, recursive: bool = False) -> None:
         _restrict_folder(opened_folder, recursive)
 
 
-def close_data_folder(data: Path) -> None:
+def close_data_folder(data_folder: Path) -> None:
     """Remove the rights of group and others from the data folder and its folders, unless `explain_open_folder` gives a
     reason against it. Raises OSError where the folder cannot be listed."""
-    if not is_open_to_others(data) or explain_open_folder(data):
+    if not is_open_to_others(data_folder) or explain_open_folder(data_folder):
         return
-    close_to_others(data.resolve())
-    for folder in (path for path in data.iterdir() if is_real_folder(path) and is_open_to_others(path)):
+    close_to_others(data_folder.resolve())
+    for folder in (path for path in data_folder.iterdir() if is_real_folder(path) and is_open_to_others(path)):
         close_to_others(folder)
 
 
-def explain_open_folder(data: Path) -> str:
-    """Why a data folder that is open to others is not closed automatically, in words; empty if there is no reason: it
-    belongs to another account, is meant to be shared (sticky or set-group bit), or holds the working or home folder."""
-    if not is_open_to_others(data):
+def explain_open_folder(data_folder: Path) -> str:
+    """Explain in words why the rights of others to a data folder are not removed: it belongs to another account, is
+    meant to be shared (sticky or set-group bit), or holds the working or home folder. Empty where none of these holds,
+    or others have no rights."""
+    if not is_open_to_others(data_folder):
         return ""
-    folder_stat, resolved_data = data.stat(), data.resolve()
+    folder_stat, resolved_data = data_folder.stat(), data_folder.resolve()
     if folder_stat.st_uid != os.geteuid():
         return "it belongs to another account"
     if folder_stat.st_mode & (stat.S_ISVTX | stat.S_ISGID):
         return "it was made to be shared"
-    if any(protected.is_relative_to(resolved_data) for protected in (Path.cwd(), Path.home().resolve())):
+    if any(protected_folder.is_relative_to(resolved_data) for protected_folder in (Path.cwd(), Path.home().resolve())):
         return "it holds more than the study"
     return ""
 
@@ -95,15 +96,15 @@ def format_privacy_warning(folder: Path, reason: str = "") -> str:
     return f"{text}{reason and f' A session leaves them: {reason}.'} Remove these rights: chmod 700 {folder}"
 
 
-def format_data_folder_warning(data: Path) -> str:
+def format_data_folder_warning(data_folder: Path) -> str:
     """Format a warning if others have rights to a data folder that a session will not remove; otherwise empty."""
-    reason = explain_open_folder(data)
-    return format_privacy_warning(data, reason) if reason else ""
+    reason = explain_open_folder(data_folder)
+    return format_privacy_warning(data_folder, reason) if reason else ""
 
 
 def _restrict_folder(opened_folder: OpenedFolder, recursive: bool) -> None:
-    """Remove the rights of group and others from an opened folder; recursive: also from its contents. Non-blocking
-    opening, because an entry may be a pipe."""
+    """Remove the rights of group and others from an opened folder; recursive: also from its contents, except links.
+    Nothing is done without a descriptor. Entries are opened without blocking, because one may be a pipe."""
     if opened_folder.descriptor is None:
         return
     _restrict_access(opened_folder.descriptor)

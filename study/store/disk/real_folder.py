@@ -1,8 +1,9 @@
-"""A folder that is held open by its descriptor, so that its contents can be erased without following links.
+"""Access to a folder by its open descriptor, so that its contents can be erased without following links.
 
 Entries are addressed relative to the descriptor; a symbolic link that another program puts in place of a folder in the
 meantime cannot redirect the erasure. On systems without such calls (Windows) paths are used, and links are only
-checked. Used by the withdrawal of a participant and by `privacy`, which restricts access rights.
+checked beforehand. Called by `privacy`, which restricts access rights, by the withdrawal of a participant, and by
+readers that accept no links.
 """
 
 import os
@@ -26,7 +27,7 @@ def is_real_file(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class OpenedFolder:
-    """A folder that is held open; its entries are addressed by its descriptor, where the system can."""
+    """An open folder; its entries are addressed relative to its descriptor, where the system can."""
 
     path: Path
     descriptor: int | None
@@ -48,8 +49,8 @@ class OpenedFolder:
                 os.unlink(self._format_entry_path(name), dir_fd=self.descriptor)
 
     def erase_if_empty(self, name: str) -> None:
-        """Erase a folder inside this folder if it is empty; nothing happens if it does not exist or is no folder.
-        Raises OSError."""
+        """Erase a folder inside this folder if it is empty; nothing happens if it holds entries, does not exist or is
+        no folder. Raises OSError."""
         with suppress(FileNotFoundError, NotADirectoryError):
             with open_folder(self, name) as subfolder:
                 is_empty = not subfolder.list_names()
@@ -67,17 +68,17 @@ class OpenedFolder:
 
 
 @contextmanager
-def open_folder(start: Path | OpenedFolder, *names: str) -> Iterator[OpenedFolder]:
-    """Context with the folder `start`, or the one reached from it by `names`, level by level, held open.
+def open_folder(start_folder: Path | OpenedFolder, *names: str) -> Iterator[OpenedFolder]:
+    """Open the folder `start_folder`, or the one reached from it by `names`, level by level, for the context.
 
     Folders opened here are closed at the end. Raises OSError: NotADirectoryError where a level is a link or no folder,
     FileNotFoundError where it is missing.
     """
-    folder = _open_unlinked(start, None) if isinstance(start, Path) else start
-    opened_folders = [] if folder is start else [folder]
+    folder = _open_without_links(start_folder, None) if isinstance(start_folder, Path) else start_folder
+    opened_folders = [] if folder is start_folder else [folder]
     try:
         for name in names:
-            folder = _open_unlinked(folder.path / name, folder.descriptor)
+            folder = _open_without_links(folder.path / name, folder.descriptor)
             opened_folders.append(folder)
         yield folder
     finally:
@@ -86,7 +87,7 @@ def open_folder(start: Path | OpenedFolder, *names: str) -> Iterator[OpenedFolde
                 os.close(opened_folder.descriptor)
 
 
-def _open_unlinked(path: Path, parent_descriptor: int | None) -> OpenedFolder:
+def _open_without_links(path: Path, parent_descriptor: int | None) -> OpenedFolder:
     """Open a folder that is no link. parent_descriptor: of the folder that contains it; None: by its path. Raises
     OSError, NotADirectoryError for a link or no folder."""
     if os.open not in os.supports_dir_fd:

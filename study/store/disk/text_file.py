@@ -24,7 +24,7 @@ def read_text(path: Path, max_bytes: int = MAX_TABLE_BYTES) -> str:
 
 def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
     """Write a text file atomically. Line ends are written unchanged, so that a file is the same on every system.
-    Surrogates (from a file name that is not UTF-8) become question marks. Raises AlreadyThereError where the file
+    Surrogates (from a file name that is not UTF-8) become question marks. Raises AlreadyExistsError where the file
     exists unless `overwrite`, CannotWriteError where it cannot be written."""
     write_atomically(path, text.encode("utf-8", errors="replace"), overwrite=overwrite)
 

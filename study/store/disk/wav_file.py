@@ -11,7 +11,7 @@ from study.store.disk.atomic_write import write_atomically
 
 
 def write_wav(path: Path, samples: NDArray[np.int16], sample_rate_hz: int) -> None:
-    """Write samples, (n,), as a WAV file, atomically. Raises AlreadyThereError where the file exists,
+    """Write samples, (n,), as a WAV file, atomically. Raises AlreadyExistsError where the file exists,
     CannotWriteError where it cannot be written."""
     content = io.BytesIO()
     with wave.open(content, "wb") as file:

@@ -70,7 +70,7 @@ class AnswerTable:
 
     @property
     def header(self) -> tuple[str, ...]:
-        """Names of the columns: subject, session, and the questions."""
+        """Names of the columns: subject, session, and those of the questions."""
         return ("subject", "session", *(column.name for column in self.columns))
 
     def as_csv(self) -> str:
@@ -79,18 +79,18 @@ class AnswerTable:
         return "".join(format_csv_line(line) + "\n" for line in lines)
 
 
-def make_answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], free_text: bool) -> AnswerTable:
-    """Make the table of all sessions with a filled form. Without a column to show, it has no rows either.
+def make_answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], include_free_text: bool) -> AnswerTable:
+    """Make the table of all sessions with a filled form of `FORM_NAMES`; without rows where it has no columns.
 
-    free_text: include free-text answers, which may contain health data or names of persons. forms: in the order of
-    logging; of two answers to the same question in a session, the later one counts.
+    forms: in the order of logging; of two answers to the same question in a session, the later one counts.
+    include_free_text: whether to include free-text answers, which may contain health data or names of persons.
     """
     question_tables = {"before": protocol.before, "debrief": protocol.debrief}
     columns = tuple(
         AnswerColumn(table, question)
         for table, questions in question_tables.items()
         for question in questions
-        if free_text or not question.is_free_text
+        if include_free_text or not question.is_free_text
     )
     answers_by_question = {(form.subject, form.session, form.form, key): answer
             for form in forms for key, answer in form.answers.items()}  # fmt: skip

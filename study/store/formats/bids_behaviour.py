@@ -1,6 +1,7 @@
 """Trials as BIDS behaviour: per participant and session a TSV with its JSON, and the tables of the dataset.
 
-Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recordings)". Missing values are n/a.
+Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recordings)". Missing values are n/a. Called
+by `study.workflows.results.export_study`.
 """
 
 import json
@@ -17,26 +18,26 @@ from study.store.disk.text_file import write_text
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
-VERSION = "1.10.0"
+BIDS_VERSION = "1.10.0"
 """Version of the BIDS standard that the dataset states."""
-IN_FILE_NAME = ("subject", "session")
-"""Columns of a trial that BIDS puts into the file's name."""
+FILE_NAME_COLUMNS = ("subject", "session")
+"""Columns of a trial that BIDS states in the name of the file instead of the table."""
 
 PARTICIPANT_COLUMNS: dict[str, tuple[str, ...]] = {
     "age": (),
     "sex": ("male", "female", "other"),
     "handedness": ("left", "right", "ambidextrous"),
 }
-"""Columns of participants.tsv that BIDS defines, with the values that it takes; none: numbers."""
+"""Columns of participants.tsv that BIDS defines, with their permitted values; an empty tuple permits numbers."""
 
-TASK = (
+TASK_DESCRIPTION = (
     "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
     "which."
 )
 """`TaskDescription` of the tables' JSON."""
 FACTS_NAME = "facts.json"
-"""File name as in the tidy form, here below `code`."""
-QUESTION = "In which of the two directions did the force act? Answer 1 or 2."
+"""Name of the file with the provenance, below `code`; the same as in the export `tidy_csv`."""
+INSTRUCTIONS = "In which of the two directions did the force act? Answer 1 or 2."
 """`Instructions` of the tables' JSON."""
 README = """# {name}
 
@@ -47,7 +48,7 @@ Trials of a study of force directions, exported by hapteq: per participant and s
 `code/protocol.toml` is the protocol with every number of the study, in the form that `hapteq study --protocol` takes;
 `code/{facts_name}` has its hash, the seed of each session, the devices and the versions of the programs.
 """
-"""Text of the dataset's README; the names are filled in."""
+"""Text of the dataset's README, with the name of the dataset, the title of the protocol and `FACTS_NAME` as fields."""
 
 
 def write_bids(
@@ -58,12 +59,13 @@ def write_bids(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write the dataset. folder: existing and empty. facts: JSON values on where the data come from. Raises
-    CannotWriteError."""
+    """Write the dataset, and return the paths of its files. folder: existing and empty. name: of the dataset and, as a
+    label, of the task. facts: provenance as JSON values. Raises CannotWriteError where a file cannot be written, and
+    OSError where a folder cannot."""
     task, readme = _make_label(name), README.format(name=name, title=_read_title(protocol_text), facts_name=FACTS_NAME)
     paths = [
         _write_json(folder / "dataset_description.json", {
-            "Name": name, "BIDSVersion": VERSION, "DatasetType": "raw",
+            "Name": name, "BIDSVersion": BIDS_VERSION, "DatasetType": "raw",
             "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("versions", {}).get("hapteq", ""))}],
         }),
         _write_text(folder / "README.md", readme),
@@ -73,10 +75,10 @@ def write_bids(
         _write_json(folder / f"task-{task}_beh.json", {
             "TaskName": task,
             "TaskDescription": " ".join(
-                part for part in (TASK, _describe_target(protocol_text), _read_title(protocol_text)) if part
+                part for part in (TASK_DESCRIPTION, _describe_target(protocol_text), _read_title(protocol_text)) if part
             ),
-            "Instructions": QUESTION,
-            **{column: _describe_column(column) for column in list_columns(Trial) if column not in IN_FILE_NAME},
+            "Instructions": INSTRUCTIONS,
+            **{column: _describe_column(column) for column in list_columns(Trial) if column not in FILE_NAME_COLUMNS},
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
@@ -91,30 +93,32 @@ def write_bids(
 
 
 def _write_participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -> list[Path]:
-    """participants.tsv and its JSON: the code, and those questions before the trials that BIDS defines a column for."""
+    """Write participants.tsv and its JSON: the code, and the questions before the trials for which BIDS defines a
+    column. A question with any answer that BIDS does not permit is left out. Of several sessions, the first answer
+    counts."""
     participant_columns = [
-        (place, column)
-        for place, column in enumerate(answers.columns)
+        (column_index, column)
+        for column_index, column in enumerate(answers.columns)
         if column.table == "before" and column.question.key in PARTICIPANT_COLUMNS
     ]
-    by_question = {
+    values_by_key = {
         column.question.key: [
-            next((row[2][place] for row in answers.rows if row[0] == subject and row[2][place]), "n/a")
+            next((row[2][column_index] for row in answers.rows if row[0] == subject and row[2][column_index]), "n/a")
             for subject in subjects
         ]
-        for place, column in participant_columns
+        for column_index, column in participant_columns
     }
-    by_question = {
-        key: values for key, values in by_question.items() if all(_is_valid_value(key, value) for value in values)
+    values_by_key = {
+        key: values for key, values in values_by_key.items() if all(_is_valid_value(key, value) for value in values)
     }
-    lines = [["participant_id", "code", *by_question]]
-    lines += [[f"sub-{_make_label(subject)}", subject, *(values[number] for values in by_question.values())]
-              for number, subject in enumerate(subjects)]  # fmt: skip
-    text = "".join("\t".join(line) + "\n" for line in lines)
+    table_rows = [["participant_id", "code", *values_by_key]]
+    table_rows += [[f"sub-{_make_label(subject)}", subject, *(values[row_index] for values in values_by_key.values())]
+              for row_index, subject in enumerate(subjects)]  # fmt: skip
+    text = "".join("\t".join(line) + "\n" for line in table_rows)
     descriptions = {
         column.question.key: _describe_answers(column)
         for _, column in participant_columns
-        if column.question.key in by_question
+        if column.question.key in values_by_key
     }
     return [
         _write_text(folder / "participants.tsv", text),
@@ -130,35 +134,40 @@ def _is_valid_value(key: str, value: str) -> bool:
 
 
 def _write_phenotype(folder: Path, table: str, answers: AnswerTable) -> list[Path]:
-    """Answers to the questions of one table of the protocol, a row per session."""
-    columns_of = [(place, column) for place, column in enumerate(answers.columns) if column.table == table]
-    lines = [["participant_id", "session_id", *(column.question.key for _, column in columns_of)]]
+    """Write the answers to the questions of one table of the protocol ("before", "debrief"), a row per session, and
+    the descriptions of their columns."""
+    table_columns = [(index, column) for index, column in enumerate(answers.columns) if column.table == table]
+    lines = [["participant_id", "session_id", *(column.question.key for _, column in table_columns)]]
     lines += [[f"sub-{_make_label(subject)}", f"ses-{_make_label(session)}",
-               *(_format_cell(row[place]) for place, _ in columns_of)]
+               *(_format_cell(row[index]) for index, _ in table_columns)]
               for subject, session, row in answers.rows]  # fmt: skip
     descriptions = {"session_id": {"Description": "Session in which this was answered"}}
-    descriptions |= {column.question.key: _describe_answers(column) for _, column in columns_of}
+    descriptions |= {column.question.key: _describe_answers(column) for _, column in table_columns}
     text = "".join("\t".join(line) + "\n" for line in lines)
-    place = folder / "phenotype"
-    return [_write_text(place / f"{table}.tsv", text), _write_json(place / f"{table}.json", descriptions)]
+    phenotype = folder / "phenotype"
+    return [_write_text(phenotype / f"{table}.tsv", text), _write_json(phenotype / f"{table}.json", descriptions)]
 
 
 def _describe_answers(column: AnswerColumn) -> dict[str, Any]:
+    """Describe a question as a column of BIDS: its text, and unit and levels where it has them."""
     question = column.question
     unit = {"Units": question.unit} if question.unit else {}
     return {"Description": question.question, **unit, **({"Levels": column.levels} if column.levels else {})}
 
 
 def _format_cell(answer: str) -> str:
-    """Free text without the tabs that separate columns."""
+    """Format an answer as a cell, with single spaces for tabs and line breaks; n/a for an empty one."""
     return " ".join(answer.split()) or "n/a"
 
 
 def _format_tsv(trials: Sequence[Trial]) -> str:
-    """The trials as TSV. No value of a trial contains a comma or a quote, so that CSV can be split at its commas."""
+    """Format the trials as TSV. No value of a trial contains a comma or a quote, so that each line of their CSV can be
+    split at its commas."""
     lines = [line.split(",") for line in format_csv_table(trials, Trial).splitlines()]
-    kept_columns = [number for number, column in enumerate(list_columns(Trial)) if column not in IN_FILE_NAME]
-    return "".join("\t".join(line[number] or "n/a" for number in kept_columns) + "\n" for line in lines)
+    column_indices = [
+        column_index for column_index, column in enumerate(list_columns(Trial)) if column not in FILE_NAME_COLUMNS
+    ]
+    return "".join("\t".join(line[column_index] or "n/a" for column_index in column_indices) + "\n" for line in lines)
 
 
 def _read_title(protocol_text: str) -> str:
@@ -167,30 +176,33 @@ def _read_title(protocol_text: str) -> str:
 
 
 def _describe_target(protocol_text: str) -> str:
-    """Convergence level of the staircase (Levitt 1971); empty for rules with several wrong answers, and without a
-    rule."""
+    """Describe the convergence level of an n-down, 1-up staircase, the n-th root of 1/2 (Levitt 1971); empty where the
+    protocol states no `down_after_right`, or not 1 for `up_after_wrong`."""
     rule = tomllib.loads(protocol_text).get("staircase", {})
     if rule.get("up_after_wrong") != 1 or "down_after_right" not in rule:
         return ""
-    share = 0.5 ** (1 / rule["down_after_right"])
-    return f"A staircase over the amplitude seeks the level at which {100 * share:.2f} % of the answers are right."
+    target = 0.5 ** (1 / rule["down_after_right"])
+    return f"A staircase over the amplitude seeks the level at which {100 * target:.2f} % of the answers are right."
 
 
 def _describe_column(column: str) -> dict[str, str]:
-    words, unit = TRIAL_COLUMNS[column]
-    return {"Description": words, **({"Units": unit} if unit else {})}
+    """Describe a column of the trials: its meaning, and its unit where it has one."""
+    description, unit = TRIAL_COLUMNS[column]
+    return {"Description": description, **({"Units": unit} if unit else {})}
 
 
 def _make_label(text: str) -> str:
-    """The text as a BIDS label, which takes letters and digits only."""
+    """Make a BIDS label of a text: its ASCII letters and digits."""
     return re.sub(r"[^A-Za-z0-9]", "", text)
 
 
 def _write_json(path: Path, value: Mapping[str, Any]) -> Path:
+    """Write a JSON file, as `_write_text`."""
     return _write_text(path, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
 def _write_text(path: Path, text: str) -> Path:
+    """Write a new text file and its missing folders, and return its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text, overwrite=False)
     return path

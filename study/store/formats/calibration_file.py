@@ -20,6 +20,7 @@ from study.store.disk.layout import Entry
 from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-calibration", 1
+"""Name and version of the format, written into every file."""
 KIND = "calibration of a linkage"
 """Name of such a file in messages."""
 
@@ -71,7 +72,7 @@ def read_calibration(path: Path) -> LinkageCalibration:
 
 
 def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
-    """Write a calibration of a linkage, sealed and never over an existing file. Raises AlreadyThereError,
+    """Write a calibration of a linkage, sealed and never over an existing file. Raises AlreadyExistsError,
     CannotWriteError."""
 
     def fill_file(file: Any) -> None:

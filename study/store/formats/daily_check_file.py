@@ -31,7 +31,8 @@ class DailyCheck:
     sentences: tuple[str, ...]
     """One sentence for each kind of change, as shown to the user; or why the check was aborted."""
     changes: tuple[dict[str, Any], ...]
-    """The compared quantities: kind, axis, accepted value and today's, error, limit, unit, whether it changed, band."""
+    """The compared quantities: kind, axis, value of the baseline and of today, standard error, limit, unit, whether it
+    changed, and band."""
     recording: str
     """Name of today's recording, in the same folder; empty where the check was aborted before the recording was
     written."""
@@ -42,7 +43,7 @@ class DailyCheck:
 
 
 def write_daily_check(path: Path, check: DailyCheck) -> None:
-    """Write the result of a daily check. Raises AlreadyThereError where the file exists, CannotWriteError where it
+    """Write the result of a daily check. Raises AlreadyExistsError where the file exists, CannotWriteError where it
     cannot be written."""
     write_json(path, FORMAT, VERSION, asdict(check), gather_provenance())
 

@@ -35,6 +35,6 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None) -> None:
-    """Write a diagnosis. Raises AlreadyThereError where the file exists, CannotWriteError where it cannot be
+    """Write a diagnosis. Raises AlreadyExistsError where the file exists, CannotWriteError where it cannot be
     written."""
     write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance)

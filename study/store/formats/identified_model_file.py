@@ -93,7 +93,7 @@ def confirm_identified_model(path: Path) -> bool:
 
 
 def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrite: bool = False) -> None:
-    """Write a model. Raises AlreadyThereError if the file exists and `overwrite` is false, and CannotWriteError."""
+    """Write a model. Raises AlreadyExistsError if the file exists and `overwrite` is false, and CannotWriteError."""
 
     def write_contents(file: Any) -> None:
         file.attrs.update({"format": FORMAT, "version": VERSION, "sample_rate_hz": model.sample_rate_hz})

@@ -66,5 +66,5 @@ def read_mechanical_model(path: Path | str) -> MechanicalModel:
 
 
 def write_mechanical_model(path: Path | str, model: MechanicalModel, *, overwrite: bool = False) -> None:
-    """Write a model. Raises AlreadyThereError where the file exists and overwrite is False, and CannotWriteError."""
+    """Write a model. Raises AlreadyExistsError where the file exists and overwrite is False, and CannotWriteError."""
     write_text(Path(path), format_mechanical_model(model), overwrite=overwrite)

@@ -2,7 +2,8 @@
 
 Psych-DS, schema version 0.4.0 (https://psych-ds.github.io), sets the file names (`keyword-value` pairs, ending in
 `_data.csv`) and `dataset_description.json` (schema.org JSON-LD that names every column). The protocol is stored in
-`materials/`, so that `hapteq analyze` can analyse the dataset again.
+`materials/`, so that `hapteq analyze` can analyse the dataset again. Called by
+`study.workflows.results.export_study`; `tidy_csv` reads its tables with `read_described_trials`.
 """
 
 import json
@@ -30,7 +31,7 @@ ANSWERS_NAME = "data/description-answers_data.csv"
 KIND = "Psych-DS dataset"
 """Name of this kind of folder in messages."""
 FACTS_KEY = "hapteq"
-"""Key in the description for facts that only hapteq reads: provenance, seeds, devices."""
+"""Key in the description for data that only hapteq reads: provenance, seeds, devices."""
 
 README = """# {name}
 
@@ -66,14 +67,14 @@ def write_psych_ds(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write the dataset, and return the paths of its files. folder: existing and empty; facts: plain values for JSON.
-    Raises CannotWriteError, and OSError where a folder cannot be made."""
+    """Write the dataset, and return the paths of its files. folder: existing and empty; facts: JSON values, written
+    under `FACTS_KEY`. Raises CannotWriteError where a file cannot be written, and OSError where a folder cannot."""
     (folder / "data").mkdir()
     (folder / "materials").mkdir()
     paths = []
     for session in dict.fromkeys(trial.session for trial in trials):
         rows = [trial for trial in trials if trial.session == session]
-        path = folder / "data" / f"subject-{_keyword_value(rows[0].subject)}_session-{_keyword_value(session)}_data.csv"
+        path = folder / "data" / f"subject-{_format_value(rows[0].subject)}_session-{_format_value(session)}_data.csv"
         write_text(path, format_csv_table(rows, Trial), overwrite=False)
         paths.append(path)
     if answers.columns:
@@ -100,7 +101,8 @@ def write_psych_ds(
 
 
 def read_psych_ds(folder: Path) -> ExportedTrials:
-    """Read a dataset that `write_psych_ds` wrote. Raises CannotReadError, UnusableFileError."""
+    """Read a dataset that `write_psych_ds` wrote. Raises CannotReadError where a file cannot be read, UnusableFileError
+    where the description is no JSON object with `FACTS_KEY`, there is no table, or a table is invalid."""
     path = folder / DESCRIPTION_NAME
     try:
         description = load_json(read_text(path))
@@ -109,25 +111,25 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
     facts = description.get(FACTS_KEY) if isinstance(description, dict) else None
     files = tuple(sorted((folder / "data").glob("subject-*_data.csv")))
     if not isinstance(facts, dict) or not files:
-        missing = (
+        problem = (
             "no file below data/ is named subject-…_data.csv"
             if isinstance(facts, dict)
             else f"the key '{FACTS_KEY}' is missing"
         )
-        raise UnusableFileError(path, KIND, (missing,))
+        raise UnusableFileError(path, KIND, (problem,))
     trials = tuple(trial for file_path in files for trial in read_described_trials(file_path, KIND))
     return ExportedTrials(trials, read_text(folder / PROTOCOL_NAME), facts, files)
 
 
 def read_described_trials(path: Path, kind: str) -> tuple[Trial, ...]:
-    """Trials of a CSV table. kind: name of the kind of dataset for messages. Raises CannotReadError,
-    UnusableFileError."""
+    """Read the trials of a CSV table. kind: name of the kind of dataset for messages. Raises CannotReadError where the
+    table cannot be read, UnusableFileError where columns or values are invalid, or the trials contradict each other."""
     try:
         rows = parse_csv_table(read_text(path), Trial)
     except CsvError as error:
         raise UnusableFileError(path, kind, error.problems) from error
-    if wrong := find_trial_problems(rows):
-        raise UnusableFileError(path, kind, wrong)
+    if trial_problems := find_trial_problems(rows):
+        raise UnusableFileError(path, kind, trial_problems)
     return tuple(rows)
 
 
@@ -137,6 +139,7 @@ def _describe_variable(column: str, description: str, unit: str) -> dict[str, st
     return {**variable, "unitText": unit} if unit else variable
 
 
-def _keyword_value(text: str) -> str:
-    """The ASCII letters and digits of a text: the only characters that Psych-DS allows for values in file names."""
+def _format_value(text: str) -> str:
+    """Make the value of a pair `keyword-value` in a file name: the ASCII letters and digits of the text, the only
+    characters that Psych-DS permits there."""
     return re.sub(r"[^A-Za-z0-9]", "", text)

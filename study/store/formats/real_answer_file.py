@@ -38,5 +38,5 @@ def read_answer_and_provenance(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
 
 
 def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:
-    """Write an answer. Raises AlreadyThereError where the file exists, CannotWriteError where it cannot be written."""
+    """Write an answer. Raises AlreadyExistsError where the file exists, CannotWriteError where it cannot be written."""
     write_json(path, FORMAT, VERSION, real_answer_to_json(answer), provenance)

@@ -1,8 +1,8 @@
 """Record of iterative learning control on a device, `*.repeats.json`: the format `hapteq-repeats`, version 1.
 
-It is stored in the folder of the table of forces that was found, and contains the error of each play, and the
-trajectory, model and device for which the forces were found. A later run continues from these forces only for the same
-trajectory and model. Called by `study.workflows.equalizer` (`repeat_results`, `repeat_trajectory`, `repeat_playback`)
+It is stored beside the table of learned forces, and contains the error of each play, and the trajectory, model and
+device for which the forces were learned. A later run continues from these forces only for the same trajectory and
+model. Called by `study.workflows.equalizer` (`repeat_results`, `repeat_trajectory`, `repeat_playback`)
 and `hapteq validate`.
 """
 
@@ -84,6 +84,6 @@ def read_repeats(path: Path) -> Repeats:
 
 
 def write_repeats(path: Path, repeats: Repeats, provenance: Provenance | None = None) -> None:
-    """Write the document. Raises AlreadyThereError where the file exists, CannotWriteError where it cannot be
+    """Write the document. Raises AlreadyExistsError where the file exists, CannotWriteError where it cannot be
     written."""
     write_json(path, FORMAT, VERSION, asdict(repeats), provenance)

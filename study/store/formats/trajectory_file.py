@@ -21,6 +21,6 @@ def read_trajectory(path: Path) -> Trajectory:
 
 
 def write_trajectory(path: Path, trajectory: Trajectory) -> None:
-    """Write the table of the trajectory's kind. Raises TableError for NaN or infinite samples, AlreadyThereError where
+    """Write the table of the trajectory's kind. Raises TableError for NaN or infinite samples, AlreadyExistsError where
     the file exists, CannotWriteError where it cannot be written."""
     write_text(path, format_trajectory_csv(trajectory), overwrite=False)

@@ -34,7 +34,7 @@ def write_trials_mat(
 ) -> tuple[Path, ...]:
     """Write `trials.mat` into the folder and return a tuple with its path. Numbers and booleans become column vectors
     of double (NaN for a missing value), text becomes cell arrays. name: of the study; protocol_text: its file;
-    provenance: JSON values. Raises AlreadyThereError for an existing file, CannotWriteError where it cannot be
+    provenance: JSON values. Raises AlreadyExistsError for an existing file, CannotWriteError where it cannot be
     written."""
     from scipy.io import savemat
 

@@ -2,7 +2,7 @@
 
 `study.workflows.session.conduct_session` replaces the file atomically several times a second, so that a reader never
 sees an incomplete one; `study.workflows.views` (`watch_session`, `stream_signals`) reads it. The fields are those of
-`study.session.watching.live_state.Live`. No result depends on the file: errors of reading and writing are ignored.
+`study.session.watching.live_state.LiveState`. No result depends on the file: errors of reading and writing are ignored.
 """
 
 import json
@@ -14,15 +14,16 @@ from typing import Any, get_args
 
 from study.regular_file import read_regular
 from study.session.facts.fact_types import check_utc_time
-from study.session.watching.live_state import Activity, Live
+from study.session.watching.live_state import Activity, LiveState
 from study.store.disk.privacy import write_private
 from study.store.disk.strict_json import load_json
 
 LIVE_NAME = "live.json"
 """Name of the file in the session's folder."""
 LIVE_FORMAT = "hapteq-live"
+"""Name of the format, written into every file."""
 LIVE_VERSION = 1
-"""Name (`LIVE_FORMAT`) and version of the format, written into every file."""
+"""Version of the format, written into every file."""
 
 _ACTIVITIES = get_args(Activity)
 """Values of the field `activity` that a reader accepts."""
@@ -30,7 +31,7 @@ _MAX_BYTES = 1 << 16
 """Largest file that is read (bytes). Chosen: a file written by hapteq has about 1 kB."""
 
 
-def write_live(folder: Path, live: Live) -> None:
+def write_live(folder: Path, live: LiveState) -> None:
     """Write the live state into the session's folder, replacing the previous file; NaN and infinity become null. An
     OSError is ignored: a session must not end because its state cannot be displayed. Call only with the session's lock
     held (`session_lock`), because the name of the temporary file is fixed."""
@@ -49,7 +50,7 @@ def remove_live(folder: Path) -> None:
         (folder / LIVE_NAME).unlink()
 
 
-def read_live(folder: Path) -> Live | None:
+def read_live(folder: Path) -> LiveState | None:
     """Read the live state from a session's folder; None if the file is missing, unreadable, larger than `_MAX_BYTES`,
     of another format or version, or has an invalid field. Never raises."""
     try:
@@ -60,12 +61,12 @@ def read_live(folder: Path) -> Live | None:
         return None
     if (document.pop("format", None), document.pop("version", None)) != (LIVE_FORMAT, LIVE_VERSION):
         return None
-    return Live(**document) if _has_valid_fields(document) else None
+    return LiveState(**document) if _has_valid_fields(document) else None
 
 
 def _has_valid_fields(values: dict[str, Any]) -> bool:
-    """Whether the values have exactly the fields of `Live`, the last two being optional, with valid types, times and
-    activity."""
+    """Whether the values have exactly the fields of `LiveState`, of which the last two may be missing, with valid
+    types, times and activity."""
     # Files of older versions lack these two fields, which then have their defaults.
     values = {"monotonic_s": None, "telemetry": "", **values}
     number_types = (int, float)

@@ -22,7 +22,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from study.errors import StudyError
 from study.session.facts.fact_types import Count, Sha256
 from study.session.facts.log_chain import CHECKSUM_DIGITS, Chain, ChainBrokenError, verify_checksum
-from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
+from study.store.disk.file_errors import AlreadyExistsError, UnusableFileError
 from study.store.disk.json_document import read_json, write_json
 from study.store.sessions.event_log import LOG_NAME, LogContents, read_log
 
@@ -75,16 +75,16 @@ def write_seal(folder: Path, log_contents: LogContents) -> bool:
     )
     number = max(find_seals(folder), default=0) + 1
     path = folder / (SEAL_NAME if number == 1 else f"seal-{number}.json")
-    with suppress(AlreadyThereError):  # another program has just written the same seal
+    with suppress(AlreadyExistsError):  # another program has just written the same seal
         write_json(path, SEAL_FORMAT, SEAL_VERSION, asdict(seal))
     return True
 
 
-def seal_log(log: Path) -> None:
+def seal_log(log_path: Path) -> None:
     """Seal the log of a session that was just closed. Never raises StudyError: a seal that cannot be written now is
     written when the results of the session are written (`hapteq resume`, `hapteq analyze`)."""
     with suppress(StudyError):
-        write_seal(log.parent, read_log(log))
+        write_seal(log_path.parent, read_log(log_path))
 
 
 def read_seal(path: Path) -> Seal:
@@ -128,14 +128,14 @@ def is_sealed(folder: Path, log_bytes: bytes) -> bool:
     """Whether there is a seal, all lines are complete, and none contradicts the hash chain; events are not parsed.
     log_bytes: content of the log. Raises StudyError as `check_seals`.
     """
-    *lines, incomplete = log_bytes.split(b"\n")
+    *lines, incomplete_line = log_bytes.split(b"\n")
     chain = Chain()
     try:
         for line in lines:
             chain, _ = verify_checksum(chain, line)
     except ChainBrokenError:
         return False
-    return not incomplete and check_seals(folder, LogContents((), "", 0, chain, log_bytes)) > 0
+    return not incomplete_line and check_seals(folder, LogContents((), "", 0, chain, log_bytes)) > 0
 
 
 def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:

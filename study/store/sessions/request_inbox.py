@@ -25,31 +25,32 @@ from study.store.disk.strict_json import load_json
 REQUESTS_NAME = "requests"
 """Name of the folder of requests, inside the session's folder."""
 REQUEST_FORMAT = "hapteq-request"
+"""Name of the format, written into every request; others are not read."""
 REQUEST_VERSION = 1
-"""Format and version that every request states; others are not read."""
+"""Version of the format; others are not read."""
 
 KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
-"""Kinds of requests, by the beginning of the file's name."""
+"""Class of each kind of request, by the beginning of the file's name."""
 _STOP_PREFIX = "stop"
 """Beginning of the name of a request to stop: it counts even if its content cannot be read."""
 _NOTE_PREFIX = "note-"
 """Beginning of the name of a note: unread notes are kept from one sitting to the next."""
 _SOURCES = get_args(RequestSource)
-"""Senders that a reader accepts."""
+"""Origins of requests (`who`) that a reader accepts."""
 _MAX_REQUEST_BYTES = 1 << 16
-"""Largest number of bytes of a request that are read; a note has only a few sentences."""
+"""Largest number of bytes of a request that are read. Chosen: a note has only a few sentences."""
 _MAX_PER_CALL = 50
-"""Largest number of requests taken in one call: many requests at once must not block the session's loop."""
-_counter = itertools.count()
+"""Largest number of requests taken in one call. Chosen: many requests at once must not block the session's loop."""
+_request_counter = itertools.count()
 """Makes the names of this program's requests unique, and keeps them in order, within one tick of the clock."""
 
 
 class RequestInbox:
     """Folder of the requests to a session; implements `study.workflows.trial.requests_port.RequestPort`. Any number of
-    programs may send, only the session itself takes. session: the session's folder."""
+    programs may send, only the session itself takes. session_folder: of the session; `requests` is below it."""
 
-    def __init__(self, session: Path) -> None:
-        self._folder = session / REQUESTS_NAME
+    def __init__(self, session_folder: Path) -> None:
+        self._folder = session_folder / REQUESTS_NAME
         self._ignored_names: set[str] = set()
         """Names of files that could be neither used nor removed: they are examined once, not twenty times a second."""
 
@@ -57,7 +58,7 @@ class RequestInbox:
         """Write a request. Returns its name, for `is_unread` and `take_back`. Raises StudyError if it cannot be
         written."""
         kind = next(kind_name for kind_name, request_class in KINDS.items() if isinstance(request, request_class))
-        unique_key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
+        unique_key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_request_counter):06d}-{secrets.token_hex(4)}"
         name = f"{kind}-{unique_key}.json"
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
         temporary_path = self._folder / f".{name}.part"
@@ -118,8 +119,8 @@ class RequestInbox:
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
 
     def _take_request(self, name: str) -> Request | None:
-        """Read and remove a request. An unreadable stop counts as the experimenter's; other unreadable requests are set
-        aside."""
+        """Read and remove a request. An invalid stop counts as one of the experimenter; any other invalid request is
+        renamed to a hidden name, and None is returned."""
         request = _parse_request(_read_content(self._folder / name))
         if request is None and name.startswith(_STOP_PREFIX):
             request = StopAsked("experimenter")

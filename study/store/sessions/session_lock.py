@@ -17,7 +17,7 @@ from study.store.disk.privacy import PRIVATE_FILE
 SESSION_LOCK_NAME = "session.lock"
 """Lock file in the session's folder, held while a program writes to the session."""
 PLACES_LOCK_NAME = ".places.lock"
-"""Lock file in the data folder, held while a participant number (a place in the balanced order) is assigned."""
+"""Lock file in the data folder, held while a participant number (a place in the counterbalanced order) is assigned."""
 PLACES_LOCK_TIMEOUT_S = 20.0
 """Longest wait for the lock `PLACES_LOCK_NAME` (s). Chosen far above the duration of an assignment, which reads the
 first lines of all sessions in the folder."""

@@ -2,7 +2,9 @@
 
 The intent is a single file in the data folder, `<code>.withdrawal.json`, with all that will be erased, so that an
 interrupted withdrawal can be completed. While it exists, no session of the participant may be used as data. A
-tombstone, `withdrawn.json`, replaces the contents of a session folder and holds no measured value.
+tombstone, `withdrawn.json`, replaces the contents of a session folder and holds no measured value. Called by
+`study.workflows.session` (`withdraw_participant`, `participant_traces`, `participant_number`), and by
+`session_line` and `session_recognisers`, which describe a withdrawal that is not complete.
 """
 
 from collections.abc import Mapping
@@ -17,63 +19,65 @@ from study.store.sessions.archive import FOLDER_PATTERN, SessionFolder, locate_w
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 
 TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
+"""Name and version of the format of a tombstone."""
 WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
+"""Name and version of the format of an intent."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionParticipant:
-    """Facts on a session that its tombstone keeps: name of the protocol and place in its balanced order. Nothing
-    measured."""
+    """Participant of a withdrawn session as its tombstone states it: protocol, whether simulated, and place in the
+    counterbalanced order. It contains no measured value."""
 
     protocol: str
     simulated: bool
     """Whether a simulated participant gave the answers."""
     number: int | None
-    """Place in the balanced order, as a participant number; None if none was assigned."""
+    """Place in the counterbalanced order, as a participant number from 0; None if none was assigned."""
 
 
 @dataclass(frozen=True, slots=True)
 class WithdrawalIntent:
-    """What a withdrawal erases, determined before anything is erased."""
+    """Sessions and files that a withdrawal erases, listed before the first of them is erased."""
 
     subject: str
     """Participant code."""
     withdrawn_utc: str
     """UTC time of the withdrawal, kept when an interrupted withdrawal is continued."""
     sessions: Mapping[str, SessionParticipant | None]
-    """Facts for the tombstone, by the name of the session; None where the log does not state them."""
+    """Participant for the tombstone, by the name of the session; None where the log does not state it."""
     derived: tuple[str, ...]
     """Analyses and unfinished files with the participant's data, as paths relative to the data folder."""
 
 
-def write_intent(data: Path, intent: WithdrawalIntent) -> None:
-    """Write the intent and sync it to the disk. Raises CannotWriteError."""
-    path = locate_withdrawal_record(data, intent.subject)
+def write_intent(data_folder: Path, intent: WithdrawalIntent) -> None:
+    """Write the intent, replacing an earlier one, and sync it to the disk. Raises CannotWriteError where that fails."""
+    path = locate_withdrawal_record(data_folder, intent.subject)
     write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
 
 
-def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
-    """The intent; None if the file is missing or invalid, and its content must be determined again. Names that are not
-    sessions of the participant, or that lead out of the data folder, are dropped. Never raises."""
-    path = locate_withdrawal_record(data, subject)
+def read_intent(data_folder: Path, subject: str) -> WithdrawalIntent | None:
+    """Read the intent; None if the file is missing or invalid, so that its content must be determined again. Names that
+    are not sessions of the participant, and paths that may not be erased, are dropped. Never raises."""
+    path = locate_withdrawal_record(data_folder, subject)
     if not is_real_file(path):
         return None
     try:
         document = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
         sessions = {
-            str(name): _parse_participant(facts)
-            for name, facts in document["sessions"].items()
-            if _is_of_subject(name, subject)
+            str(name): _parse_participant(participant_document)
+            for name, participant_document in document["sessions"].items()
+            if _is_session_of_subject(name, subject)
         }
-        derived = tuple(str(name) for name in document["derived"] if _is_plain_name(str(name)))
+        derived = tuple(str(name) for name in document["derived"] if _is_erasable_path(str(name)))
         return WithdrawalIntent(subject, str(document["withdrawn_utc"]), sessions, derived)
     except (StudyError, AttributeError, KeyError, TypeError):
         return None
 
 
 def write_tombstone(folder: SessionFolder, withdrawn_utc: str, participant: SessionParticipant | None) -> None:
-    """Write the tombstone into the session's folder; an existing tombstone is kept. participant: facts on the session,
-    if they are known. Raises CannotWriteError."""
+    """Write the tombstone into the session's folder; an existing one is unchanged. participant: None if it is not
+    known. Raises CannotWriteError where it cannot be written."""
     if not is_real_file(folder.tombstone):
         document = {
             "session": folder.name,
@@ -84,7 +88,7 @@ def write_tombstone(folder: SessionFolder, withdrawn_utc: str, participant: Sess
 
 
 def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
-    """Content of the tombstone; empty if it is missing or unreadable. Never raises."""
+    """Read the content of the tombstone; empty if it is missing or unreadable. Never raises."""
     try:
         return read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION)
     except StudyError:
@@ -92,33 +96,35 @@ def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
 
 
 def read_participant(folder: SessionFolder) -> SessionParticipant | None:
-    """Facts on the session in its tombstone; None without valid ones."""
+    """Read the participant from the tombstone of a session; None where it states no valid one."""
     return _parse_participant(read_tombstone(folder).get("begun"))
 
 
-def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
+def list_remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
     """Names in the folder of a withdrawn session, except tombstone and lock; names of folders end in a slash. Empty if
     the folder cannot be read."""
     try:
-        with open_folder(folder.path) as place:
-            names = [name for name in place.list_names() if name not in (folder.tombstone.name, SESSION_LOCK_NAME)]
+        with open_folder(folder.path) as opened_folder:
+            names = [
+                name for name in opened_folder.list_names() if name not in (folder.tombstone.name, SESSION_LOCK_NAME)
+            ]
     except OSError:
         return ()
     return tuple(f"{name}/" if is_real_folder(folder.path / name) else name for name in names)
 
 
-def describe_unfinished(folder: SessionFolder) -> str:
-    """Text for the user on an incomplete withdrawal: the files that are still there, and the command that continues it.
-    Empty if the withdrawal is complete."""
-    remaining = list_remaining(folder)
-    if not remaining and folder.tombstone.exists() and not folder.withdrawal.exists():
+def describe_unfinished_withdrawal(folder: SessionFolder) -> str:
+    """Describe an incomplete withdrawal to the user: the files that still exist, and the command that continues it.
+    Empty if the withdrawal is complete: tombstone written, all else in the folder and the intent erased."""
+    remaining_entries = list_remaining_entries(folder)
+    if not remaining_entries and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
-    remaining_text = f"Still there: {', '.join(remaining)}. " if remaining else ""
+    remaining_text = f"Still there: {', '.join(remaining_entries)}. " if remaining_entries else ""
     return f"{remaining_text}Continue with: hapteq withdraw {folder.name} --data {folder.path.parent}"
 
 
 def _parse_participant(document: Any) -> SessionParticipant | None:
-    """Facts on a session from JSON; None if they are missing, or have other fields or types."""
+    """Parse a participant from a JSON value; None if it is missing, or has other fields or types."""
     try:
         participant = SessionParticipant(**document) if document else None
     except TypeError:
@@ -126,21 +132,23 @@ def _parse_participant(document: Any) -> SessionParticipant | None:
     return participant if participant is not None and _has_valid_types(asdict(participant)) else None
 
 
-def _has_valid_types(facts: Mapping[str, Any]) -> bool:
-    """Whether facts on a session from a file have the types of `SessionParticipant`."""
-    number = facts["number"]
+def _has_valid_types(values: Mapping[str, Any]) -> bool:
+    """Whether the values have the types of the fields of `SessionParticipant`, and the number is not negative."""
+    number = values["number"]
     # A bool is an int for Python, but no participant number.
     is_number = isinstance(number, int) and not isinstance(number, bool) and number >= 0
-    return isinstance(facts["protocol"], str) and isinstance(facts["simulated"], bool) and (number is None or is_number)
+    return (
+        isinstance(values["protocol"], str) and isinstance(values["simulated"], bool) and (number is None or is_number)
+    )
 
 
-def _is_of_subject(name: Any, subject: str) -> bool:
-    """Whether it is the name of a session folder of this participant."""
+def _is_session_of_subject(name: Any, subject: str) -> bool:
+    """Whether the name is that of a session folder of this participant."""
     match = FOLDER_PATTERN.fullmatch(str(name))
     return match is not None and match["subject"] == subject
 
 
-def _is_plain_name(name: str) -> bool:
+def _is_erasable_path(name: str) -> bool:
     """Whether a path stays within the data folder and outside all session folders, so that it may be erased."""
     path = PurePosixPath(name)
     if not path.parts or path.is_absolute() or ".." in path.parts:

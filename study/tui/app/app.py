@@ -23,12 +23,20 @@ from study.session.watching.requests import NoteAsked, PauseAsked
 from study.tui import home_messages
 from study.tui.app import outcomes
 from study.tui.app.archive_screens import ArchiveScreens
-from study.tui.app.engine_line import EngineConnection, EngineMessage
+from study.tui.app.engine_connection import EngineConnection, EngineMessage
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.app.start_options import StartOptions
 from study.tui.engine.from_engine import Failed, Finished
-from study.tui.engine.to_engine import AskOtherSession, BeginSession, LetGo, Relay, Resume, SessionOrder, ShowSession
+from study.tui.engine.to_engine import (
+    BeginSession,
+    ForwardRequest,
+    Interrupt,
+    Resume,
+    SendRequest,
+    SessionOrder,
+    ShowSession,
+)
 from study.tui.exit_handlers import install_exit_handlers
 from study.tui.keys.input_queue import InputQueue
 from study.tui.keys.key_names import format_key_name
@@ -180,7 +188,7 @@ class HapteqApp(App[None]):
         if self._sitting is None or self._stop_screen is not None:
             self._leave_app(ExitCode.INTERRUPTED)
             return
-        self._engine.send(LetGo())
+        self._engine.send(Interrupt())
         stop_screen = self._stop_screen = self._show_outcome(outcomes.make_stop_sent_outcome(self._words), "")
         self.set_timer(outcomes.STOP_REPLY_TIMEOUT_S, lambda: self._report_unanswered_stop(stop_screen))
 
@@ -207,11 +215,13 @@ class HapteqApp(App[None]):
 
     def action_watch(self) -> None:
         if self._sitting is not None and self._sitting.path:
-            self._watch_controller.toggle_view(self._sitting.path, lambda request: self._engine.send(Relay(request)))
+            self._watch_controller.toggle_view(
+                self._sitting.path, lambda request: self._engine.send(ForwardRequest(request))
+            )
 
     def action_pause(self) -> None:
         if self._sitting is not None:
-            self._engine.send(Relay(PauseAsked("participant")))
+            self._engine.send(ForwardRequest(PauseAsked("participant")))
 
     def action_note(self, adverse: bool) -> None:
         if self._sitting is None:
@@ -223,11 +233,11 @@ class HapteqApp(App[None]):
     def _send_note(self, note: NoteAsked | None) -> None:
         """Send a note to the engine for the session's log; None (cancelled): nothing is sent."""
         if note is not None:
-            self._engine.send(Relay(note))
+            self._engine.send(ForwardRequest(note))
             self.notify(self._words["goes_into_log"], markup=False)
 
     def on_pause_screen_note_written(self, event: Any) -> None:
-        self._engine.send(Relay(event.note))
+        self._engine.send(ForwardRequest(event.note))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Disable the actions of a sitting (watch, note, pause) outside one."""
@@ -266,7 +276,7 @@ class HapteqApp(App[None]):
 
     def on_watch_requested(self, event: home_messages.WatchRequested) -> None:
         self._watch_controller.open_after_confirmation(
-            event.path, lambda request: self._engine.send(AskOtherSession(event.path, request))
+            event.path, lambda request: self._engine.send(SendRequest(event.path, request))
         )
 
     def on_demo_screen_pause_wanted(self) -> None:

@@ -27,7 +27,7 @@ from study.tui.engine.from_engine import (
     UserNotice,
     Withdrawn,
 )
-from study.tui.engine.to_engine import Diagnose, LetGo, ShowHome, ToEngine
+from study.tui.engine.to_engine import Diagnose, Interrupt, ShowHome, ToEngine
 
 if TYPE_CHECKING:
     from study.tui.screens.diagnosing import DiagnosingScreen
@@ -94,7 +94,7 @@ class ArchiveScreens:
                 self._app.notify(sentence, markup=False)
 
     async def start_diagnosis(self, command: Diagnose) -> None:
-        """Start a diagnosis and show its progress. If the user stops it, the message `LetGo` (interrupt) is sent to the
+        """Start a diagnosis and show its progress. If the user stops it, the message `Interrupt` is sent to the
         engine."""
         from study.tui.screens.diagnosing import DiagnosingScreen
 
@@ -102,7 +102,7 @@ class ArchiveScreens:
             """Called when the screen is closed, with True if the user stopped the diagnosis."""
             self._diagnosing_screen = None
             if is_stopped:
-                self._send(LetGo())
+                self._send(Interrupt())
 
         self._send(command)
         self._diagnosing_screen = DiagnosingScreen("Getting ready.")

@@ -5,7 +5,7 @@ from study.tui.engine.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
 
 STOP_REPLY_TIMEOUT_S = 2.0
-"""Time without an answer of the engine to a stop (s) after which the panel says so."""
+"""Time without an answer of the engine to a stop (s) after which the panel states that it did not answer. Chosen."""
 
 
 def make_stop_sent_outcome(words: Words) -> Outcome:
@@ -24,11 +24,13 @@ def make_failure_outcome(failure: Failed, at_home: bool, words: Words = ENGLISH_
     """Make the panel for a failure, with "resume" where it names a session. at_home: no sitting was running, and the
     screen below continues. words: texts in the participant's language."""
     error = failure.error
-    parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
+    sections = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
     decisions: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
-    paragraphs = tuple((heading, text) for heading, text in parts if text)
+    paragraphs = tuple((heading, text) for heading, text in sections if text)
     return Outcome(
-        error.title, (*_state_addressee(words), *paragraphs), ("resume", *decisions) if failure.path else decisions
+        error.title,
+        (*_make_addressee_paragraphs(words), *paragraphs),
+        ("resume", *decisions) if failure.path else decisions,
     )
 
 
@@ -36,17 +38,17 @@ def make_completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outc
     """Make the panel for a finished session: thresholds, warnings, path of the report. words: texts in the
     participant's language."""
     results = end.results
-    parts = (
+    sections = (
         ("Thresholds", "\n".join(results.table)),
         ("To know", "\n".join(f"• {warning}" for warning in results.warnings)),
         ("Report", results.report),
     )
-    paragraphs = tuple((heading, text) for heading, text in parts if text)
+    paragraphs = tuple((heading, text) for heading, text in sections if text)
     title = f"The session is finished: {end.answers} answers"
-    return Outcome(title, (*_state_addressee(words), *paragraphs), ("look", "home", "quit"), grave=False)
+    return Outcome(title, (*_make_addressee_paragraphs(words), *paragraphs), ("look", "home", "quit"), is_problem=False)
 
 
-def _state_addressee(words: Words) -> tuple[tuple[str, str], ...]:
-    """Make the paragraph that says, in the participant's language, that the English text is for the experimenter; none
-    where the participant's language is English."""
+def _make_addressee_paragraphs(words: Words) -> tuple[tuple[str, str], ...]:
+    """Make the paragraph that states, in the participant's language, that the English text is for the experimenter;
+    none where the participant's language is English."""
     return () if words == ENGLISH_WORDS else (("", words["for_experimenter"]),)

@@ -153,7 +153,7 @@ class SittingScreens:
         was_covered = self._app.screen is not self._preparing_screen
         while self._app.screen is not self._preparing_screen and self._preparing_screen in self._app.screen_stack:
             self._app.pop_screen()
-        self._preparing_screen.say(sentence, afresh=was_covered)
+        self._preparing_screen.show_step(sentence, is_new_wait=was_covered)
 
     async def _open_request_screen(self, request: ScreenRequest) -> None:
         """Replace the screen of the previous request by that of a new request."""

@@ -15,9 +15,9 @@ from equalizer.signals.signal import FloatArray
 from study.tui.drawing.braille import Canvas
 
 LABEL_COLUMNS, DRAWING_COLUMNS, DRAWING_ROWS = 24, 54, 2
-"""Width of the label, and width and height of the drawing, in characters."""
+"""Width of the label, and width and height of the drawing, in characters. Chosen."""
 _SHOWN_DECADES = 4.0
-"""Range of amplitudes that a spectrum shows, in decades below its maximum."""
+"""Range of amplitudes that a spectrum shows, in decades below its maximum. Chosen."""
 
 
 def draw_time_series(channel: Channel) -> Iterable[str]:
@@ -64,6 +64,7 @@ def draw_spectra(overview: Overview) -> Iterable[str]:
         if channel.role not in ("command", "response") or power_density.max() <= 0:
             continue
         canvas = Canvas(DRAWING_COLUMNS, DRAWING_ROWS)
+        # The factor 1.001 includes the highest frequency in the last column.
         edges_hz = np.geomspace(frequency_hz[0], frequency_hz[-1] * 1.001, canvas.width + 1)
         for x, (start_hz, stop_hz) in enumerate(itertools.pairwise(edges_hz)):
             # The largest line within the column; where low frequencies have none, interpolate between lines.
@@ -73,7 +74,8 @@ def draw_spectra(overview: Overview) -> Iterable[str]:
                 if column_density.size
                 else float(np.interp(start_hz, frequency_hz, power_density))
             )
-            # Distance below the maximum over the range; 0.5 log10 of a power ratio is log10 of the amplitude ratio.
+            # Distance below the maximum over the range; 0.5 log10 of a power ratio is log10 of the amplitude ratio. The
+            # bound 1e-99 avoids the logarithm of 0.
             depth = -0.5 * np.log10(max(peak_density / power_density.max(), 1e-99)) / _SHOWN_DECADES
             if depth <= 1:
                 canvas.draw_line((x, round(depth * (canvas.height - 1))), (x, canvas.height - 1))

@@ -68,14 +68,14 @@ class Engine:
 
     def _await_command(self) -> Command | None:
         """Import modules in advance, then wait for the next command; None after the end of the screen's process."""
-        if not self._link.command_waits:
+        if not self._link.has_waiting_command:
             self._import_in_advance()
         return self._link.wait_for_command()
 
     def _import_in_advance(self) -> None:
         """Import modules in advance, skipping the rest once a command waits."""
         for module_name in ("study.tui.engine.engine_commands", *SESSION_MODULES, *ANALYSIS_MODULES):
-            if not self._link.command_waits:
+            if not self._link.has_waiting_command:
                 import_module(module_name)
 
     def _perform(self, command: Command) -> None:

@@ -43,17 +43,17 @@ from study.tui.engine.remote_display import RemoteDisplay
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import (
     Analyze,
-    AskOtherSession,
     BeginSession,
     CalibrateSensor,
     Command,
     Diagnose,
-    KeepSensor,
     Resume,
+    SendRequest,
     SessionOrder,
     ShowDiagnosis,
     ShowHome,
     ShowSession,
+    StoreCalibration,
     Withdraw,
 )
 from study.workflows.results.fold_session import fold_session
@@ -69,7 +69,7 @@ from study.workflows.views.view_home import describe_model_quality, make_home_vi
 from study.workflows.views.view_session import make_session_view
 
 REPLY_POLL_S = 0.5
-"""Longest single wait (s) for a reply; between two waits an interruption takes effect."""
+"""Longest single wait (s) for a reply. Chosen: between two waits an interruption takes effect."""
 
 CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it again.", "Nothing was written.")
 """Error of a calibration that the user stopped."""
@@ -88,7 +88,7 @@ class EngineCommands:
         """Perform one command. Raises StudyError where it fails, KeyboardInterrupt where the user interrupts."""
         self.session_folder = None
         # An interruption that came after the command was sent, but before it was begun, takes effect here.
-        if self._link.taken_is_let_go:
+        if self._link.is_taken_command_interrupted:
             raise KeyboardInterrupt
         match command:
             case ShowHome() | ShowSession() | ShowDiagnosis():
@@ -105,13 +105,13 @@ class EngineCommands:
                 self._withdraw(SessionFolder(Path(session)))
             case Diagnose():
                 self._diagnose(command)
-            case CalibrateSensor() | KeepSensor():
+            case CalibrateSensor() | StoreCalibration():
                 self._calibrate(command)
-            case AskOtherSession(session=session, request=request):
+            case SendRequest(session=session, request=request):
                 send_request(SessionFolder(Path(session)), request, self._clock)
 
     def _begin_session(self, order: SessionOrder) -> None:
-        """Plan and conduct a new session."""
+        """Plan and conduct a new session. Notes of the plan are shown to the user."""
         model = Path(order.model) if order.model else None
         plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
         for note in plan.notes:
@@ -203,15 +203,20 @@ class EngineCommands:
         self._link.send(DiagnosisProgress("getting ready", 0.0))
         sources = tuple(Path(source) for source in command.sources)
         out_folder = Path(command.out) if command.out else choose_result_folder(sources[0])
-        model, clean = Path(command.model) if command.model else None, tuple(Path(path) for path in command.clean)
-        plan = DiagnosePlan(sources, out_folder, model, clean=clean)
-        document_path = diagnose_at_screen(plan, lambda step, share: self._link.send(DiagnosisProgress(step, share)))
+        model, reference_recordings = (
+            Path(command.model) if command.model else None,
+            tuple(Path(path) for path in command.clean),
+        )
+        plan = DiagnosePlan(sources, out_folder, model, clean=reference_recordings)
+        document_path = diagnose_at_screen(
+            plan, lambda step, fraction: self._link.send(DiagnosisProgress(step, fraction))
+        )
         self._link.send(_read_diagnosis(document_path))
 
-    def _calibrate(self, command: CalibrateSensor | KeepSensor) -> None:
+    def _calibrate(self, command: CalibrateSensor | StoreCalibration) -> None:
         """Calibrate the accelerometer with instructions on the screen, or store a calibration. Raises
         CALIBRATION_STOPPED where the user interrupts."""
-        if isinstance(command, KeepSensor):
+        if isinstance(command, StoreCalibration):
             self._link.send(CalibrationStored(str(save_accelerometer_calibration(command.table))))
             return
         request_numbers = itertools.count(1)

@@ -1,6 +1,6 @@
 """The engine's end of the pipe to the screen. Used by `engine`, `engine_commands` and `remote_display`.
 
-A thread reads all messages while the main thread runs a session, so that Ctrl-C at the screen takes the force off at
+A thread reads all messages while the main thread runs a session, so that Ctrl-C at the screen switches the force off at
 once. It sorts messages into commands, replies and requests, and detects that the screen's process has ended.
 """
 
@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 
 from study.tui.engine.from_engine import FromEngine
-from study.tui.engine.to_engine import Command, Heartbeat, LetGo, Relay, Reply, ToEngine
+from study.tui.engine.to_engine import Command, ForwardRequest, Heartbeat, Interrupt, Reply, ToEngine
 from study.workflows.trial.requests_port import QueuedRequests
 
 
@@ -27,7 +27,7 @@ class ScreenLink:
         self, connection: Connection, interrupt: Callable[[], None], on_screen_ended: Callable[[], None]
     ) -> None:
         self._commands: SimpleQueue[Command | None] = SimpleQueue()
-        self._received_count, self._taken_count, self._let_go_up_to = 0, 0, 0
+        self._received_count, self._taken_count, self._interrupted_count = 0, 0, 0
         """Numbers of commands received, taken by the main thread, and received before the last interruption. They are
         needed because an interrupted command may not have been begun or taken yet."""
         self.requests = QueuedRequests()
@@ -63,14 +63,14 @@ class ScreenLink:
         return command
 
     @property
-    def command_waits(self) -> bool:
+    def has_waiting_command(self) -> bool:
         """Whether a received command waits to be taken."""
         return not self._commands.empty()
 
     @property
-    def taken_is_let_go(self) -> bool:
-        """Whether the user interrupted (`LetGo`) after sending the command that was taken last."""
-        return self._taken_count <= self._let_go_up_to
+    def is_taken_command_interrupted(self) -> bool:
+        """Whether the user interrupted (`Interrupt`) after sending the command that was taken last."""
+        return self._taken_count <= self._interrupted_count
 
     def wait_for_reply(self, timeout_s: float) -> Reply | None:
         """Wait for the next reply, of any number; None if no reply came within `timeout_s` (s). Raises
@@ -92,44 +92,45 @@ class ScreenLink:
         return time.monotonic() - self._last_message_s
 
     def _listen(self) -> None:
-        """Read messages until the pipe is closed; then take the force off and end the engine. Runs in a thread."""
+        """Read messages until the pipe is closed or a message cannot be read; then switch the force off and end the
+        engine. Runs in a thread."""
         try:
             while True:
                 self._handle_message(self._connection.recv())
         except (EOFError, OSError):
             pass
-        except Exception:  # noqa: BLE001 - an engine that understands nothing any more must not go on
+        except Exception:  # noqa: BLE001 - an engine that cannot read messages must not continue
             traceback.print_exc()
         finally:
             self.ended = True
             self._commands.put(None)
             try:
-                self._let_go()
+                self._interrupt_command()
             finally:
                 self._on_screen_ended()
 
     def _handle_message(self, message: ToEngine) -> None:
-        """Put a message into the queue of its kind, pass a request to the session (`Relay`), or interrupt at once
-        (`LetGo`)."""
-        # Any message shows that the screen is alive; heartbeats are only the regular ones.
+        """Put a message into the queue of its kind, pass a request to the session (`ForwardRequest`), or interrupt at
+        once (`Interrupt`)."""
+        # Any message shows that the screen's event loop runs, not only the heartbeat.
         self._last_message_s = time.monotonic()
         match message:
             case Heartbeat():
                 return
             case Reply():
                 self._replies.put(message)
-            case Relay(request=request):
+            case ForwardRequest(request=request):
                 self.requests.send(request)
-            case LetGo():
-                self._let_go()
+            case Interrupt():
+                self._interrupt_command()
             case _:
                 self._received_count += 1
                 self._commands.put(message)
 
-    def _let_go(self) -> None:
-        """Interrupt the current command and take the force off. The interrupted main thread takes it off too, but it
-        may be waiting for a disk or a driver."""
-        self._let_go_up_to = self._received_count
+    def _interrupt_command(self) -> None:
+        """Interrupt the current command and switch the force off. The interrupted main thread switches it off too, but
+        it may be waiting for a disk or a driver."""
+        self._interrupted_count = self._received_count
         self._interrupt()
         if (stop := self.stop_device) is not None:
             stop()

@@ -1,7 +1,8 @@
 """Messages from the screen's process to the engine process, sent pickled through the pipe.
 
-They are plain values, and the module imports nothing heavy, so that the first frame appears soon. `from_engine` holds
-the messages of the other direction.
+They are plain values, and the module imports no slow module, so that the first frame appears soon. `from_engine` has
+the messages of the other direction. The application (`study.tui.app`) and its screens send them; `screen_link` receives
+them, and `engine_commands` performs the commands.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from study.session.watching.requests import Request
 
 @dataclass(frozen=True, slots=True)
 class SessionOrder:
-    """Everything that determines a new session."""
+    """Parameters of a new session."""
 
     protocol: str
     """Name of a shipped protocol, or path of a protocol file."""
@@ -35,9 +36,11 @@ class ShowHome:
     data: str
     """Path of the data folder."""
     protocol: str = ""
-    """Protocol that is listed first; empty for none. The same holds for device and model."""
+    """Protocol that is listed first; empty for none."""
     device: str = ""
+    """Device that is listed first; empty for none."""
     model: str = ""
+    """Model that is listed first; empty for none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,9 @@ class Resume:
     session: str
     """Path of its folder, or its name in the data folder."""
     device: str
+    """Name of the device."""
     data: str
+    """Path of the data folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +96,7 @@ class Withdraw:
 
 @dataclass(frozen=True, slots=True)
 class Diagnose:
-    """Diagnose recordings against a model, write the results and show them. `LetGo` interrupts the diagnosis."""
+    """Diagnose recordings against a model, write the results and show them. `Interrupt` interrupts the diagnosis."""
 
     sources: tuple[str, ...]
     """Paths of recordings, or of one session folder."""
@@ -106,7 +111,7 @@ class Diagnose:
 @dataclass(frozen=True, slots=True)
 class CalibrateSensor:
     """Calibrate the accelerometer under gravity in six positions; the engine requests each by
-    `PlacementRequest`. `LetGo` interrupts the calibration."""
+    `PlacementRequest`. `Interrupt` interrupts the calibration."""
 
     port: str
     """Name of the serial port."""
@@ -115,7 +120,7 @@ class CalibrateSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class KeepSensor:
+class StoreCalibration:
     """Store a calibration in the lab's file."""
 
     table: str
@@ -123,7 +128,7 @@ class KeepSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class AskOtherSession:
+class SendRequest:
     """Send a request to a session that runs in another program."""
 
     session: str
@@ -132,16 +137,16 @@ class AskOtherSession:
 
 
 @dataclass(frozen=True, slots=True)
-class Relay:
+class ForwardRequest:
     """Send a request (a note, a pause or a stop) to the session that runs in this engine."""
 
     request: Request
 
 
 @dataclass(frozen=True, slots=True)
-class LetGo:
-    """Ctrl-C: take the force off at once, in any state of the engine, and interrupt the current command. An interrupted
-    session can be resumed."""
+class Interrupt:
+    """Switch the force off at once, in any state of the engine, and interrupt the current command (Ctrl-C). An
+    interrupted session can be resumed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +160,9 @@ class Reply:
     ignored."""
 
     number: int
+    """Number of the request."""
     value: Any
-    """Return value of the method of the display port."""
+    """Return value of the method of the display port; true for a `PlacementRequest`, when the sensor was placed."""
 
 
 Command = (
@@ -169,10 +175,10 @@ Command = (
     | Withdraw
     | Diagnose
     | CalibrateSensor
-    | KeepSensor
-    | AskOtherSession
+    | StoreCalibration
+    | SendRequest
 )
 """Messages that the engine performs one after another."""
 
-ToEngine = Command | Relay | LetGo | Heartbeat | Reply
+ToEngine = Command | ForwardRequest | Interrupt | Heartbeat | Reply
 """Any message from the screen."""

@@ -20,8 +20,8 @@ from study.tui.keys.key_presses import get_arrival_time_s
 IMMEDIATE_KEYS = ("ctrl+c", "ctrl+q", "ctrl+z")
 """Keys that are never queued or ignored: Ctrl-C and Ctrl-Q switch the force off, Ctrl-Z suspends the program."""
 SETTLE_PASSES = 3
-"""Number of passes through the message queues until the effects of a key are complete: the key, the message that it
-causes, and what the handler of that message posts."""
+"""Number of passes through the message queues until the effects of a key are complete: one each for the key, for the
+message that it causes, and for the messages that the handler of that message posts."""
 MAX_SETTLE_S = 1.0
 """Longest wait for the effects of an event (s). Chosen: a widget that is busy longer does not delay further keys."""
 

@@ -45,7 +45,7 @@ class LineInput:
         return not self._has_line_left()
 
     def discard_early_lines(self) -> None:
-        """Discard what was typed at a terminal before this call. Lines of a pipe are kept."""
+        """Discard all input typed at a terminal before this call, complete lines included. Lines of a pipe are kept."""
         if not self.is_interactive:
             return
         import termios
@@ -54,10 +54,11 @@ class LineInput:
         self._buffer = b""
 
     def _read_available(self) -> bool:
-        """Read up to 4096 available bytes into the buffer. Returns False at the end of the input."""
-        data = os.read(self._descriptor, 4096)
-        self._has_reached_end = not data
-        self._buffer += data
+        """Read available bytes into the buffer, at most 4096 per call (chosen). Returns False at the end of the
+        input."""
+        received_bytes = os.read(self._descriptor, 4096)
+        self._has_reached_end = not received_bytes
+        self._buffer += received_bytes
         return not self._has_reached_end
 
     def _has_line_left(self) -> bool:

@@ -31,7 +31,7 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.line_mode.conversation import Conversation
 from study.tui.line_mode.line_input import LineInput
-from study.tui.trial_words import choose_run_text, describe_progress, describe_refusal, describe_void_trial
+from study.tui.trial_words import choose_run_key, describe_progress, describe_refusal, describe_void_trial
 from study.workflows.trial.display import SignOfLife
 
 
@@ -82,7 +82,7 @@ class PlainDisplay:
         return plain_demo.await_handle(look, self._conversation, sign_of_life)
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        current_run = (choose_run_text(question), question.run_number)
+        current_run = (choose_run_key(question), question.run_number)
         if question.progress is not None and current_run != self._announced_run:
             self._conversation.say("", describe_progress(question.progress, self._words))
             self._announced_run = current_run

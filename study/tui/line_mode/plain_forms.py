@@ -2,7 +2,7 @@
 
 from protocols.wording.words import Words
 from study.session.views.form_entry import CONFIRMED_KINDS
-from study.session.views.form_views import Form, FormField, FormReply, has_answer
+from study.session.views.form_views import Form, FormField, FormReply, is_valid_answer
 from study.session.views.participant_views import DeviceReport
 from study.tui.line_mode.conversation import Conversation, Line, quote_line, remove_control_characters
 from study.tui.trial_words import describe_form_origin, describe_number_limits
@@ -36,7 +36,7 @@ def ask_form(form: Form, conversation: Conversation) -> FormReply:
 
 
 def _confirm_changes(form: Form, answers: dict[str, str], conversation: Conversation) -> bool:
-    """Show all answers after a change. True if they are confirmed; False if the form shall be asked again."""
+    """Show all answers after a change. Returns True if they are confirmed; False if the form is to be asked again."""
     conversation.discard_early_lines()
     text = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
     words = conversation.words
@@ -51,8 +51,8 @@ def _confirm_changes(form: Form, answers: dict[str, str], conversation: Conversa
 
 
 def show_device_check(report: DeviceReport, conversation: Conversation) -> bool:
-    """Write the findings of the device check, and ask how to go on. Returns True to continue, False to check again.
-    Raises KeyboardInterrupt when the participant leaves."""
+    """Write the findings of the device check, and ask how to continue. Returns True for Enter (continue), False for c
+    (check again). Raises KeyboardInterrupt when the participant leaves."""
     conversation.discard_early_lines()
     words = conversation.words
     simulation_text = f" {words['simulation']}" if report.simulated else ""
@@ -99,20 +99,20 @@ def _ask_field(field: FormField, field_position: tuple[int, int], conversation: 
 
 
 def _parse_answer(field: FormField, line: Line, is_numbered: bool) -> str | None:
-    """The answer in a line; None if the line is no valid answer to this field. is_numbered: choices may be given by
-    their number."""
+    """Parse the answer in a line; None if the line is no valid answer to this field. A choice is given by its text, by
+    first letters that no other choice has or, where is_numbered, by its number."""
     text = remove_control_characters(line.text)
     if not text:
         return None if field.needed else ""
     if not field.choices:
-        is_valid = line.word not in (BACK, "q") and has_answer(field, text)
+        is_valid = line.word not in (BACK, "q") and is_valid_answer(field, text)
         return text if is_valid else None
     if is_numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
     matching_choices = [choice for choice in field.choices if choice.casefold() == text.casefold()]
     if not matching_choices and line.word in (BACK, "q"):
         return None  # a command, also where a choice begins with this letter
-    # As on the screen, the first letters of a choice suffice if no other choice has them: y for yes.
+    # As in the form of the screen, first letters suffice where a single choice has them: y for yes.
     matching_choices = matching_choices or [
         choice for choice in field.choices if choice.casefold().startswith(text.casefold())
     ]

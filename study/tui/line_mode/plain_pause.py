@@ -13,7 +13,7 @@ from study.tui.trial_words import describe_progress
 from study.workflows.trial.display import SignOfLife
 
 COUNTDOWN_INTERVAL_S = 10.0
-"""Interval at which the remaining time is written (s)."""
+"""Interval at which the remaining time of a rest is written (s). Chosen."""
 
 
 def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignOfLife) -> float:

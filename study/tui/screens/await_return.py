@@ -1,4 +1,5 @@
-"""Screen after a void trial: it gives the reason, and no stimulus is played until the participant presses Enter."""
+"""Screen after a void trial: it gives the reason, and no stimulus is played until the participant presses Enter. Opened
+by `study.tui.app.sitting_screens`."""
 
 from typing import ClassVar
 

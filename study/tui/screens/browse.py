@@ -38,6 +38,7 @@ class HapteqFiles(DirectoryTree):
     out."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
+        """Select the paths that the tree shows; called by Textual for the entries of a folder."""
         return [path for path in paths if not path.name.startswith(".") and (_is_openable(path) or path.is_dir())]
 
 
@@ -108,7 +109,7 @@ class BrowseScreen(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _open_path(self, path: Path) -> None:
-        """Request to show the session of a log, or any other file as a diagnosis, and close the dialog."""
+        """Post the request to show the session of a log, or any other file as a diagnosis, and close the dialog."""
         command = ShowSession(str(path.parent)) if path.name == LOG_NAME else ShowDiagnosis(str(path))
         self.app.post_message(CommandRequested(command))
         dismiss_screen(self, None)

@@ -1,7 +1,8 @@
 """Screen of the labelled demonstration before the trials, in which a participant feels each direction of motion.
 
 The participant plays both directions at each vibration frequency as often as wanted, with the labels shown, and so
-learns what the answers of the later trials mean. The screen returns one choice at a time; the session plays it.
+learns what the answers of the later trials mean. The screen returns one choice at a time; the session plays it. Opened
+by `study.tui.app.sitting_screens`.
 """
 
 from typing import ClassVar
@@ -24,7 +25,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class DemoScreen(TranslatedScreen[DemoChoice]):
-    """Shows both directions at the selected vibration, and which of them were felt already.
+    """Shows both directions at the selected vibration, and which of them were played already.
 
     Keys: 1 and 2 (or other answer keys) play a direction, the arrow keys, b and n select a slower or faster vibration,
     p pauses, Enter ends. Dismissed with PlayDemo or DemoDone.
@@ -56,7 +57,8 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         self._menu = menu
         self._keys = keys
         self._vibration = menu.vibration
-        self._asked = False
+        # Whether Enter was pressed before all stimuli were played, so that the next Enter ends.
+        self._has_asked_to_confirm = False
 
     def compose(self) -> ComposeResult:
         yield LiteralText(id="title")
@@ -69,7 +71,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show(self.words.fill("demo_how", {"keys": self._keys.describe_keys(self.words)}))
+        self._redraw(self.words.fill("demo_how", {"keys": self._keys.describe_keys(self.words)}))
 
     def on_key(self, event: Key) -> None:
         """Dismiss with the direction to play if an answer key was pressed."""
@@ -79,45 +81,48 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
             dismiss_screen(self, PlayDemo(self._vibration, answer))
 
     def action_heard(self, answer: int) -> None:
-        """Does nothing: the binding exists for its entry in the footer; `on_key` handles the answers."""
+        """Do nothing: the binding exists for its entry in the footer; `on_key` handles the answers."""
 
     def action_turn(self, step: int) -> None:
         """Select the next slower (-1) or faster (1) vibration; at the end of the range, say so."""
         vibration = self._vibration + step
         if vibration < 1:
-            self._show(self.words["demo_slowest"])
+            self._redraw(self.words["demo_slowest"])
         elif vibration > self._menu.vibrations:
-            self._show(self.words["demo_fastest"])
+            self._redraw(self.words["demo_fastest"])
         else:
             self._vibration = vibration
-            self._show(describe_felt_directions(self._menu, self._vibration, self.words))
+            self._redraw(describe_felt_directions(self._menu, self._vibration, self.words))
 
     def action_pause(self) -> None:
         """Ask the application for a pause."""
         self.post_message(self.PauseWanted())
 
     def action_done(self) -> None:
-        """End the demonstration. If a stimulus was not felt yet, Enter must be pressed twice: it is often pressed by
-        habit."""
-        unfelt = 2 * self._menu.vibrations - len(set(self._menu.played_pairs))
-        if unfelt and not self._asked:
-            self._asked = True
-            self._show(self.words.fill("demo_unfelt", {"unfelt": unfelt, "all": 2 * self._menu.vibrations}))
+        """End the demonstration. If a stimulus was not played yet, Enter must be pressed twice, because it is often
+        pressed by habit."""
+        unfelt_count = 2 * self._menu.vibrations - len(set(self._menu.played_pairs))
+        if unfelt_count and not self._has_asked_to_confirm:
+            self._has_asked_to_confirm = True
+            self._redraw(self.words.fill("demo_unfelt", {"unfelt": unfelt_count, "all": 2 * self._menu.vibrations}))
             return
         dismiss_screen(self, DemoDone())
 
-    def _show(self, sentence: str) -> None:
+    def _redraw(self, sentence: str) -> None:
         """Redraw title, steps and panels for the selected vibration, with a sentence below."""
         menu = self._menu
         self.query_one("#title", LiteralText).update(
             self.words.fill("demo_title", {"vibration": self._vibration, "vibrations": menu.vibrations})
         )
-        self.query_one("#steps", LiteralText).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
+        self.query_one("#steps", LiteralText).update(
+            "  ".join(self._format_step(vibration_index + 1) for vibration_index in range(menu.vibrations))
+        )
         for panel in self.query(DirectionPanel):
             panel.mark = "felt" if (self._vibration, panel.number) in menu.played_pairs else ""
         self.query_one("#message", LiteralText).update(sentence)
 
-    def _step(self, vibration: int) -> str:
-        """One vibration in the row of steps: its number, a mark per direction felt, brackets if selected."""
-        ticks = "".join("✓" if (vibration, number) in self._menu.played_pairs else "·" for number in (1, 2))
-        return f"[{vibration} {ticks}]" if vibration == self._vibration else f" {vibration} {ticks} "
+    def _format_step(self, vibration: int) -> str:
+        """Format a vibration for the row of steps: its number and, for each direction, whether it was played (✓); in
+        brackets if it is selected."""
+        marks = "".join("✓" if (vibration, number) in self._menu.played_pairs else "·" for number in (1, 2))
+        return f"[{vibration} {marks}]" if vibration == self._vibration else f" {vibration} {marks} "

@@ -89,8 +89,8 @@ class DiagnoseForm(ModalScreen[None]):
 
     @on(Input.Submitted)
     def action_begin(self) -> None:
-        """Check the paths; post the request and close the form, or show the first problem and focus its field. That the
-        folder of the results is new is checked by the diagnosis."""
+        """Check the paths; post the request and close the form, or show the first problem and focus its field. The
+        diagnosis itself checks that the folder of the results is new."""
         paths_by_field: dict[str, tuple[str, ...]] = {}
         for field in ("sources", "clean"):
             try:
@@ -104,7 +104,7 @@ class DiagnoseForm(ModalScreen[None]):
         model, out_folder = (
             str(Path(text).expanduser()) if (text := self._read_field(name)) else "" for name in ("model", "out")
         )
-        missing = next(
+        missing_entry = next(
             (
                 (field_name, path)
                 for field_name, paths in paths_by_field.items()
@@ -115,8 +115,8 @@ class DiagnoseForm(ModalScreen[None]):
         )
         if not sources:
             self._show_message("Name a recording, or the folder of a session.", "sources")
-        elif missing is not None:
-            self._show_message(f"There is nothing at {missing[1]}.", missing[0])
+        elif missing_entry is not None:
+            self._show_message(f"There is nothing at {missing_entry[1]}.", missing_entry[0])
         elif model and not Path(model).is_file():
             self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:

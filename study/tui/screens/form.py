@@ -206,7 +206,7 @@ class FormScreen(TranslatedScreen[FormReply]):
     def _show(self, entry: FormEntry) -> None:
         """Draw the state: answers, cursor, number of open questions, message and footer."""
         for index, question in enumerate(self.query(FormQuestion)):
-            question.show(entry.field_entries[index], at=index == entry.cursor)
+            question.show(entry.field_entries[index], is_current=index == entry.cursor)
         button = self.query_one(Button)
         button.set_class(entry.field is None, "-at")
         if entry.field is None:

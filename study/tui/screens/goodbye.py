@@ -1,4 +1,4 @@
-"""Last screen of a sitting: how it ended, and how many answers are saved."""
+"""Last screen of a sitting: how it ended, and how many answers are saved. Opened by `study.tui.app.sitting_screens`."""
 
 from typing import ClassVar
 
@@ -37,7 +37,7 @@ class GoodbyeScreen(TranslatedScreen[None]):
             elif notice.finished:
                 yield LiteralText(words["end_last_trial"], classes="strong")
             else:
-                yield LiteralText(_stops(notice.reason, words), classes="strong")
+                yield LiteralText(_describe_stop(notice.reason, words), classes="strong")
             if notice.answers:
                 yield LiteralText(words.fill_count("saved", notice.answers), classes="gap")
             if notice.answers and not notice.finished:
@@ -50,6 +50,6 @@ class GoodbyeScreen(TranslatedScreen[None]):
         dismiss_screen(self, None)
 
 
-def _stops(reason: str, words: Words) -> str:
-    """Sentence on a sitting that stopped before the session was finished, with the reason if there is one."""
+def _describe_stop(reason: str, words: Words) -> str:
+    """Describe a sitting that stopped before the session was finished, with the reason if there is one."""
     return words.fill("end_stops_because", {"reason": words.translate_fact(reason)}) if reason else words["end_stops"]

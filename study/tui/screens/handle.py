@@ -1,4 +1,5 @@
-"""Screen before a trial: it shows where the handle is, and where the participant must move it."""
+"""Screen before a trial: it shows where the handle is, and where the participant must move it. Opened and updated by
+`study.tui.app.sitting_screens`."""
 
 from typing import ClassVar
 

@@ -1,6 +1,7 @@
 """The start screen: a form to begin a new session, and the list of past sessions.
 
-It appears before the engine has read the list of sessions, which is filled in later (`HomeScreen.show`).
+It appears before the engine has read the list of sessions, which is filled in later (`HomeScreen.show`). Opened by
+`study.tui.app.archive_screens`.
 """
 
 from typing import ClassVar
@@ -21,10 +22,10 @@ from study.tui.session_status import describe_session
 from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
 
-LOOKING = "Looking for sessions…"
-"""Shown until the list of sessions is loaded."""
+LOADING_TEXT = "Looking for sessions…"
+"""Text that is shown until the list of sessions is loaded."""
 
-EMPTY = """\
+EMPTY_LIST_TEXT = """\
 No sessions here yet. To begin with:
 
 1  Try it as a participant would: type the code P00 and press F5.
@@ -38,9 +39,9 @@ No sessions here yet. To begin with:
 
 F1 explains this screen.\
 """
-"""Shown in place of an empty list."""
+"""Text that is shown in place of an empty list of sessions."""
 
-GUIDE = """\
+GUIDE_TEXT = """\
 [b]A study day[/b]
 
 1  Is the device fit? [b]hapteq doctor[/b]
@@ -58,7 +59,7 @@ GUIDE = """\
 ✕  withdrawn: the data were erased
 !  unreadable: Enter says why
 """
-"""Shown below the form if the terminal has at least 120 columns."""
+"""Text that is shown below the form if the terminal has at least 120 columns."""
 
 HELP = """\
 # The start
@@ -132,27 +133,28 @@ class HomeScreen(Screen[None]):
         with Container(id="body"):
             with Vertical(id="left"):
                 yield NewSessionForm(id="new")
-                yield Static(GUIDE, id="guide")
+                yield Static(GUIDE_TEXT, id="guide")
             with Vertical(id="past") as past:
                 past.border_title = "Sessions"
                 yield SessionTable(id="sessions")
                 with VerticalScroll(id="empty"):
-                    yield Static(EMPTY)
-                yield Static(LOOKING, id="detail", markup=False)
+                    yield Static(EMPTY_LIST_TEXT)
+                yield Static(LOADING_TEXT, id="detail", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
         self.query_one("#code", Input).focus()
         if self._home is not None:
-            self._show(self._home)
+            self._show_content(self._home)
 
     def show(self, home: HomeView) -> None:
-        """Show new content; the user's entries in the form are kept. May be called before the first frame."""
+        """Show new content; the user's entries in the form are kept. Before the first frame, the content is only
+        stored, and shown with that frame."""
         self._home = home
         if self.query("#name"):
-            self._show(home)
+            self._show_content(home)
 
-    def _show(self, home: HomeView) -> None:
+    def _show_content(self, home: HomeView) -> None:
         """Fill form and list, or show the hints for an empty list."""
         self.query_one("#name", Static).update(f"hapteq   force-direction studies   data: {home.data}")
         self.query_one(NewSessionForm).show(home)
@@ -170,7 +172,8 @@ class HomeScreen(Screen[None]):
             table.focus()
 
     @on(SessionTable.CursorMoved)
-    def _describe(self, event: SessionTable.CursorMoved) -> None:
+    def _show_session_description(self, event: SessionTable.CursorMoved) -> None:
+        """Describe the session under the cursor below the list."""
         self.query_one("#detail", Static).update(describe_session(event.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
@@ -195,5 +198,5 @@ class HomeScreen(Screen[None]):
         self.app.push_screen(SensorScreen())
 
     def action_look_again(self) -> None:
-        self.query_one("#detail", Static).update(LOOKING)
+        self.query_one("#detail", Static).update(LOADING_TEXT)
         self.post_message(HomeRequested())

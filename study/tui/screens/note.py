@@ -1,6 +1,7 @@
 """Dialog to write a note into the session's log, or to report an adverse event such as pain.
 
-Each note states its writer (participant or experimenter); a report of an adverse event is marked as such.
+Each note states its writer (participant or experimenter); a report of an adverse event is marked as such. Opened by the
+application (`study.tui.app.app`, for the experimenter) and by the pause screen (`pause`, for the participant).
 """
 
 from typing import ClassVar
@@ -21,7 +22,7 @@ from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
 MAX_NOTE_CHARACTERS = 500
-"""Maximum length of a note: a few sentences, so that a line of the log stays readable."""
+"""Maximum length of a note. Chosen: a few sentences, so that a line of the log stays readable."""
 WRITERS: tuple[RequestSource, ...] = ("participant", "experimenter")
 """Writers among whom the dialog lets the user choose, in this order."""
 
@@ -29,7 +30,8 @@ WRITERS: tuple[RequestSource, ...] = ("participant", "experimenter")
 class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
     """Fields for the text, its writer, and whether it reports an adverse event.
 
-    Ctrl-S or the button writes the note, Esc cancels. Dismissed with the note (NoteAsked), or with None after a cancel.
+    Ctrl-S or the button writes the note, Esc cancels. Dismissed with the note (NoteAsked), or with None after Esc.
+    adverse, writer: initial choices; a writer that is not in `WRITERS` selects none.
     """
 
     PAGE = "help_note"
@@ -76,15 +78,17 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
     def action_save(self) -> None:
         """Dismiss with the note; refuse an empty or too long text, and a note without a writer."""
         text = " ".join(self.query_one(TextArea).text.split())
-        writer = self.query_one("#who", ChoiceRow).chosen
+        writer_index = self.query_one("#who", ChoiceRow).chosen
         if not text:
             self._refuse(self.words["note_empty"])
         elif len(text) > MAX_NOTE_CHARACTERS:
             self._refuse(self.words.fill("note_long", {"most": MAX_NOTE_CHARACTERS, "count": len(text)}))
-        elif writer is None:
+        elif writer_index is None:
             self._refuse(self.words["note_no_writer"])
         else:
-            dismiss_screen(self, NoteAsked(WRITERS[writer], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
+            dismiss_screen(
+                self, NoteAsked(WRITERS[writer_index], text, self.query_one("#adverse", ChoiceRow).chosen == 1)
+            )
 
     def action_leave(self) -> None:
         """Dismiss without a note."""

@@ -53,6 +53,7 @@ class NotePrompt(ModalScreen[str | None]):
         dismiss_screen(self, event.value.strip() or None)
 
     def action_stop(self) -> None:
+        """Stop the session; the dialog stays open."""
         self._stop()
 
     def action_leave(self) -> None:

@@ -1,4 +1,7 @@
-"""Panel at the end: what happened, what was saved, and the possible next steps with their keys."""
+"""Panel after a sitting, a stop or a failure: what happened, what was saved, and the next steps with their keys.
+
+Opened by `study.tui.app.app`; `study.tui.app.outcomes` makes the content.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ KEYS: dict[Decision, tuple[str, str]] = {
     "quit": ("q", "Leave hapteq"),
     "back": ("enter", "Back"),
 }
-"""Key of each next step, and its words."""
+"""Key of each next step (Textual's name), and its description."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,19 +47,19 @@ class Outcome:
     """Content of the panel: a title, paragraphs, and the possible next steps."""
 
     title: str
-    parts: tuple[tuple[str, str], ...]
-    """(heading, text); a heading may be empty."""
+    paragraphs: tuple[tuple[str, str], ...]
+    """(heading, text) of each paragraph; a heading may be empty."""
     decisions: tuple[Decision, ...]
     """Possible next steps, in this order."""
-    grave: bool = True
-    """False for good news."""
+    is_problem: bool = True
+    """Whether the panel reports a stop or a failure: red border, "!" before the title."""
     words: Words = ENGLISH_WORDS
-    """In which a participant is told what to do."""
+    """Texts in the language of the panel."""
 
 
 class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
-    """Says what happened, what is saved and what to do; r, h, q and Enter choose the next step, as far as each is
-    offered. Dismissed with that step."""
+    """Shows what happened, what is saved and what to do; r, h, q and Enter choose the next step, if it is among
+    `Outcome.decisions`. Dismissed with that step."""
 
     HELP = HELP
     CSS = """
@@ -92,21 +95,26 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         self.show_outcome(self._outcome)
 
     def show_outcome(self, outcome: Outcome) -> None:
-        """Replace the content when more is known."""
+        """Replace the content, such as where the engine does not answer a stop. May be called before the first
+        frame."""
         self._outcome, self.words = outcome, outcome.words
         if not self.query("#told"):
             return
-        self.set_class(not outcome.grave, "-good")
-        self.query_one(Vertical).border_title = f"{'! ' if outcome.grave else ''}{outcome.title}"
-        self.query_one("#told", Static).update(_outcome_text(outcome))
-        keys = [(key, self.words.translate_key(words)) for key, words in map(KEYS.__getitem__, outcome.decisions)]
-        self.query_one("#offered", Static).update("\n".join(f"{key.capitalize():5}  {words}" for key, words in keys))
+        self.set_class(not outcome.is_problem, "-good")
+        self.query_one(Vertical).border_title = f"{'! ' if outcome.is_problem else ''}{outcome.title}"
+        self.query_one("#told", Static).update(_format_outcome(outcome))
+        keys = [(key, self.words.translate_key(key_text)) for key, key_text in map(KEYS.__getitem__, outcome.decisions)]
+        self.query_one("#offered", Static).update(
+            "\n".join(f"{key.capitalize():5}  {key_text}" for key, key_text in keys)
+        )
         self.refresh_bindings()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Allow only the steps that the content offers; other actions always."""
         return action != "decide" or parameters[0] in self._outcome.decisions
 
     def action_enter(self) -> None:
+        """Choose "look" if it is offered, otherwise "back"; no effect if neither is."""
         for decision in ("look", "back"):
             if decision in self._outcome.decisions:
                 self.action_decide(decision)
@@ -116,6 +124,9 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         dismiss_screen(self, decision)
 
 
-def _outcome_text(outcome: Outcome) -> Content:
-    parts = [Content.assemble((heading, "bold"), "\n" if heading else "", text) for heading, text in outcome.parts]
-    return Content("\n\n").join(parts)
+def _format_outcome(outcome: Outcome) -> Content:
+    """Format the paragraphs, each with its heading in bold on its own line, separated by an empty line."""
+    paragraphs = [
+        Content.assemble((heading, "bold"), "\n" if heading else "", text) for heading, text in outcome.paragraphs
+    ]
+    return Content("\n\n").join(paragraphs)

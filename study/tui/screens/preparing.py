@@ -12,14 +12,14 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.translated_screen import TranslatedScreen
 
 UPDATE_INTERVAL_S = 0.5
-"""Interval (s) at which the elapsed time is drawn."""
+"""Interval (s) at which the elapsed time is drawn. Chosen."""
 PLACEHOLDER_TEXT = "…"
-"""Shown as long as there is no sentence."""
+"""Text that is shown as long as there is no sentence."""
 
 
 class PreparingScreen(TranslatedScreen[None]):
-    """The current step of a preparation and the elapsed time; no keys. Without a sentence the screen has no text,
-    because the participant's language is not known before the protocol was read."""
+    """Shows the current step of a preparation and the elapsed time; no keys. Without a sentence it shows only
+    `PLACEHOLDER_TEXT`, because the participant's language is not known before the protocol was read."""
 
     PAGE = "help_preparing"
     CSS = """
@@ -51,10 +51,11 @@ class PreparingScreen(TranslatedScreen[None]):
     def on_mount(self) -> None:
         self.set_interval(UPDATE_INTERVAL_S, self._update_elapsed)
 
-    def say(self, sentence: str, afresh: bool = False) -> None:
-        """Show the current step. afresh: whether another wait begins, so that the elapsed time restarts."""
+    def show_step(self, sentence: str, is_new_wait: bool = False) -> None:
+        """Show the current step, a sentence. is_new_wait: whether another wait begins, so that the elapsed time
+        restarts."""
         self._sentence = sentence
-        if afresh:
+        if is_new_wait:
             self._start_s = self._now_s()
         if self.query("#sentence"):
             self.query_one("#sentence", Static).update(sentence)
@@ -81,7 +82,7 @@ class PreparingScreen(TranslatedScreen[None]):
         return describe_elapsed(self._now_s() - self._start_s, self.words) if self._sentence else ""
 
 
-def describe_elapsed(seconds: float, words: Words = ENGLISH_WORDS) -> str:
+def describe_elapsed(elapsed_s: float, words: Words = ENGLISH_WORDS) -> str:
     """Describe an elapsed time (s) in words: minutes and seconds, or seconds alone below a minute."""
-    minutes, remainder_s = divmod(int(seconds), 60)
+    minutes, remainder_s = divmod(int(elapsed_s), 60)
     return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": remainder_s})

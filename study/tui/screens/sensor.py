@@ -1,7 +1,8 @@
 """Screen that guides through the six-position calibration of the accelerometer, step by step.
 
 The engine reads the sensor and computes the calibration (`study.devices.accelerometer.calibration`); this screen shows
-its messages and sends the user's replies.
+its messages and sends the user's replies. Opened by the start screen (`home`); `study.tui.app.archive_screens` passes
+the messages of the engine to it.
 """
 
 from typing import ClassVar
@@ -15,7 +16,7 @@ from textual.widgets import Footer, Input, Label, Static
 
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.from_engine import CalibrationComputed, CalibrationStored, PlacementRequest
-from study.tui.engine.to_engine import CalibrateSensor, KeepSensor, LetGo, Reply
+from study.tui.engine.to_engine import CalibrateSensor, Interrupt, Reply, StoreCalibration
 from study.tui.home_messages import CommandRequested
 
 HELP = """\
@@ -36,11 +37,11 @@ In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
 """
 """Help of the screen, in Markdown."""
 FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
-"""Key, title and hint of each field."""
-BAUD = 2_000_000
-"""Default rate of the serial line, bit/s."""
-STEPS = 6
-"""Number of positions of the calibration."""
+"""Name, label and placeholder of each field, from top to bottom."""
+DEFAULT_BAUD_RATE = 2_000_000
+"""Rate of the serial line (bit/s) where the field is empty."""
+POSITION_COUNT = 6
+"""Number of positions of the calibration: each of three axes up and down."""
 
 
 class SensorScreen(Screen[None]):
@@ -67,9 +68,9 @@ class SensorScreen(Screen[None]):
 
     def __init__(self) -> None:
         super().__init__()
-        self._waits_for: PlacementRequest | None = None
+        self._pending_placement: PlacementRequest | None = None
         """Position that the user must confirm; None where none is requested."""
-        self._under_way = False
+        self._is_calibrating = False
         """Whether a calibration is running."""
         self._table = ""
         """Result (TOML) that Enter writes into the lab's file; empty where there is none."""
@@ -92,80 +93,87 @@ class SensorScreen(Screen[None]):
         """Handle a message of the engine: show the next position, the result, or that the result was written."""
         match message:
             case PlacementRequest(number=number, position=position, previous_reading=readings):
-                self._waits_for = message
+                self._pending_placement = message
                 if readings is not None:
-                    self._note(f"✓ read {', '.join(f'{value:.0f}' for value in readings)}")
-                self._show_line(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
+                    self._append_reading_line(f"✓ read {', '.join(f'{value:.0f}' for value in readings)}")
+                self._show_instruction(
+                    f"{number} of {POSITION_COUNT}: lay the sensor down with {position}, let go of it, press Enter."
+                )
             case CalibrationComputed(table=table, file=file):
-                self._under_way, self._table = False, table
+                self._is_calibrating, self._table = False, table
                 self.query_one("#seen", Static).update(table)
-                self._show_line(f"Enter writes this into {file}; Esc leaves it.")
+                self._show_instruction(f"Enter writes this into {file}; Esc leaves it.")
             case CalibrationStored(file=file):
-                self._lock(False)
-                self._show_line(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
+                self._set_fields_disabled(False)
+                self._show_instruction(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
 
     def reset_after_error(self) -> None:
         """Reset the screen after an error; a panel above the screen shows the error."""
-        self._waits_for, self._under_way, self._table = None, False, ""
-        self._show_line("F5 begins again.")
+        self._pending_placement, self._is_calibrating, self._table = None, False, ""
+        self._show_instruction("F5 begins again.")
         self.query_one("#seen", Static).update("")
-        self._lock(False)
+        self._set_fields_disabled(False)
 
     def action_begin(self) -> None:
         """Check port and baud rate, and start the calibration; no effect while it is running."""
         port = self.query_one("#port", Input).value.strip()
-        baud = self.query_one("#baud", Input).value.strip() or str(BAUD)
-        if self._under_way:
+        baud = self.query_one("#baud", Input).value.strip() or str(DEFAULT_BAUD_RATE)
+        if self._is_calibrating:
             return
         if not port:
-            self._refuse("Name the port.", "port")
+            self._show_field_problem("Name the port.", "port")
         elif not baud.isascii() or not baud.isdigit() or int(baud) < 1:
-            self._refuse("The baud rate is a whole number.", "baud")
+            self._show_field_problem("The baud rate is a whole number.", "baud")
         else:
-            self._under_way, self._table = True, ""
+            self._is_calibrating, self._table = True, ""
             self.query_one("#seen", Static).update("")
-            self._lock(True)
-            self._show_line("The port is opened…")
+            self._set_fields_disabled(True)
+            self._show_instruction("The port is opened…")
             self.post_message(CommandRequested(CalibrateSensor(port, int(baud))))
 
     def action_go_on(self) -> None:
-        """Enter: confirm the position, else have the result written, else begin from a field."""
-        if self._waits_for is not None:
-            self._note(f"{self._waits_for.position}: listening, leave it at rest…")
-            self.post_message(CommandRequested(Reply(self._waits_for.number, True)))
-            self._waits_for = None
+        """Confirm the position that is requested; else request that the result be written; else begin, where a field
+        has the focus."""
+        if self._pending_placement is not None:
+            self._append_reading_line(f"{self._pending_placement.position}: listening, leave it at rest…")
+            self.post_message(CommandRequested(Reply(self._pending_placement.number, True)))
+            self._pending_placement = None
         elif self._table:
-            self.post_message(CommandRequested(KeepSensor(self._table)))
+            self.post_message(CommandRequested(StoreCalibration(self._table)))
             self._table = ""
-            self._show_line("It is written…")
+            self._show_instruction("It is written…")
         elif isinstance(self.focused, Input):
             self.action_begin()
 
     def action_leave(self) -> None:
         """Close the screen, and stop a running calibration."""
-        if self._under_way:
-            self.post_message(CommandRequested(LetGo()))
+        if self._is_calibrating:
+            self.post_message(CommandRequested(Interrupt()))
         dismiss_screen(self, None)
 
     @on(Input.Changed)
     def _clear_message(self) -> None:
         """Replace a message about a field once the field is edited."""
-        if not self._under_way:
-            self._show_line("F5 begins.")
+        if not self._is_calibrating:
+            self._show_instruction("F5 begins.")
 
-    def _lock(self, locked: bool) -> None:
+    def _set_fields_disabled(self, disabled: bool) -> None:
+        """Disable or enable the fields; they are disabled during a calibration."""
         for field in self.query(Input):
-            field.disabled = locked
+            field.disabled = disabled
 
-    def _refuse(self, text: str, field: str) -> None:
-        self._show_line(text)
+    def _show_field_problem(self, text: str, field: str) -> None:
+        """Show a problem, and focus the field that it concerns."""
+        self._show_instruction(text)
         self.query_one(f"#{field}", Input).focus()
 
-    def _show_line(self, text: str) -> None:
+    def _show_instruction(self, text: str) -> None:
+        """Show the next step in the line below the fields, in place of the previous one."""
         self.query_one("#do", Static).update(text)
 
-    def _note(self, text: str) -> None:
-        """Append a line about a position; its reading (✓) replaces the line that was shown during the measurement."""
+    def _append_reading_line(self, text: str) -> None:
+        """Append a line about a position to the list of results; a reading (✓) completes the last line instead: it
+        replaces the text after the name of the position."""
         results = self.query_one("#seen", Static)
         lines = [line for line in str(results.content).split("\n") if line]
         if text.startswith("✓") and lines:

@@ -1,6 +1,7 @@
 """Screen of one past session: its facts, thresholds, staircases, log and report, and the actions that it allows.
 
-The screen shows a `SessionView` and posts messages; the application and its engine act on these.
+The screen shows a `SessionView` and posts messages, on which the application and its engine act. Opened by
+`study.tui.app.archive_screens`; `diagnosis` uses `open_report`.
 """
 
 from pathlib import Path
@@ -87,6 +88,7 @@ class SessionScreen(Screen[None]):
         self._view = view
 
         async def redraw() -> None:
+            """Compose the screen again, and select the page that was selected before."""
             await self.recompose()
             self.query_one(TabbedContent).active = page
             self.refresh_bindings()
@@ -150,7 +152,10 @@ class SessionScreen(Screen[None]):
         open_report(self.app, self._view.report)
 
     def action_withdraw(self) -> None:
+        """Ask for confirmation, and request the withdrawal where it is given."""
+
         def act_on_decision(erase: bool | None) -> None:
+            """Request the withdrawal where the dialog returned True."""
             if erase:
                 self.post_message(CommandRequested(Withdraw(self._view.line.path)))
 
@@ -180,8 +185,8 @@ def make_file_url(path: str) -> str:
 
 def open_report(app: App[object], path: str) -> None:
     """Open an HTML report in a browser of this machine. Where the screen itself runs in a browser, the file's content
-    is sent to a new tab, because a browser refuses links from a served page to a local file. A notification tells of a
-    file that cannot be read."""
+    is sent to a new tab, because a browser refuses links from a served page to a local file; a file that cannot be read
+    is then reported by a notification."""
     if app.is_web:
         try:
             app.deliver_binary(path, open_method="browser", mime_type="text/html")

@@ -22,7 +22,7 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.keys.key_presses import KeyPressDetector, get_arrival_time_s
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, format_repeat_text
-from study.tui.trial_words import choose_run_text, format_heading
+from study.tui.trial_words import choose_run_key, format_heading
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
@@ -37,9 +37,9 @@ REPLY_TEXTS = {
     TIME_OVER: "time_over",
 }
 """Key of the text shown after a reply. REPEAT has none: its text states the number of repeats left."""
-REQUEST_VALID_S = 3.0
-"""A request to pause or leave made between two questions is kept for this time (s): the next question, if it comes
-within it, is answered with the request at once."""
+REQUEST_VALIDITY_S = 3.0
+"""Time (s) for which a request to pause or leave that is made between two questions is kept. Chosen. A question that
+comes within it is answered with the request at once."""
 NUM_LOCK_OFF_KEYS = {"end", "down", "kp_begin"}
 """Names of the keys that a numeric keypad sends while Num Lock is off, in place of digits."""
 
@@ -75,16 +75,20 @@ class TrialScreen(TranslatedScreen[None]):
     def __init__(self, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
         self._keys = keys
-        self._presses = KeyPressDetector()
+        self._press_detector = KeyPressDetector()
         self._question: Question | None = None
         self._repeats_left: int | None = None
+        # Time from which a reply is accepted (s, monotonic clock); None where none is.
         self._armed_s: float | None = None
+        # Answer to the current question, 1 or 2; 0 without one.
         self._accepted_answer = 0
         self._time_limit_timer: Timer | None = None
+        # Problem shown below the answers; empty for none.
         self._trouble = ""
-        self._trouble_is_old = False
+        self._is_trouble_old = False
         self._verdict: bool | None = None
         """Whether the last answer was right; None without feedback."""
+        # Request made between two questions, and its time (s, monotonic clock); None without one.
         self._pending_request: tuple[Unanswered, float] | None = None
 
     def compose(self) -> ComposeResult:
@@ -103,21 +107,21 @@ class TrialScreen(TranslatedScreen[None]):
     def arm(self, question: Question) -> None:
         """Show a question and accept one reply to it. Starts its time limit (s), where it has one."""
         self._stop_time_limit()
-        if self._question is not None and choose_run_text(question) != choose_run_text(self._question):
+        if self._question is not None and choose_run_key(question) != choose_run_key(self._question):
             self._verdict = None  # another kind of run begins, which may give no feedback
         self._question, self._repeats_left, self._accepted_answer = question, question.repeats_left, 0
         # Feedback is repeated with the next question: the trial that it belongs to ends too soon to read it.
         previous_verdict, self._verdict = self._verdict, None
-        if self._trouble_is_old:
+        if self._is_trouble_old:
             self.show_trouble("")
-        self._trouble_is_old = True
+        self._is_trouble_old = True
         if question.time_limit_s > 0:
             self._time_limit_timer = self.set_timer(question.time_limit_s, self._end_at_time_limit)
         self._show_question(
             "" if previous_verdict is None else f"{self.words['last_right' if previous_verdict else 'last_wrong']} "
         )
         self._armed_s = time.monotonic()
-        if self._pending_request is not None and self._armed_s - self._pending_request[1] < REQUEST_VALID_S:
+        if self._pending_request is not None and self._armed_s - self._pending_request[1] < REQUEST_VALIDITY_S:
             self._post_reply(self._pending_request[0])
         self._pending_request = None
 
@@ -141,9 +145,10 @@ class TrialScreen(TranslatedScreen[None]):
         self._show_message(self._describe_verdict())
 
     def show_trouble(self, sentence: str) -> None:
-        """Show a problem below the answers. It stays during the next trial, so that there is time to read it."""
+        """Show a problem below the answers. It stays until the end of the next trial, so that there is time to read
+        it."""
         self._trouble = sentence
-        self._trouble_is_old = False
+        self._is_trouble_old = False
         if self._is_composed:
             self.query_one("#trouble", LiteralText).update(sentence)
 
@@ -176,13 +181,13 @@ class TrialScreen(TranslatedScreen[None]):
             self._show_message(self.words["pause_comes"])
 
     def action_heard(self, answer: int) -> None:
-        """Does nothing: the binding only gives the footer its entry. Answers are handled in `on_key`."""
+        """Do nothing: the binding exists for its entry in the footer; `on_key` handles the answers."""
 
     def _take_answer(self, answer: int, arrival_time_s: float) -> None:
         """Post an answer (1 or 2), unless the key is held down or arrived before the question. arrival_time_s: arrival
         of the key (s, monotonic clock)."""
         armed_s = self._armed_s
-        is_press = self._presses.is_press(answer, arrival_time_s, float("inf") if armed_s is None else armed_s)
+        is_press = self._press_detector.is_press(answer, arrival_time_s, float("inf") if armed_s is None else armed_s)
         if armed_s is None or arrival_time_s < armed_s:
             return
         if not is_press:
@@ -231,8 +236,8 @@ class TrialScreen(TranslatedScreen[None]):
         return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
 
     def _show_question(self, feedback_text: str = "") -> None:
-        """Redraw the screen for the current question. feedback_text: on the previous answer,
-        put before the message."""
+        """Redraw the screen for the current question. feedback_text: text about the previous answer, put before the
+        message."""
         if not self._is_composed:
             return
         self.query_one("#trouble", LiteralText).update(self._trouble)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 class WatchController:
-    """Controller of the experimenter's view; at most one view is open at a time. Arguments of its methods: path, the
-    folder of the session; send_request, which sends a request of the view to the session."""
+    """Controller of the experimenter's view; at most one view is open at a time. Arguments of its methods:
+    session_folder, the path of the session's folder; send_request, which sends a request of the view to the session."""
 
     def __init__(self, app: App[Any]) -> None:
         self._app = app
@@ -29,9 +29,10 @@ class WatchController:
         self._screen: WatchScreen | None = None
         self._is_starting = False
 
-    def toggle_view(self, path: str, send_request: Callable[[Request], object]) -> None:
-        """Close the view if it is on top. Otherwise open it on the screen of the running session, after its name was
-        typed as confirmation; before the view opens, a note in the log records it."""
+    def toggle_view(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
+        """Close the view if it is on top. Otherwise open it on the screen of the running session, after the user has
+        typed the name of the session as confirmation; before the view opens, a note in the log records that it was
+        shown."""
         if self._screen is not None and self._app.screen is self._screen:
             self.close()
             return
@@ -39,18 +40,18 @@ class WatchController:
 
         def open_confirmed() -> None:
             send_request(NoteAsked("program", VIEW_SHOWN_NOTE))
-            self.open_now(path, send_request)
+            self.open_now(session_folder, send_request)
 
-        confirm_view(self._app, Path(path).name, open_confirmed)
+        confirm_view(self._app, Path(session_folder).name, open_confirmed)
 
-    def open_after_confirmation(self, path: str, send_request: Callable[[Request], object]) -> None:
-        """Open the view of a session of another program, after its name was typed as confirmation; nothing is
-        logged."""
+    def open_after_confirmation(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
+        """Open the view of a session that another program runs, after the user has typed the name of the session as
+        confirmation; nothing is logged."""
         from study.tui.screens.confirm_view import confirm_view
 
-        confirm_view(self._app, Path(path).name, lambda: self.open_now(path, send_request))
+        confirm_view(self._app, Path(session_folder).name, lambda: self.open_now(session_folder, send_request))
 
-    def open_now(self, path: str, send_request: Callable[[Request], object]) -> None:
+    def open_now(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
         """Open the view without confirmation, unless one is open or being opened. Returns before it is open: a thread
         starts the reading process, because that takes time. A failure is shown as a notification."""
         if self._is_starting or (self._screen is not None and self._screen in self._app.screen_stack):
@@ -61,9 +62,9 @@ class WatchController:
             from study.tui.engine.watch_feed import WatchFeed
 
             try:
-                feed = WatchFeed(path)
-            except OSError as problem:
-                self._app.call_from_thread(self._report_start_failure, problem)
+                feed = WatchFeed(session_folder)
+            except OSError as error:
+                self._app.call_from_thread(self._report_start_failure, error)
             else:
                 self._app.call_from_thread(self._show_view, feed, send_request)
 
@@ -82,10 +83,10 @@ class WatchController:
         if feed is not None:
             threading.Thread(target=feed.close, name="watch-end", daemon=True).start()
 
-    def _report_start_failure(self, problem: OSError) -> None:
+    def _report_start_failure(self, error: OSError) -> None:
         """Notify the user that the reading process could not be started."""
         self._is_starting = False
-        self._app.notify(f"The view cannot be opened: {problem.strerror or problem}.", severity="error", markup=False)
+        self._app.notify(f"The view cannot be opened: {error.strerror or error}.", severity="error", markup=False)
 
     def _show_view(self, feed: WatchFeed, send_request: Callable[[Request], object]) -> None:
         """Show the view of a reading process that has started, and end the previous one."""

@@ -122,16 +122,23 @@ def format_details(view: WatchView) -> Content:
             "Session", [f"{view.subject}, {participant_text}, {answers_text}", view.protocol, f"Device: {view.device}"]
         ),
         *_format_section(
-            "Forms", [f"{format_local_time(f.utc)}  {f.form}: {_describe_outcome(f.passed)}" for f in view.forms]
+            "Forms",
+            [f"{format_local_time(form.utc)}  {form.form}: {_describe_outcome(form.passed)}" for form in view.forms],
         ),
         *_format_section(
             "Practice",
-            [f"{p.frequency_hz:g} Hz: {p.right} right of {p.of}, {_describe_outcome(p.passed)}" for p in view.practice],
+            [
+                f"{result.frequency_hz:g} Hz: {result.right} right of {result.of}, {_describe_outcome(result.passed)}"
+                for result in view.practice
+            ],
         ),
-        *(_format_section("Drift", [d.sentence for d in view.drifts]) if view.probes else ()),
+        *(_format_section("Drift", [drift.sentence for drift in view.drifts]) if view.probes else ()),
         *_format_section(
             "Notes",
-            [f"{format_local_time(n.utc)}  {'ADVERSE ' if n.adverse else ''}{n.who}: {n.text}" for n in view.notes],
+            [
+                f"{format_local_time(note.utc)}  {'ADVERSE ' if note.adverse else ''}{note.who}: {note.text}"
+                for note in view.notes
+            ],
         ),
     ]
     return Content.assemble(*parts)
@@ -175,6 +182,7 @@ def _format_trial(trial: ClosedTrial, columns: int) -> Content:
         f"{_format_decimal(trial.response_time_s, 4)} {delivered_text} {_format_decimal(trial.off_axis_mps2, 4)}"
     )
     reversal_mark = "↺" if trial.reversal else " "
+    # 9 columns: the result (5), the mark of a reversal with a blank (2), two blanks before the remark.
     remark_columns = columns - len(left_text) - len(right_text) - 9
     remark = trial.remark or ("measuring" if trial.status == "measuring" else "")
     if trial.phase == "catch":
@@ -200,8 +208,8 @@ def _format_decimal(value: float | None, width: int) -> str:
 
 
 def _format_bar(share: float, description: str) -> Content:
-    """Format a bar for a share of a limit (0 to 1 fills it), with a description: in the style of a warning from 0.8, of
-    an error from 1."""
+    """Format a bar for a share of a limit (from 0; 1 and more fill it), with a description: in the style of a warning
+    from 0.8 (chosen: the limit comes near), of an error from 1."""
     filled_cells = round(min(1.0, share) * BAR_CELLS)
     style = "bold $text-error" if share >= 1 else "bold $text-warning" if share >= 0.8 else ""
     return Content.assemble(

@@ -1,6 +1,6 @@
 """Selection of a single choice among a few (radio buttons), side by side if they fit, otherwise listed vertically.
 
-Used by the forms (`form_question`) and the note screen.
+Used by the screens `form` and `note`, and by `form_question`.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from textual.widget import Widget
 from study.session.views.form_entry import find_choice, move_mark
 
 CHOICE_GAP_CELLS = 3
-"""Character cells between two choices that are side by side."""
+"""Character cells between two choices that are side by side (chosen)."""
 
 
 class ChoiceRow(Widget, can_focus=True):
     """Choices side by side, or one below the other where they do not fit. Arrow keys move, Space or a click chooses,
-    Enter chooses and leaves, a digit chooses by number. Nothing is preselected, and moving over a choice does not
-    select it: an agreement must be intended."""
+    Enter chooses and leaves, a digit chooses by number. Nothing is selected unless `chosen`, the index of an earlier
+    answer, is given, and moving over a choice does not select it: an agreement must be intended."""
 
     DEFAULT_CSS = """
     ChoiceRow { height: auto; width: 1fr; }
@@ -62,7 +62,7 @@ class ChoiceRow(Widget, can_focus=True):
         super().__init__(id=id)
         self._choices = choices
         # Choices are numbered unless one of them is itself a number: then a digit selects the choice of that name.
-        self._numbered = not any(choice.isdigit() for choice in choices)
+        self._is_numbered = not any(choice.isdigit() for choice in choices)
         self.set_reactive(ChoiceRow.chosen, chosen)
         self.set_reactive(ChoiceRow.cursor, chosen)
 
@@ -113,13 +113,13 @@ class ChoiceRow(Widget, can_focus=True):
     def render(self) -> Text:
         text = Text(no_wrap=True)
         column = row = 0
-        for index, position in enumerate(self._place_choices(self.size.width)):
-            if position[1] > row:
+        for index, choice_position in enumerate(self._place_choices(self.size.width)):
+            if choice_position[1] > row:
                 text.append("\n")
-                column, row = 0, position[1]
-            text.append(" " * (position[0] - column))
+                column, row = 0, choice_position[1]
+            text.append(" " * (choice_position[0] - column))
             text.append(self._format_label(index), self._choose_style(index))
-            column = position[0] + len(self._format_label(index))
+            column = choice_position[0] + len(self._format_label(index))
         return text
 
     def _choose_style(self, index: int) -> str:
@@ -130,15 +130,16 @@ class ChoiceRow(Widget, can_focus=True):
 
     def _format_label(self, index: int) -> str:
         """Format a choice with its number, where choices are numbered, and its radio button."""
-        number = f"{index + 1} " if self._numbered else ""
-        return f" {number}{'●' if index == self.chosen else '○'} {self._choices[index]} "
+        number_text = f"{index + 1} " if self._is_numbered else ""
+        return f" {number_text}{'●' if index == self.chosen else '○'} {self._choices[index]} "
 
     def _place_choices(self, width: int) -> list[tuple[int, int]]:
-        """Compute column and row of each choice at this width, in character cells."""
-        lengths = [len(self._format_label(index)) for index in range(len(self._choices))]
-        if sum(lengths) + CHOICE_GAP_CELLS * (len(lengths) - 1) > width:
-            return [(0, index) for index in range(len(lengths))]
-        return [(sum(lengths[:index]) + CHOICE_GAP_CELLS * index, 0) for index in range(len(lengths))]
+        """Compute column and row of each choice (character cells, from 0) at this width: side by side if all fit,
+        otherwise one below the other."""
+        label_widths = [len(self._format_label(index)) for index in range(len(self._choices))]
+        if sum(label_widths) + CHOICE_GAP_CELLS * (len(label_widths) - 1) > width:
+            return [(0, index) for index in range(len(label_widths))]
+        return [(sum(label_widths[:index]) + CHOICE_GAP_CELLS * index, 0) for index in range(len(label_widths))]
 
     def _move_within(self, step: int) -> bool:
         """Move the cursor through vertically listed choices. Returns False beyond their ends and for choices side by

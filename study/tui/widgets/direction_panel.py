@@ -1,7 +1,7 @@
 """Panel of one of the two answers of a trial: its number, its direction as a thick line, and its description in words.
 
-Number, words and the heavier frame carry the same information as the colour, so that colour is not needed.
-Used by the screens of trials and of the demonstration.
+Number, words and the heavier frame carry the same information as the colour, so that colour is not needed. Used by the
+screens `trial`, `playing`, `instructions` and `demo`.
 """
 
 import textwrap
@@ -17,12 +17,13 @@ from textual.widget import Widget
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.participant_views import DirectionPicture
 from study.tui.drawing.direction_picture import describe_direction, draw_large_direction
-from study.tui.drawing.number_picture import large_number
+from study.tui.drawing.number_picture import draw_large_digit
 
 LARGE_DIGITS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
-"""Large digits, three lines each."""
+"""Large digit of each answer, by its number: three lines of three columns."""
 DIGIT_MARGIN_COLUMNS = 5
-"""Columns kept free for the number, left of the drawing, and as many on its right."""
+"""Columns kept free for the number left of the drawing, and as many on its right: a digit of 3 columns with a blank on
+each side."""
 
 Mark = Literal["", "taken", "saved", "now", "felt"]
 """State of this answer: "" (none), taken (accepted), saved (on disk), now (being played), felt (in the
@@ -45,6 +46,8 @@ class DirectionPanel(Widget):
     DirectionPanel:light > .direction-panel--one { color: #0072B2; }
     DirectionPanel:light > .direction-panel--two { color: #A84A00; }
     """
+    """Style sheet. Colours of the directions: blue and orange of the palette by Okabe and Ito, which can be told apart
+    with a colour-vision deficiency; a darker orange on light background (chosen, for contrast)."""
     COMPONENT_CLASSES = {"direction-panel--one", "direction-panel--two"}  # noqa: RUF012  Textual's own type
 
     picture: reactive[DirectionPicture | None] = reactive(None)
@@ -52,14 +55,14 @@ class DirectionPanel(Widget):
 
     def __init__(self, number: int, picture: DirectionPicture | None = None, words: Words = ENGLISH_WORDS) -> None:
         super().__init__()
-        self._texts = words
+        self._words = words
         self.number = number
         self.set_reactive(DirectionPanel.picture, picture)
 
     def watch_mark(self, old_mark: Mark, new_mark: Mark) -> None:
         self.remove_class(f"-{old_mark}")
         self.set_class(bool(new_mark), f"-{new_mark}")
-        self.border_subtitle = f"{self.number} {self._texts[f'mark_{new_mark}']}" if new_mark else ""
+        self.border_subtitle = f"{self.number} {self._words[f'mark_{new_mark}']}" if new_mark else ""
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
@@ -85,7 +88,7 @@ class DirectionPanel(Widget):
         """Draw the direction or the number. Returns the rows, and the number of free columns to their left."""
         drawing_size = _fit_square(Size(self.size.width, self.size.height - len(self._wrap_description())))
         if self.picture is None:
-            drawing = large_number(self.number, drawing_size.width, drawing_size.height)
+            drawing = draw_large_digit(self.number, drawing_size.width, drawing_size.height)
         else:
             drawing = draw_large_direction(self.picture, self.number, drawing_size.width, drawing_size.height)
         return drawing, (self.size.width - drawing_size.width) // 2
@@ -98,8 +101,8 @@ class DirectionPanel(Widget):
     def _describe_answer(self) -> str:
         """Describe the direction, or the interval where there is no picture."""
         if self.picture is None:
-            return self._texts["interval_first" if self.number == 1 else "interval_second"]
-        return describe_direction(self.picture, self.number, self._texts)
+            return self._words["interval_first" if self.number == 1 else "interval_second"]
+        return describe_direction(self.picture, self.number, self._words)
 
 
 def _fit_square(available_size: Size) -> Size:

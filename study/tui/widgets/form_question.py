@@ -1,4 +1,5 @@
-"""Widget of one field of a form: the question and its answer. Display only: the form's screen handles the keys."""
+"""Widget of one field of a form: the question and its answer. Used by the form's screen (`study.tui.screens.form`),
+which handles the keys; this widget only displays."""
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -14,7 +15,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class FormQuestion(Vertical):
-    """The numbered question, and below it the choices or the text entered so far."""
+    """Numbered question, and below it the choices or the text entered so far."""
 
     DEFAULT_CSS = """
     FormQuestion {
@@ -28,7 +29,7 @@ class FormQuestion(Vertical):
         super().__init__()
         self.field = field
         self._number = number
-        self._texts = words
+        self._words = words
 
     def compose(self) -> ComposeResult:
         yield LiteralText(f"{self._number}. {self.field.label}")
@@ -41,34 +42,35 @@ class FormQuestion(Vertical):
 
     @property
     def stacked(self) -> bool:
-        """Whether it has choices and they are listed vertically at this width."""
+        """Whether the field has choices that are listed vertically at the present width."""
         return bool(self.field.choices) and self.query_one(ChoiceRow).stacked
 
-    def show(self, entry: FieldEntry, at: bool) -> None:
-        """Show the state of the answer. at: whether the cursor of the form is on this question, which is then scrolled
-        into view."""
-        if at and not self.has_class("-at"):
+    def show(self, entry: FieldEntry, is_current: bool) -> None:
+        """Show the state of the answer. is_current: whether the cursor of the form is on this question, which is then
+        scrolled into view."""
+        if is_current and not self.has_class("-at"):
             # Scrolls to the whole widget: the question must be visible, not only its answer.
             self.scroll_visible(animate=False)
-        self.set_class(at, "-at")
+        self.set_class(is_current, "-at")
         if self.field.choices:
             row = self.query_one(ChoiceRow)
-            row.cursor, row.is_current = entry.marked, at
+            row.cursor, row.is_current = entry.marked, is_current
             row.chosen = self.field.choices.index(entry.answer) if entry.answer in self.field.choices else None
         else:
-            self.query_one(".written", Static).update(self._answer_text(entry, at))
+            self.query_one(".written", Static).update(self._format_answer(entry, is_current))
 
-    def _answer_text(self, entry: FieldEntry, at: bool) -> Text:
-        """The entered text, or a hint (with the range of a number) while nothing is entered; `at` shows the cursor."""
+    def _format_answer(self, entry: FieldEntry, is_current: bool) -> Text:
+        """Format the entered text, or a hint (with the range of a number) while nothing is entered. is_current: whether
+        to show the cursor."""
         if not entry.answer:
-            hint = self._texts["form_type" if self.field.needed else "form_type_or_not"]
+            hint = self._words["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:
-                hint = f"{hint} ({describe_number_limits(self.field.limits, self._texts)})"
+                hint = f"{hint} ({describe_number_limits(self.field.limits, self._words)})"
             text = Text(hint, "dim")
-            if at:
+            if is_current:
                 text.stylize("reverse", 0, 1)
             return text
-        text = Text(entry.answer + (" " if at else ""))
-        if at:
+        text = Text(entry.answer + (" " if is_current else ""))
+        if is_current:
             text.stylize("reverse", entry.caret, entry.caret + 1)
         return text

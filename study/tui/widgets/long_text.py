@@ -9,7 +9,7 @@ from textual.geometry import Size
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-_LINE_HEAD = re.compile(r".{1,16}?\s{2,}")
+_LINE_LABEL = re.compile(r".{1,16}?\s{2,}")
 """Label at the start of a line, such as a time: 1 to 16 characters and at least two blanks. Continuation lines are
 indented by its length."""
 
@@ -55,6 +55,6 @@ def _wrap_line(line: str, width: int) -> list[str]:
     width."""
     if len(line) <= width:
         return [line]
-    head = _LINE_HEAD.match(line)
-    indent = " " * head.end() if head and head.end() < width // 2 else ""
+    label = _LINE_LABEL.match(line)
+    indent = " " * label.end() if label and label.end() < width // 2 else ""
     return textwrap.wrap(line, width, subsequent_indent=indent) or [""]

@@ -1,7 +1,8 @@
-"""Form of the start screen that begins a session: participant, protocol, device, and a model where one is needed.
+"""Form of the start screen (`study.tui.screens.home`) that begins a session: participant, protocol, device, and a model
+where the protocol needs one.
 
-Problems are shown while typing. They are found from the list of sessions on the screen; the program that begins a
-session checks again.
+Problems are shown while typing, from the list of sessions on the screen; the program that begins a session checks
+again.
 """
 
 from typing import ClassVar
@@ -20,7 +21,7 @@ from study.session.views.resume_command import SIMULATED_DEVICE
 from study.tui.home_messages import BeginRequested
 
 PLACEHOLDER_OPTIONS = [("…", "")]
-"""Entry of a list whose choices are not known yet; the list is disabled."""
+"""Entry of a list whose choices are not known yet, or that has none; the list is disabled."""
 
 
 class NewSessionForm(Vertical):
@@ -49,6 +50,7 @@ class NewSessionForm(Vertical):
     def compose(self) -> ComposeResult:
         with Horizontal(classes="field"):
             yield Label("Participant")
+            # 64 characters are more than a valid code has: a code that is too long stays visible and is explained.
             yield Input(placeholder="code, such as P01", compact=True, id="code", max_length=64)
         with Horizontal(classes="field"):
             yield Label("Protocol")
@@ -65,10 +67,13 @@ class NewSessionForm(Vertical):
     def show(self, home: HomeView) -> None:
         """Show the choices of `home`; earlier selections are kept where they are still available."""
         self._home = home
-        self._set_options("#protocol", [(_format_protocol_option(p.name, p.locked), p.name) for p in home.protocols])
+        self._set_options(
+            "#protocol",
+            [(_format_protocol_option(protocol.name, protocol.locked), protocol.name) for protocol in home.protocols],
+        )
         self._set_options("#device", [(_format_device_option(name), name) for name in home.devices])
         self._set_options("#model", [(_format_model_option(path, home), path) for path in home.models])
-        suggested_code = suggest_code(tuple(line.subject for line in home.sessions if line.observer is None))
+        suggested_code = suggest_code(tuple(session.subject for session in home.sessions if session.observer is None))
         self.query_one("#code", Input).placeholder = f"code, such as {suggested_code}"
         self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
         self._show_problem()
@@ -83,9 +88,9 @@ class NewSessionForm(Vertical):
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
-        problem = explain_invalid_code(code) or self._find_withdrawal_problem(code)
+        problem = explain_invalid_code(code) or self._describe_withdrawal(code)
         if problem or self._model_problem:
-            self._show_about(problem or self._model_problem, "-problem")
+            self._show_message(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
         model = self._read_selected("#model") if self._is_equalized else ""
@@ -100,22 +105,26 @@ class NewSessionForm(Vertical):
         code = self._code
         self.set_class(self._is_equalized, "-equalized")
         if code and not is_code(code):
-            self._show_about(explain_invalid_code(code), "-problem")
-        elif problem := self._find_withdrawal_problem(code):
-            self._show_about(problem, "-problem")
+            self._show_message(explain_invalid_code(code), "-problem")
+        elif problem := self._describe_withdrawal(code):
+            self._show_message(problem, "-problem")
         elif self._model_problem:
-            self._show_about(self._model_problem, "-problem")
-        elif notice := self._find_code_notice(code):
-            self._show_about(notice, "-notice")
+            self._show_message(self._model_problem, "-problem")
+        elif notice := self._describe_earlier_sessions(code):
+            self._show_message(notice, "-notice")
         else:
-            protocol = self._read_selected("#protocol")
-            self._show_about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
+            protocol_name = self._read_selected("#protocol")
+            self._show_message(
+                next((entry.title for entry in self._home.protocols if entry.name == protocol_name), ""), ""
+            )
 
     @property
     def _is_equalized(self) -> bool:
         """Whether the selected protocol equalizes its stimuli, and so needs a model."""
         protocol_name = self._read_selected("#protocol")
-        return self._home is not None and any(p.equalized for p in self._home.protocols if p.name == protocol_name)
+        return self._home is not None and any(
+            protocol.equalized for protocol in self._home.protocols if protocol.name == protocol_name
+        )
 
     @property
     def _model_problem(self) -> str:
@@ -129,27 +138,29 @@ class NewSessionForm(Vertical):
         """The entered code of the participant, without spaces around it."""
         return self.query_one("#code", Input).value.strip()
 
-    def _find_withdrawal_problem(self, code: str) -> str:
-        """Describe the problem of a code whose participant withdrew; empty if there is none."""
-        return next((f"{code} withdrew: this code is not given again." for line in self._list_sessions_of(code)
-                     if line.standing == "withdrawn"), "")  # fmt: skip
+    def _describe_withdrawal(self, code: str) -> str:
+        """Describe the problem of a code whose participant withdrew; empty for other codes."""
+        return next((f"{code} withdrew: this code is not given again." for session in self._list_sessions_of(code)
+                     if session.standing == "withdrawn"), "")  # fmt: skip
 
-    def _find_code_notice(self, code: str) -> str:
-        """Describe where a valid code is in use: an unfinished session of this protocol, or other sessions."""
-        lines, protocol = self._list_sessions_of(code), self._read_selected("#protocol")
-        for line in lines:
-            if line.standing == "unfinished" and line.protocol == _extract_protocol_name(protocol, self._home):
+    def _describe_earlier_sessions(self, code: str) -> str:
+        """Describe where a valid code is in use: an unfinished session of this protocol, or other sessions; empty for
+        an unused code."""
+        sessions, protocol = self._list_sessions_of(code), self._read_selected("#protocol")
+        for session in sessions:
+            if session.standing == "unfinished" and session.protocol == _extract_protocol_name(protocol, self._home):
                 return (
-                    f"{line.name} of this protocol is not finished. Beginning makes another one; r in the list resumes."
+                    f"{session.name} of this protocol is not finished. "
+                    "Beginning makes another one; r in the list resumes."
                 )
-        if lines:
-            count_text = "a session" if len(lines) == 1 else f"{len(lines)} sessions"
+        if sessions:
+            count_text = "a session" if len(sessions) == 1 else f"{len(sessions)} sessions"
             return f"{code} has {count_text} here already. Is it the same person?"
         return ""
 
     def _list_sessions_of(self, code: str) -> list[SessionLine]:
         """List the sessions of the participant with this code."""
-        return [line for line in self._home.sessions if line.subject == code] if self._home and code else []
+        return [session for session in self._home.sessions if session.subject == code] if self._home and code else []
 
     def _read_selected(self, selector: str) -> str:
         """Read the selected value of a list; empty without a selection."""
@@ -167,12 +178,13 @@ class NewSessionForm(Vertical):
         select.disabled = not options
         select.value = previous_value if previous_value in values else values[0]
 
-    def _show_about(self, text: str, css_class: str) -> None:
-        """Show a text below the fields. css_class: -problem, -notice, or empty for a description."""
-        about_line = self.query_one("#about", Static)
-        about_line.set_class(css_class == "-problem", "-problem")
-        about_line.set_class(css_class == "-notice", "-notice")
-        about_line.update(f"! {text}" if css_class else text)
+    def _show_message(self, text: str, css_class: str) -> None:
+        """Show a text below the fields. css_class: -problem, -notice (both with a "! " before the text), or empty for
+        the title of the protocol."""
+        message_line = self.query_one("#about", Static)
+        message_line.set_class(css_class == "-problem", "-problem")
+        message_line.set_class(css_class == "-notice", "-notice")
+        message_line.update(f"! {text}" if css_class else text)
 
 
 def _format_protocol_option(name: str, locked: bool) -> str:
@@ -181,7 +193,7 @@ def _format_protocol_option(name: str, locked: bool) -> str:
 
 
 def _format_device_option(name: str) -> str:
-    """Format a device in the list."""
+    """Format a device in the list; the simulated device is marked."""
     return f"{name} (nothing moves)" if name == SIMULATED_DEVICE else name
 
 
@@ -192,7 +204,7 @@ def _format_model_option(path: str, home: HomeView) -> str:
 
 
 def _extract_file_name(path: str) -> str:
-    """Extract the last part of a path of either system."""
+    """Extract the last part of a path with slashes or backslashes."""
     return path.replace("\\", "/").rpartition("/")[2]
 
 

@@ -10,7 +10,7 @@ from textual.widget import Widget
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.participant_views import Progress
 
-DONE, REMAINING = "━", "─"
+DONE_CHAR, REMAINING_CHAR = "━", "─"
 """Characters of the bar, for the part that is done and the part that remains."""
 
 
@@ -34,7 +34,8 @@ class SessionBar(Widget):
     def render_line(self, y: int) -> Strip:
         """Draw the line. The heading is cut only where the shortest bar, 8 characters, leaves too little room."""
         width = self.size.width
-        # The bar has at most 40 characters and a quarter of the width. It shrinks to 8, so that the heading is not cut.
+        # The bar has at most 40 characters and a quarter of the width (chosen: longer shows no more detail). It shrinks
+        # to 8, the shortest bar that shows progress, so that the heading is not cut.
         available_width = width - len(self.heading) - 1 - len(self._format_progress(0))
         right_text = self._format_progress(max(8, min(40, width // 4, available_width)))
         left_text = self.heading[: max(0, width - len(right_text) - 1)]
@@ -53,5 +54,6 @@ class SessionBar(Widget):
         minutes_left = self.progress.minutes_left
         minutes_text = "" if minutes_left is None else f"  {self._words.fill('bar_left', {'minutes': minutes_left})}"
         return (
-            f"{DONE * done_width}{REMAINING * (bar_width - done_width)} {self.progress.share_done:4.0%}{minutes_text}"
+            f"{DONE_CHAR * done_width}{REMAINING_CHAR * (bar_width - done_width)} "
+            f"{self.progress.share_done:4.0%}{minutes_text}"
         )

@@ -8,7 +8,7 @@ from study.tui.text_rows import Rows, align_rows
 
 
 class TextTable(Static):
-    """Static table."""
+    """Table of text with a bold header; its rows do not change."""
 
     DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
 

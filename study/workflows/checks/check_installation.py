@@ -1,6 +1,7 @@
 """Check that this computer meets the requirements of a study: Python and packages, terminal, data folder, privacy.
 
 Each check returns a `DeviceFinding`, with advice where something is wrong; a missing part is a finding, not an error.
+Called by `examine_setup` and `hapteq doctor` (`study.cli.doctor`).
 """
 
 import importlib.util
@@ -31,7 +32,8 @@ MIN_TERMINAL_SIZE = (80, 24)
 """Columns and rows of a terminal in which every screen fits."""
 
 MIN_FREE_BYTES = 10**9
-"""Free disk space (bytes) that is enough for about ten sessions with all recordings."""
+"""Free disk space (bytes) below which it is reported: 1 GB, chosen as enough for about ten sessions with all
+recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +86,20 @@ def check_requirement(requirement: Requirement) -> DeviceFinding:
         return DeviceFinding(requirement.name, "not installed", fine=False, advice=_INSTALL_ADVICE)
 
 
-def check_version(name: str, installed: str, required: SpecifierSet) -> DeviceFinding:
+def check_version(name: str, installed_version: str, required_versions: SpecifierSet) -> DeviceFinding:
     """Check whether a version satisfies a specifier; prereleases count."""
-    is_satisfied = required.contains(installed, prereleases=True)
-    requirement_text = f" (needs {required})" if str(required) else ""
-    return DeviceFinding(name, f"{installed}{requirement_text}", is_satisfied, "" if is_satisfied else _INSTALL_ADVICE)
+    is_satisfied = required_versions.contains(installed_version, prereleases=True)
+    requirement_text = f" (needs {required_versions})" if str(required_versions) else ""
+    return DeviceFinding(
+        name, f"{installed_version}{requirement_text}", is_satisfied, "" if is_satisfied else _INSTALL_ADVICE
+    )
 
 
 def check_import_name(
     package_name: str, distributions_by_package: Mapping[str, Sequence[str]], package_folder: Path
 ) -> DeviceFinding:
-    """Check whether `import package_name` gives hapteq's own package. owners: distributions by the top-level names that
-    they install. home: folder that contains hapteq's packages."""
+    """Check whether `import package_name` gives hapteq's own package. distributions_by_package: distributions by the
+    top-level names that they install. package_folder: folder that contains hapteq's packages."""
     other_distributions = sorted(set(distributions_by_package.get(package_name, ())) - {HAPTEQ})
     if other_distributions:
         advice = (
@@ -108,9 +112,17 @@ def check_import_name(
             fine=False,
             advice=advice,
         )
-    spec = importlib.util.find_spec(package_name)
-    if spec is None or spec.origin is None or Path(spec.origin) != package_folder / package_name / "__init__.py":
-        origin = "nowhere to be found" if spec is None or spec.origin is None else f"taken from {spec.origin}"
+    module_spec = importlib.util.find_spec(package_name)
+    if (
+        module_spec is None
+        or module_spec.origin is None
+        or Path(module_spec.origin) != package_folder / package_name / "__init__.py"
+    ):
+        origin = (
+            "nowhere to be found"
+            if module_spec is None or module_spec.origin is None
+            else f"taken from {module_spec.origin}"
+        )
         advice = "Rename that file, or start hapteq without its folder on PYTHONPATH."
         return DeviceFinding(f"import {package_name}", origin, fine=False, advice=advice)
     return DeviceFinding(f"import {package_name}", "hapteq's own", fine=True)
@@ -127,7 +139,8 @@ def detect_terminal() -> Terminal | None:
 
 
 def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """Check encoding, size and colours of the terminal. No terminal is fine: the check may run in a script."""
+    """Check encoding, size and colours of the terminal: fine are UTF-8, at least `MIN_TERMINAL_SIZE`, and a TERM other
+    than "dumb" or empty. No terminal (None) is fine: the check may run in a script."""
     if terminal is None:
         return (DeviceFinding("Terminal", "none here, so it was not checked", fine=True),)
     is_utf8 = terminal.encoding.lower().replace("-", "") == "utf8"
@@ -164,9 +177,9 @@ def check_data_folder(data: Path) -> DeviceFinding:
     try:
         with tempfile.TemporaryFile(dir=folder):
             free_bytes = shutil.disk_usage(folder).free
-    except OSError as problem:
+    except OSError as error:
         advice = "Choose another folder with --data, or change the rights of this one."
-        return DeviceFinding(finding_name, f"{data}: {problem.strerror}", fine=False, advice=advice)
+        return DeviceFinding(finding_name, f"{data}: {error.strerror}", fine=False, advice=advice)
     has_enough_space = free_bytes >= MIN_FREE_BYTES
     value_text = f"{data}: can be written, {free_bytes / 1e9:.1f} GB free"
     return DeviceFinding(
@@ -193,7 +206,8 @@ def _is_applicable(requirement: Requirement) -> bool:
 
 
 def _describe_colours(kind: str) -> str:
-    """Describe the number of colours of a terminal, by the environment. kind: value of TERM."""
+    """Describe the number of colours of a terminal, from the environment variables NO_COLOR and COLORTERM. kind: value
+    of TERM."""
     if os.environ.get("NO_COLOR"):
         return "switched off by NO_COLOR; no information is given by colour alone"
     if os.environ.get("COLORTERM") in ("truecolor", "24bit"):
@@ -202,4 +216,6 @@ def _describe_colours(kind: str) -> str:
 
 
 _PLAIN_ADVICE = "or use `hapteq study --plain`."
+"""End of each advice on the terminal: the line mode needs no particular terminal."""
 _INSTALL_ADVICE = "Run `make study` in hapteq's folder, or install hapteq again."
+"""Advice for a missing or unsuitable package or Python."""

@@ -8,11 +8,11 @@ import os
 
 
 def get_load_per_processor() -> float | None:
-    """Load average of the last minute divided by the number of processors that this program may use; 1: all are busy.
-    None where the system has no load average (Windows)."""
+    """Get the load average of the last minute divided by the number of processors that this program may use; 1: all are
+    busy. None where the system has no load average (Windows)."""
     try:
-        load = os.getloadavg()[0]
+        load_average = os.getloadavg()[0]
     except (AttributeError, OSError):  # Windows has no load average
         return None
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return load / max(processors or 1, 1)
+    return load_average / max(processors or 1, 1)

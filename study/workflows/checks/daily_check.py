@@ -1,6 +1,7 @@
 """Daily check of a device: play the excitation of its acceptance without a hand, and compare both recordings.
 
-`hapteq doctor` carries it out; each sitting reads the last result (`judge_last_check`).
+`hapteq doctor` carries it out (`study.cli.doctor`, `examine_setup`); before each sitting, `prepare_sitting` reads the
+last result (`judge_last_check`).
 """
 
 import contextlib
@@ -32,10 +33,10 @@ if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change
     from analysis.device_change.measure_device import NotMeasurableError
 
-PROTOCOL_NAME = "daily_check"
+CHECK_PROTOCOL_NAME = "daily_check"
 """Shipped recording protocol of the check, and of the acceptance."""
 BASELINE_FOLDER, CHECK_FOLDER = "baselines", "daily_checks"
-"""Folders beside the acceptance."""
+"""Folders of the recordings of acceptances and of daily checks, in `get_device_folder()`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +62,10 @@ def compute_play_duration_s() -> float:
     return RecordingPlan(_read_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
 
 
-def record_baseline(name: str, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
+def record_baseline(device_name: str, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
     """Record the baseline of the daily checks. Returns its name in `get_device_folder` and its SHA-256. Raises
     StudyError, also where the recording is not good enough for a comparison."""
-    plan = _plan_recording(name, BASELINE_FOLDER)
+    plan = _plan_recording(device_name, BASELINE_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
         return _record_baseline_on(device, plan, motion_callbacks)
 
@@ -99,22 +100,24 @@ def _record_baseline_on(device: Device, plan: RecordingPlan, motion_callbacks: M
     return f"{BASELINE_FOLDER}/{plan.out.name}", compute_sha256(plan.out)
 
 
-def require_acceptable_device(name: str) -> None:
+def require_acceptable_device(device_name: str) -> None:
     """Require a device that can be accepted. Raises WrongUseError for a device that is never accepted."""
-    if not needs_real_time(name):
-        raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
+    if not needs_real_time(device_name):
+        raise WrongUseError(
+            "There is nothing to compare with", f"{device_name!r} is never accepted.", "Leave --daily out."
+        )
 
 
-def check_today(name: str, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
+def check_today(device_name: str, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
     """Play the excitation of the baseline and write what changed. Raises StudyError."""
-    plan = _plan_recording(name, CHECK_FOLDER)
+    plan = _plan_recording(device_name, CHECK_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
         return check_on_device(device, plan, motion_callbacks)
 
 
 def check_on_device(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
     """Carry out the check of `check_today` on an open device. A check that breaks off is written as not passed."""
-    baseline, digest = _read_baseline(device.info, plan.protocol)
+    baseline, baseline_sha256 = _read_baseline(device.info, plan.protocol)
     notices: list[str] = []
 
     def announce(notice: str) -> None:
@@ -128,12 +131,12 @@ def check_on_device(device: Device, plan: RecordingPlan, motion_callbacks: Motio
         if notices:  # A check that was passed earlier on the same day must not remain valid.
             with contextlib.suppress(StudyError, OSError):
                 reason = str(error) or type(error).__name__
-                _write_check(device.info, plan, digest, False, (f"It broke off: {reason}",), ())
+                _write_check(device.info, plan, baseline_sha256, False, (f"It broke off: {reason}",), ())
         raise
     findings = make_change_findings(changes)
     passed = all(finding.fine for finding in findings)
     sentences = tuple(f"{finding.name}: {finding.value}. {finding.advice}".strip() for finding in findings)
-    return DailyCheckResult(findings, _write_check(device.info, plan, digest, passed, sentences, changes))
+    return DailyCheckResult(findings, _write_check(device.info, plan, baseline_sha256, passed, sentences, changes))
 
 
 def _write_check(
@@ -151,7 +154,7 @@ def _write_check(
         utc=datetime.now(UTC).isoformat(timespec="seconds"),
         passed=passed,
         sentences=sentences,
-        changes=tuple(_as_json(change) for change in changes),
+        changes=tuple(_convert_change_to_json(change) for change in changes),
         recording=plan.out.name if plan.out.exists() else "",
         recording_sha256=compute_sha256(plan.out) if plan.out.exists() else "",
         baseline_sha256=baseline_sha256,
@@ -170,8 +173,8 @@ def compare_recordings(baseline: Recording, todays_recording: Recording) -> tupl
 
     try:
         return compare_devices(baseline, todays_recording)
-    except NotMeasurableError as refusal:
-        raise _make_not_comparable_error(refusal) from refusal
+    except NotMeasurableError as error:
+        raise _make_not_comparable_error(error) from error
 
 
 def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
@@ -187,8 +190,9 @@ def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
 
 
 def _find_last_check(info: DeviceInfo) -> DeviceFinding:
-    """Find the newest check of this device and describe it as a finding; unreadable files are skipped."""
-    today = split_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)[0]
+    """Find the newest check of this device and describe it as a finding, fine only if it was passed today (local date)
+    and compared with the present baseline; "none yet" without a check. Unreadable files are skipped."""
+    today_date = split_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)[0]
     device_option = info.name.replace(".", "")
     advice = f"With no hand on the handle: hapteq doctor --device {device_option} --daily."
     for path in sorted((get_device_folder() / CHECK_FOLDER).glob("*.json"), reverse=True):
@@ -199,24 +203,24 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
         if (check.device, check.details) != (info.name, info.details):
             continue
         time_and_path = f"{format_time_in_zone(check.utc, convert_to_machine_zone)}, {path}"
-        if split_time_in_zone(check.utc, convert_to_machine_zone)[0] != today:
+        if split_time_in_zone(check.utc, convert_to_machine_zone)[0] != today_date:
             return DeviceFinding(
                 "Daily check", f"none today; the last one was {time_and_path}", False, advice, warning=True
             )
         if check.baseline_sha256 != _find_baseline_digest(info):
-            text = f"none since it was accepted anew; the last one was {time_and_path}"
-            return DeviceFinding("Daily check", text, False, advice, warning=True)
+            status_text = f"none since it was accepted anew; the last one was {time_and_path}"
+            return DeviceFinding("Daily check", status_text, False, advice, warning=True)
         if not check.changes:
             return DeviceFinding("Daily check", f"it broke off ({time_and_path})", False, advice, warning=True)
         if check.passed:
             return DeviceFinding("Daily check", f"nothing changed since the acceptance ({time_and_path})", fine=True)
         changed_kinds = ", ".join(dict.fromkeys(str(change["kind"]) for change in check.changes if change["changed"]))
-        text = (
+        status_text = (
             f"{changed_kinds} changed since the acceptance"
             if changed_kinds
             else "measured too inaccurately to detect a change"
         )
-        return DeviceFinding("Daily check", f"{text} ({time_and_path})", False, advice, True)
+        return DeviceFinding("Daily check", f"{status_text} ({time_and_path})", False, advice, True)
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 
@@ -231,18 +235,18 @@ def _find_baseline_digest(info: DeviceInfo) -> str:
 def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recording, str]:
     """Read the recording of this device's acceptance, and its SHA-256. Raises DeviceError where there is none, or it is
     not comparable with a recording by this protocol."""
-    name, digest = find_accepted_baseline(info, datetime.now(UTC).date())
+    baseline_name, baseline_sha256 = find_accepted_baseline(info, datetime.now(UTC).date())
     acceptance_advice = (
         f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
     )
-    if not name:
+    if not baseline_name:
         raise DeviceError(
             "There is nothing to compare with",
             "The device was accepted without a recording (no accelerometer).",
             acceptance_advice,
         )
-    path = get_device_folder() / name
-    if not path.is_file() or compute_sha256(path) != digest:
+    path = get_device_folder() / baseline_name
+    if not path.is_file() or compute_sha256(path) != baseline_sha256:
         raise DeviceError(
             "There is nothing to compare with", f"{path} is gone, or is not what was accepted.", acceptance_advice
         )
@@ -250,27 +254,27 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
     if baseline.meta["provenance"]["protocol_hash"] != hash_protocol(protocol):
         explanation = f"{path} was played by another version of the protocol {protocol.name!r}."
         raise DeviceError("There is nothing to compare with", explanation, acceptance_advice)
-    return baseline, digest
+    return baseline, baseline_sha256
 
 
-def _make_not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
+def _make_not_comparable_error(error: "NotMeasurableError") -> DeviceError:
     """Make the error for a recording from which the device's response cannot be measured."""
-    explanation = f"The recording does not show how the device responds: {refusal}."
+    explanation = f"The recording does not show how the device responds: {error}."
     return DeviceError("The device was not compared", explanation, "Check accelerometer and handle, and try again.")
 
 
-def _plan_recording(name: str, folder: str) -> RecordingPlan:
+def _plan_recording(device_name: str, folder_name: str) -> RecordingPlan:
     """Plan a recording by the shipped protocol, with a new file in this folder beside the acceptance."""
-    recording_folder = get_device_folder() / folder
+    recording_folder = get_device_folder() / folder_name
     recording_folder.mkdir(parents=True, exist_ok=True)
     return RecordingPlan(
-        _read_protocol(), name, (0.0, 0.0, 0.0), 1, recording_folder / f"{name}_{_format_time_stamp()}.h5"
+        _read_protocol(), device_name, (0.0, 0.0, 0.0), 1, recording_folder / f"{device_name}_{_format_time_stamp()}.h5"
     )
 
 
 def _read_protocol() -> RecordingProtocol:
     """Read the shipped recording protocol of the check."""
-    return read_recording_protocol(PROTOCOL_NAME).protocol
+    return read_recording_protocol(CHECK_PROTOCOL_NAME).protocol
 
 
 def _format_time_stamp() -> str:
@@ -283,7 +287,9 @@ def _open_free_device(plan: RecordingPlan) -> Device:
     return open_device(plan.device, make_recording_settings(plan), RealClock(), plan.seed)
 
 
-def _as_json(change: "Change") -> dict[str, Any]:
-    """Convert a change to JSON values; NaN becomes None, because JSON has no NaN."""
-    missing_values = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
+def _convert_change_to_json(change: "Change") -> dict[str, Any]:
+    """Convert a change to JSON values; NaN in `accepted`, `today` or `error` becomes None, because JSON has no NaN."""
+    missing_values = {
+        field_name: None for field_name in ("accepted", "today", "error") if math.isnan(getattr(change, field_name))
+    }
     return asdict(change) | missing_values

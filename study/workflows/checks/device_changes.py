@@ -36,17 +36,16 @@ def make_change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ..
 
 def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
     """Make the finding on one kind of change, over all axes: wrong where one changed, a warning where one could not be
-    decided. friction_changed: whether the friction changed, too, which also changes gain and
-    response."""
+    decided. friction_changed: whether the friction changed, too, which also changes gain and response."""
     change_text = f"{'; '.join(_format_change(change) for change in changes)} ({_format_limit(changes[0])})"
-    axes = ", ".join(change.axis for change in changes if change.changed)
+    changed_axes = ", ".join(change.axis for change in changes if change.changed)
     cause_text = (
         FRICTION_ADVICE
         if friction_changed and kind in ("gain", "response")
         else f"{CAUSE_ADVICE[kind]} {PERSISTENCE_ADVICE}"
     )
-    advice = f"It changed ({axes}). {cause_text}"
-    if axes:
+    advice = f"It changed ({changed_axes}). {cause_text}"
+    if changed_axes:
         return DeviceFinding(kind.capitalize(), change_text, fine=False, advice=advice)
     if unclear_axes := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
         return DeviceFinding(
@@ -56,21 +55,22 @@ def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool
 
 
 def _format_change(change: "Change") -> str:
-    """Axis and size of a change: percent for gain and response, else the present and the accepted value."""
+    """Format axis and size of a change: percent for gain and response, else the present and the accepted value."""
     match change.kind:
         case "gain":
             return f"{change.axis} {format_signed(100 * (change.today - 1), 1)} %"
         case "response" if math.isnan(change.today):
-            return f"{change.axis} not measured{_format_place(change)}"
+            return f"{change.axis} not measured{_format_band_and_peaks(change)}"
         case "response":
-            return f"{change.axis} {100 * change.today:.1f} %{_format_place(change)}"
+            return f"{change.axis} {100 * change.today:.1f} %{_format_band_and_peaks(change)}"
         case _:
             accepted_text, today_text = _format_value(change.accepted), _format_value(change.today)
             return f"{change.axis} {today_text} {change.unit}, accepted {accepted_text}"
 
 
-def _format_place(change: "Change") -> str:
-    """Band (Hz) of a change of the response, and its strongest peaks; empty where no band is stated."""
+def _format_band_and_peaks(change: "Change") -> str:
+    """Format the band (Hz) of a change of the response, and the frequencies of the strongest peak today and at the
+    acceptance; empty where no band is stated."""
     if change.band_hz is None:
         return ""
     peak_text = (
@@ -80,7 +80,7 @@ def _format_place(change: "Change") -> str:
 
 
 def _format_limit(change: "Change") -> str:
-    """Limit of a kind of change, in words."""
+    """Format the limit of a kind of change: absolute, as a factor, or in percent."""
     match change.kind:
         case "friction":
             return f"may change by {change.limit:g} {change.unit}"
@@ -91,5 +91,5 @@ def _format_limit(change: "Change") -> str:
 
 
 def _format_value(value: float) -> str:
-    """A measured value with three digits; words for NaN."""
+    """Format a measured value with three significant digits; words for NaN: the handle did not move."""
     return "the handle did not move" if math.isnan(value) else f"{value:.3g}"

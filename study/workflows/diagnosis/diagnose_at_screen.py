@@ -18,13 +18,13 @@ def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], N
     no results are written then."""
     try:
         return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
-    except KeyboardInterrupt as stopped:
+    except KeyboardInterrupt as interruption:
         raise UserInterruptError(
             "The diagnosis was stopped",
             "It was not finished.",
             "Start it again when there is time.",
             saved="Nothing was written.",
-        ) from stopped
+        ) from interruption
 
 
 def choose_result_folder(source: Path) -> Path:

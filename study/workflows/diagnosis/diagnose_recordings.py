@@ -40,9 +40,8 @@ from study.workflows.forked_map import map_forked, measure_processor_s
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
 
-
 READ_SHARE, FITTED_SHARE, DIAGNOSED_SHARE = 0.02, 0.2, 0.92
-"""Share of the progress (0 to 1) after reading, after fitting a model where none was given, and after the diagnosis."""
+"""Share of progress (0 to 1, chosen) after reading, after fitting a model where none was given, after the diagnosis."""
 
 TWIN_REMARK = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
@@ -117,14 +116,14 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
 
 
 def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
-    """First part of `diagnose_recordings`: the diagnosis without writing, so that its answer can be shown before the
+    """Run a diagnosis without writing (first part of `diagnose_recordings`), so that its answer can be shown before the
     figures are drawn. Raises StudyError."""
     check_effect_names(plan.excluded_effects)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
     for_force_balance = plan.model is None and not plan.clean
-    inputs, clean = _add_clean(plan, read_input(plan.sources, plan.seed, for_force_balance, plan.force_constants))
-    kept_laws = _read_effects(plan.effect_files, inputs.recordings)
+    inputs, clean = _read_clean(plan, read_input(plan.sources, plan.seed, for_force_balance, plan.force_constants))
+    kept_laws = _read_effect_laws(plan.effect_files, inputs.recordings)
     on_progress("reading", READ_SHARE)
     has_time_left, guard = _start_time_budget(plan), make_crash_guard()
     first_model = _choose_model(plan, inputs, clean, (has_time_left, guard), on_progress)
@@ -132,7 +131,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     spring_n_per_m = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
     model = add_spring(first_model.model, spring_n_per_m)
     start_share = FITTED_SHARE if plan.model is None else READ_SHARE
-    _check_compared(plan, inputs, model)
+    _check_comparison(plan, inputs, model)
     settings = replace(
         _make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard, kept=kept_laws
     )
@@ -144,11 +143,11 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
         raise make_not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
         ) from refusal
-    except np.linalg.LinAlgError as problem:
+    except np.linalg.LinAlgError as error:
         raise make_not_diagnosable_error(
-            (f"The fits broke down ({problem}): near the given parameters the simulation diverges",),
+            (f"The fits broke down ({error}): near the given parameters the simulation diverges",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
-        ) from problem
+        ) from error
     findings = replace(
         findings,
         improved=add_spring(findings.improved, -spring_n_per_m),
@@ -159,8 +158,8 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     )
 
 
-def _add_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
-    """Read the recordings of the intact device in the same form as `inputs`; None where the plan has none."""
+def _read_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
+    """Read the recordings of the intact device. Returns both inputs in the same form; None where the plan has none."""
     if not plan.clean:
         return inputs, None
     # Imported here: most diagnoses have no recordings of the intact device.
@@ -171,7 +170,7 @@ def _add_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisInp
 
 
 def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
-    """Second part of `diagnose_recordings`: write document, improved model, figures and page atomically."""
+    """Write document, improved model, figures and page atomically (second part of `diagnose_recordings`)."""
     # Imported here because plotting is slow to import, and the answer comes first.
     from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 
@@ -208,7 +207,8 @@ def _make_settings(
     )
 
 
-def _read_effects(paths: Sequence[Path], recordings: Sequence[Recording]) -> tuple[LawEntry, ...]:
+def _read_effect_laws(paths: Sequence[Path], recordings: Sequence[Recording]) -> tuple[LawEntry, ...]:
+    """Read the laws of effect files; empty without files. Raises StudyError."""
     if not paths:
         return ()
     from study.workflows.diagnosis.effect_file import read_entries
@@ -216,7 +216,7 @@ def _read_effects(paths: Sequence[Path], recordings: Sequence[Recording]) -> tup
     return read_entries(paths, recordings)
 
 
-def _check_compared(plan: DiagnosePlan, inputs: DiagnosisInput, model: MechanicalModel) -> None:
+def _check_comparison(plan: DiagnosePlan, inputs: DiagnosisInput, model: MechanicalModel) -> None:
     """Raise WrongUseError if the requested comparison is not possible."""
     if plan.compare == "force" and plan.clean:
         reason = "With --clean, hapteq chooses the comparison, so that both sets of recordings are measured alike."
@@ -245,7 +245,7 @@ def _choose_model(
     plan: DiagnosePlan,
     inputs: DiagnosisInput,
     clean: DiagnosisInput | None,
-    bounds: tuple[TimeBudget, Guard],
+    time_budget_and_guard: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
     """Choose the model to compare with: the given one; for a session on the simulated device, its twin; with clean
@@ -259,7 +259,7 @@ def _choose_model(
     from study.workflows.diagnosis.fit_without_model import fit_first_model, fit_linear_model
 
     if clean is None:
-        return fit_first_model(inputs, plan.excluded_effects, bounds, fit_progress)
+        return fit_first_model(inputs, plan.excluded_effects, time_budget_and_guard, fit_progress)
     step = "fitting a linear model, as none was given"
     on_progress(step, READ_SHARE)
     return FirstModel(*fit_linear_model(clean, lambda share: fit_progress(step, share), "the clean recordings"))

@@ -20,7 +20,7 @@ from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.recording.read_any_recording import read_any_recording
 
 Checked = TypeVar("Checked")
-"""Type of the result of a checked call."""
+"""Type of the result of the function that `_translate_refusal` calls."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class DiagnosisInput:
 
     recordings: tuple[Recording, ...]
     names: tuple[str, ...]
-    """Names of the sources, for messages and reports."""
+    """Name of each recording's source, for messages and reports."""
     parents: tuple[Path, ...]
     """Input files."""
     remarks: tuple[str, ...]
@@ -47,7 +47,8 @@ def read_input(
 ) -> DiagnosisInput:
     """Read recordings, or the folder of one session. seed: of the choice among a session's trials. for_force_balance:
     convert to one motion per force, as a force balance needs (`one_motion_per_force`). constants: see
-    `with_force_constant`. Raises StudyError."""
+    `with_force_constant`; not used for a session, whose commands are forces. A session with reference probes is
+    represented by these (`find_references`) instead of its trials. Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
         raise make_not_diagnosable_error(
@@ -74,9 +75,9 @@ def read_input(
     recordings, names = tuple(recording for recording, _ in recordings_with_notes), _name_sources(sources)
     _translate_refusal(lambda: require_comparable(recordings, names))
     force_recordings, constant_remarks = _convert_to_forces(recordings, constants)
-    prepared = _translate_refusal(lambda: prepare_recordings(force_recordings, names, for_force_balance))
-    remarks = (*_collect_notes(recordings_with_notes), *constant_remarks, *prepared.remarks)
-    return DiagnosisInput(prepared.recordings, names, tuple(sources), remarks, constants=constants)
+    prepared_recordings = _translate_refusal(lambda: prepare_recordings(force_recordings, names, for_force_balance))
+    remarks = (*_collect_notes(recordings_with_notes), *constant_remarks, *prepared_recordings.remarks)
+    return DiagnosisInput(prepared_recordings.recordings, names, tuple(sources), remarks, constants=constants)
 
 
 def _translate_refusal(check: Callable[[], Checked]) -> Checked:
@@ -90,21 +91,21 @@ def _translate_refusal(check: Callable[[], Checked]) -> Checked:
 def _convert_to_forces(
     recordings: tuple[Recording, ...], constants: Sequence[float]
 ) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """Multiply commands by the force constants. Returns the recordings and remarks; unchanged without constants. Raises
-    WrongUseError for a wrong constant."""
+    """Multiply commands by the force constants. Returns the recordings and the remark on the conversion of the first;
+    unchanged recordings and no remark without constants. Raises WrongUseError for a wrong constant."""
     if not constants:
         return recordings, ()
     from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
 
     try:
-        converted = [with_force_constant(recording, constants) for recording in recordings]
+        converted_recordings = [with_force_constant(recording, constants) for recording in recordings]
     except NoForceConstant as refusal:
         raise WrongUseError(
             "The force constant cannot be used", f"{begin_sentence(str(refusal))}.",
             "Leave --force-constant out, or correct it.",
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
-    return tuple(recording for recording, _ in converted), (converted[0][1],)
+    return tuple(recording for recording, _ in converted_recordings), (converted_recordings[0][1],)
 
 
 def _collect_notes(recordings_with_notes: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:

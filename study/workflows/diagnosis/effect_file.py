@@ -1,4 +1,4 @@
-"""Saves discovered laws as Python files (effect files) and loads them, as candidates of a later diagnosis.
+"""Save discovered laws as Python files (effect files) and load them, as candidates of a later diagnosis.
 
 A diagnosis compares a catalogue of known physical effects, and may discover a formula without a name. Saved under a
 name, the formula joins the catalogue's effects in diagnoses of other recordings. Loading a file runs its code: load
@@ -47,8 +47,9 @@ ENTRY = LawEntry(
 
 
 def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
-    """Write a law of a diagnosis (folder or JSON) or of a model (TOML) as an effect file. number: which law, from 1.
-    Raises StudyError if there is no such law, or if the name of `out_path` is not a new valid name."""
+    """Write a law of a diagnosis (folder or JSON) or of a model (TOML) as an effect file. number: which law, in the
+    order of `_read_laws`, at least 1. Raises StudyError if there is no such law, or if the name of `out_path` is not a
+    new valid name."""
     laws = _read_laws(source)
     if number > len(laws):
         content_text = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
@@ -66,13 +67,13 @@ def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
         )
     law = laws[number - 1]
     signature = f"it varies with {', '.join(law.variables) or 'nothing'} as the formula states"
-    about = f"Discovered law without a name: {law.text} (acts on the {law.acts_on} at {law.axis})."
+    docstring_text = f"Discovered law without a name: {law.text} (acts on the {law.acts_on} at {law.axis})."
     entry = LawEntry(out_path.stem, law, f"found by hapteq: {source.name}", signature)
     write_text(
         out_path,
         EFFECT_TEMPLATE.format(
             # Escaped: the texts come from a file, and an unescaped quote would end the docstring and run as code.
-            about=about.replace("\\", r"\\").replace('"', r"\""),
+            about=docstring_text.replace("\\", r"\\").replace('"', r"\""),
             name=entry.name, expression=law.expression, numbers=law.numbers, units=law.units, acts_on=law.acts_on,
             axis=law.axis, source=entry.source, signature=entry.signature,
         ),
@@ -128,5 +129,5 @@ def _read_laws(source: Path) -> list[Law]:
 
 
 def _make_effect_error(explanation: str, advice: str) -> StudyError:
-    """Error with what happened and what to do."""
+    """Make the error for a law or an effect file that cannot be used."""
     return StudyError("There is no effect of your own", explanation, advice, saved="Nothing was written.")

@@ -1,4 +1,4 @@
-"""`hapteq model`: fit a first mechanical model (mass, damping, stiffness, modes) to recordings and write it.
+"""Fit a first mechanical model (mass, damping, stiffness, modes) to recordings and write it; called by `hapteq model`.
 
 The structure is given or chosen by `analysis.diagnosis.first_model.choose_structure`. The file also states why the
 structure was chosen and its error on held-out parts.
@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.data.recorded_conditions import as_recorded, has_carried_weight
-from analysis.diagnosis.first_model.choose_structure import Choice, choose_structure
+from analysis.diagnosis.data.recorded_conditions import as_recorded, has_payload
+from analysis.diagnosis.first_model.choose_structure import ChosenStructure, choose_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, ParameterEstimate, StructureRefused
 from analysis.diagnosis.result.unit_doubt import describe_unknown_units
 from analysis.wording import typeset
@@ -27,8 +27,8 @@ ERROR_TITLE = "The model was not made"
 
 @dataclass(frozen=True, slots=True)
 class FirstModelPlan:
-    """Arguments of `fit_first_model`: recordings, model file to write, and the name of a structure; "auto": the best is
-    chosen."""
+    """Arguments of `fit_first_model`: recordings, model file to write, and the name of a structure of `KINDS`; "auto":
+    the best is chosen."""
 
     recordings: tuple[Path, ...]
     out: Path
@@ -38,16 +38,16 @@ class FirstModelPlan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FirstModel:
+class FittedFirstModel:
     """A mechanical model that was fitted and written to `plan.out`, and how its structure was chosen."""
 
     plan: FirstModelPlan
-    choice: Choice
+    choice: ChosenStructure
     remarks: tuple[str, ...]
     """Sentences on the input, on the units and on the fit."""
 
 
-def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FirstModel:
+def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FittedFirstModel:
     """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
     added weight, and where no structure fits; nothing is written then."""
     requested_kind = _parse_structure(plan.structure)
@@ -58,8 +58,9 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
             "Give its recordings, REC.h5.",
             saved="Nothing was written.",
         )  # fmt: skip
+    # The seed 1 has no effect: only the trials of a session are drawn at random.
     diagnosis_input = read_input(plan.recordings, 1, True, plan.force_constants)
-    if has_carried_weight(diagnosis_input.recordings):
+    if has_payload(diagnosis_input.recordings):
         raise _make_refusal_error(
             "A recording was made with a weight on the handle, and a model fitted to it would include the weight."
         )
@@ -81,14 +82,14 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         plan.out, replace(as_recorded(choice.fit.model, diagnosis_input.recordings[0]), provenance=provenance)
     )
     on_progress(1.0)
-    return FirstModel(
+    return FittedFirstModel(
         plan,
         choice,
         (*diagnosis_input.remarks, *filter(None, [describe_unknown_units(choice.fit.model)]), *choice.fit.remarks),
     )
 
 
-def format_first_model(first_model: FirstModel) -> tuple[str, ...]:
+def format_first_model(first_model: FittedFirstModel) -> tuple[str, ...]:
     """Format lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters
     with 95 % intervals, held-out error of each channel (%), and a sentence on the error that remains."""
     choice, fit = first_model.choice, first_model.choice.fit
@@ -111,21 +112,24 @@ def format_first_model(first_model: FirstModel) -> tuple[str, ...]:
     )
 
 
-def summarize_first_model(first_model: FirstModel) -> dict[str, Any]:
-    """Summarize the fitted model as plain values, for the JSON document of `hapteq model --json`."""
+def summarise_first_model(first_model: FittedFirstModel) -> dict[str, Any]:
+    """Summarise the fitted model as plain values, for the JSON document of `hapteq model --json`."""
     choice, fit = first_model.choice, first_model.choice.fit
     return {
         "model": str(first_model.plan.out),
         "structure": fit.kind,
         "reason": choice.reason,
         "numbers": [
-            {"name": p.name, "unit": p.unit, "value": p.value,
-             "ci95": None if p.half_width is None else [p.value - p.half_width, p.value + p.half_width]}
-            for p in fit.parameters
+            {"name": parameter.name, "unit": parameter.unit, "value": parameter.value,
+             "ci95": None if parameter.half_width is None
+             else [parameter.value - parameter.half_width, parameter.value + parameter.half_width]}
+            for parameter in fit.parameters
         ],
         "compared": fit.compared,
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
-        "tried": [{"structure": t.kind, "error": t.error, "why_not": t.refusal} for t in choice.tried],
+        "tried": [
+            {"structure": attempt.kind, "error": attempt.error, "why_not": attempt.refusal} for attempt in choice.tried
+        ],
         "remains": choice.remains,
         "remarks": list(first_model.remarks),
     }  # fmt: skip
@@ -156,7 +160,7 @@ def _parse_structure(structure: str) -> Kind | None:
 
 
 def _make_refusal_error(explanation: str) -> StudyError:
-    """Make the error for recordings to which no first model can be fitted."""
+    """Make the error for recordings to which no first model can be fitted. explanation: why, as a sentence."""
     return StudyError(
         ERROR_TITLE, explanation, "Choose another --structure, or record positions or velocities along every command.",
         saved="Nothing was written.",

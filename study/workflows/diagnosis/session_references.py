@@ -1,8 +1,8 @@
-"""The reference probes of a session, played without a hand on the handle, as recordings for a diagnosis.
+"""Find the reference probes of a session, played without a hand on the handle, as recordings for a diagnosis.
 
 Trials are single frequencies with a hand on the handle, from which no effect can be named. A reference is a multisine
 on the free handle, like the recordings of `hapteq record`, and is diagnosed in place of the trials. A remark states
-what all probes of the session found changed.
+which changes of the device all probes of the session show. Called by `diagnosis_input`.
 """
 
 from dataclasses import dataclass
@@ -18,36 +18,41 @@ from study.workflows.results.session_drift import DriftReader
 
 @dataclass(frozen=True, slots=True)
 class SessionReferences:
-    """Recordings of a session's references, to be diagnosed in place of its trials. log: the session's log."""
+    """Recordings of a session's references, to be diagnosed in place of its trials."""
 
     log: Path
+    """Event log of the session."""
     paths: tuple[Path, ...]
+    """Recordings, in the order of the log; at least one."""
     remarks: tuple[str, ...]
+    """Sentences for the report: which recordings are diagnosed, and the drift of the device over all probes."""
 
 
 def find_references(session: Path) -> SessionReferences | None:
-    """The references whose recordings are complete and match the log. session: its folder. None where there is none.
-    Raises StudyError where the session cannot be read."""
+    """Find the references that were measured without trouble and whose recordings match the log. session: its folder.
+    None where there is none. Raises StudyError where the session cannot be read."""
     folder = find_session(str(session), session.absolute().parent)
     folded_session = fold_session(folder)
     if not folded_session.state.protocol.probes.is_enabled:
         return None
     events = folded_session.log_contents.events
-    kinds = {event.number: event.kind for event in events if isinstance(event, ProbePlayed)}
-    measured = [e for e in events if isinstance(e, ProbeMeasured) and e.recording and not e.trouble]
+    probe_kinds = {event.number: event.kind for event in events if isinstance(event, ProbePlayed)}
+    measured_probes = [
+        probe for probe in events if isinstance(probe, ProbeMeasured) and probe.recording and not probe.trouble
+    ]
     paths = tuple(
         folder.path / event.recording
-        for event in measured
-        if event.recording and kinds[event.number] == "reference" and _is_as_logged(folder, event)
+        for event in measured_probes
+        if event.recording and probe_kinds[event.number] == "reference" and _is_as_logged(folder, event)
     )
     if not paths:
         return None
-    subject, were = ("the reference", "was") if len(paths) == 1 else (f"the {len(paths)} references", "were")
-    text = (
-        f"Of {folder.name} {subject} without a hand {were} diagnosed, and not its trials, which contain single "
+    subject, verb = ("the reference", "was") if len(paths) == 1 else (f"the {len(paths)} references", "were")
+    remark = (
+        f"Of {folder.name} {subject} without a hand {verb} diagnosed, and not its trials, which contain single "
         "frequencies with a hand."
     )
-    return SessionReferences(folder.log, paths, (text, *_drifts(folder, folded_session)))
+    return SessionReferences(folder.log, paths, (remark, *_describe_drifts(folder, folded_session)))
 
 
 def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
@@ -56,10 +61,13 @@ def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
     return path.is_file() and compute_sha256(path) == event.sha256
 
 
-def _drifts(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
-    """A remark on the changes of the device from probe to probe, or that there are none."""
-    watched = begin_watching(folded_session.state.opened, folded_session.state.protocol)
+def _describe_drifts(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
+    """Describe the changes of the device from probe to probe in one remark, also if none was detected."""
+    session = begin_watching(folded_session.state.opened, folded_session.state.protocol)
     for event in folded_session.log_contents.events[1:]:
-        watched = apply_followed_event(watched, event)
-    text = "; ".join(drift.sentence for drift in DriftReader(folder).update(watched.probes))
-    return (f"In its {len(watched.probes)} probes {f'there changed: {text}' if text else 'no change was detected'}.",)
+        session = apply_followed_event(session, event)
+    drift_text = "; ".join(drift.sentence for drift in DriftReader(folder).update(session.probes))
+    return (
+        f"In its {len(session.probes)} probes "
+        f"{f'there changed: {drift_text}' if drift_text else 'no change was detected'}.",
+    )

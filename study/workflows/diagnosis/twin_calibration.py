@@ -31,19 +31,19 @@ def check_same_device(calibration: LinkageCalibration, device: str, title: str) 
 
 
 def make_inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
-    """Change of inertia along each axis at the centre, as effects `pose_dependent_inertia` with the parameter per_m =
-    (dM_aa/dx_a) / (a' M a) in 1/m for the driven axis a. An axis with a slope of at most `MIN_SLOPE_PER_M` has no
-    effect.
+    """Make the change of inertia along each axis at the centre, as effects `pose_dependent_inertia` with the parameter
+    per_m = (dM_aa/dx_a) / (a' M a) in 1/m for the driven axis a. An axis with a slope of at most `MIN_SLOPE_PER_M` has
+    no effect.
 
     a' M a is the mass at the actuator's end of the transmission alone; per_m is therefore larger than the slope
     relative to the total mass.
     """
     slopes, axes = estimate_local_inertia(calibration, np.zeros(3))[1], compute_driven_axes(model)
     driven_kg = np.einsum("na,nm,ma->a", axes, model.mass, axes)
-    per_m = _extract_diagonal_slopes(slopes) / driven_kg
+    slopes_per_m = _extract_diagonal_slopes(slopes) / driven_kg
     return tuple(
         ModelEffect("pose_dependent_inertia", axis_name, {"per_m": float(slope_per_m)})
-        for axis_name, slope_per_m in zip("xyz", per_m, strict=True)
+        for axis_name, slope_per_m in zip("xyz", slopes_per_m, strict=True)
         if abs(slope_per_m) > MIN_SLOPE_PER_M
     )
 
@@ -51,8 +51,8 @@ def make_inertia_effects(model: MechanicalModel, calibration: LinkageCalibration
 def describe_calibration(
     model: MechanicalModel, identified_kg: FloatArray, calibration: LinkageCalibration
 ) -> tuple[str, ...]:
-    """Two sentences: the masses of the calibration compared with those of the recordings, and the change of inertia
-    that the model contains. identified_kg: (3,), masses along x, y, z from the recordings."""
+    """Describe the calibration in two sentences: the masses of the calibration compared with those of the recordings,
+    and the change of inertia that the model contains. identified_kg: (3,), masses along x, y, z from the recordings."""
     inertia, slopes = estimate_local_inertia(calibration, np.zeros(3))
     calibrated_kg = np.diag(inertia)
     largest_relative_difference = float(np.abs(identified_kg / calibrated_kg - 1).max())
@@ -73,6 +73,6 @@ def describe_calibration(
 
 
 def _extract_diagonal_slopes(slopes: FloatArray) -> FloatArray:
-    """(3,), kg/m: dM_aa/dx_a, the derivative of the inertia along each axis a with the position along the same axis.
-    slopes: (3, 3, 3), entry [a] is dM/dx_a, the derivative of the inertia matrix."""
+    """Extract dM_aa/dx_a, (3,), kg/m: the derivative of the inertia along each axis a with the position along the same
+    axis. slopes: (3, 3, 3), entry [a] is dM/dx_a, the derivative of the inertia matrix."""
     return np.array([slopes[axis, axis, axis] for axis in range(3)])

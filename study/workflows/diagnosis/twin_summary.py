@@ -16,8 +16,8 @@ from study.workflows.diagnosis.write_twin import WrittenTwin
 
 
 def summarise_twin(twin: WrittenTwin) -> dict[str, Any]:
-    """Parameters, tolerances and errors of the written model as plain values, for a JSON document; units by the suffix
-    of a key."""
+    """Summarise parameters, tolerances and errors of the written model as plain values, for a JSON document; units by
+    the suffix of a key."""
     model, fit, tolerance = twin.model, twin.fit, twin.model.tolerance
     return {
         "model": str(twin.plan.out),
@@ -39,7 +39,8 @@ def summarise_twin(twin: WrittenTwin) -> dict[str, Any]:
 
 
 def format_twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
-    """The same as lines of text for the terminal: the rigid body, its modes, and the error of each channel."""
+    """Format the written model as lines of text for the terminal: the rigid body, the modes of its bodies, and the
+    error of each channel (%)."""
     model, fit, tolerance = twin.model, twin.fit, twin.model.tolerance
     rigid_body, mass_tolerance_text = twin.rigid_body, _format_deviation(tolerance, "mass_kg")
     lines = [
@@ -62,20 +63,20 @@ def format_twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
 
 
 def _compute_modes_hz(twin: WrittenTwin) -> list[float]:
-    """Natural frequencies (Hz), ascending, of the bodies coupled to the driven axes, with the driven axes fixed: sqrt(k
-    / m) / (2 pi) for each body, which is exact where no two of the bodies are coupled to each other."""
+    """Compute the natural frequencies (Hz), ascending, of the bodies coupled to the driven axes, with the driven axes
+    fixed: sqrt(k / m) / (2 pi) for each body, which is exact where no two of the bodies are coupled to each other."""
     model, input_count = twin.model, twin.model.inputs
     stiffness_per_mass = np.diag(model.stiffness)[input_count:] / np.diag(model.mass)[input_count:]
     return sorted(float(frequency_hz) for frequency_hz in np.sqrt(np.maximum(stiffness_per_mass, 0.0)) / (2 * np.pi))
 
 
 def _format_values(values: FloatArray) -> str:
-    """Values with three significant digits, separated by commas."""
+    """Format values with three significant digits, separated by commas."""
     return ", ".join(typeset(f"{value:.3g}") for value in values)
 
 
 def _format_deviation(tolerance: Tolerance | None, parameter_name: str) -> str:
-    """The standard deviation of a parameter as text in brackets; empty where it is not known. parameter_name: field of
+    """Format the standard deviation of a parameter in brackets; empty where it is not known. parameter_name: field of
     `Tolerance`."""
     deviation = None if tolerance is None else getattr(tolerance, parameter_name)
     return "" if deviation is None else f" (± {deviation:.2g})"

@@ -13,7 +13,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, solve_banded_feedforward
+from equalizer.tracking.bands.narrow_and_wide_models import BandPredictions, solve_banded_feedforward
 from equalizer.tracking.compensation.effect_compensation import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
@@ -68,7 +68,7 @@ class EqualizedTrajectory:
     """Feedforward from the linear models alone."""
     peaks: ForcePeaks
     """Force peaks of `forces`."""
-    bands: BandFacts | None
+    bands: BandPredictions | None
     """Facts about the bands of a narrow and a wide model; None with a single band."""
     compensation: Compensation | None
     """Compensation of known effects; None without `EqualizePlan.physics`."""
@@ -178,14 +178,14 @@ def _require_accuracy(plan: EqualizePlan, feedforward: Feedforward, in_bands: bo
 
 def _solve_feedforward(
     plan: EqualizePlan, reference: Trajectory, models: PlaybackModels
-) -> tuple[Feedforward, BandFacts | None]:
+) -> tuple[Feedforward, BandPredictions | None]:
     """Solve for the feedforward forces, with the facts about the bands where narrow and wide models are combined.
     Raises ForceLimitError where the cap is exceeded, ValueError for unsuitable models."""
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two_bands is None:
         return compute_feedforward_at(models.at_place, reference.signal, settings), None
     banded = solve_banded_feedforward(models.two_bands, reference.signal, settings)
-    return banded.feedforward, banded.facts
+    return banded.feedforward, banded.predictions
 
 
 def _read_amplitude_n(model: IdentifiedModel) -> float | None:

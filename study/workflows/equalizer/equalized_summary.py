@@ -45,7 +45,7 @@ def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:
         values["bands"] = {
             "edges_hz": list(bands.edges_hz),
             "middle_error_if_only_cut": bands.cut_error,
-            "middle_error_with_run_in": bands.whole_error,
+            "middle_error_with_run_in": bands.uncut_error,
             "high_level_error": bands.level_error,
             "high_direction": list(bands.direction),
             "travel_m": bands.travel_m,
@@ -168,7 +168,7 @@ def _format_band_lines(equalized: EqualizedTrajectory) -> list[str]:
         f"model up to {high_hz:g} Hz, from there to {two_bands.wide.band_hz[1]:g} Hz only the loudness is reproduced, "
         "all along one direction.",
         "The bands begin before the table's first row and end after its last; only its rows are written, and the "
-        f"middle band is solved for them. Its error would be {100 * bands.whole_error:.2f} % if all rows were "
+        f"middle band is solved for them. Its error would be {100 * bands.uncut_error:.2f} % if all rows were "
         f"played, and {100 * bands.cut_error:.2f} % if the other rows were simply cut off.",
     ]
     if bands.level_error is not None:

@@ -1,5 +1,5 @@
-"""Summary of an identified device for `hapteq identify` and its report: lines for a person, a document for a
-program."""
+"""Summary of an identified device for `hapteq identify` and its report (`report_identification`): lines of text for the
+terminal, plain values for JSON."""
 
 from typing import Any
 
@@ -9,7 +9,8 @@ from study.workflows.equalizer.identify_model import IdentifiedDevice
 
 def summarise_model(device: IdentifiedDevice) -> dict[str, Any]:
     """Summarise quality, order, band (Hz) and errors of the identified model as JSON values; errors are relative to the
-    response (1 = 100 %), times in s."""
+    response (1 = 100 %), times in s. `lines`: number of spectral lines (frequencies) of the estimate in the band,
+    without its margins; `held_out_...`: None without a test recording."""
     model, held_out_test = device.model, device.held_out_test
     lowest_hz, highest_hz = model.band_hz
     return {
@@ -30,18 +31,19 @@ def summarise_model(device: IdentifiedDevice) -> dict[str, Any]:
 
 
 def format_summary(device: IdentifiedDevice) -> tuple[str, ...]:
-    """Format the summary as lines for the terminal."""
-    values = summarise_model(device)
-    lowest_hz, highest_hz = values["band_hz"]
+    """Format quality, order, band (Hz) and errors (%) as lines for the terminal, and the effects that were subtracted
+    from the recordings if there are any."""
+    summary = summarise_model(device)
+    lowest_hz, highest_hz = summary["band_hz"]
     lines = [
         write_quality_sentence(device.model.quality),
-        f"Order {values['order']}, {lowest_hz:g} to {highest_hz:g} Hz, stable (slowest pole "
-        f"{values['spectral_radius']:.5f}), from {values['lines']} lines.",
-        f"Model against estimate: {100 * values['rms_relative_error']:.2f} % rms, worst line "
-        f"{100 * values['worst_relative_error']:.2f} %; both include the noise of the estimate.",
+        f"Order {summary['order']}, {lowest_hz:g} to {highest_hz:g} Hz, stable (slowest pole "
+        f"{summary['spectral_radius']:.5f}), from {summary['lines']} lines.",
+        f"Model against estimate: {100 * summary['rms_relative_error']:.2f} % rms, worst line "
+        f"{100 * summary['worst_relative_error']:.2f} %; both include the noise of the estimate.",
     ]
-    if values["freed_of"]:
+    if summary["freed_of"]:
         lines.append(
-            f"Subtracted from the recordings: {', '.join(values['freed_of'])}; give --physics when playing, too."
+            f"Subtracted from the recordings: {', '.join(summary['freed_of'])}; give --physics when playing, too."
         )
     return tuple(lines)

@@ -238,7 +238,7 @@ def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[floa
 
 
 def _write_play(play: ContactPlay, models: PlaybackModels) -> None:  # tables, figure and contact.json in a new folder
-    from analysis.figures.contact_transient import contact_picture
+    from analysis.figures.contact_transient import make_contact_picture
     from study.workflows.picture_files import write_pictures
 
     rate_hz = play.sample_rate_hz
@@ -250,7 +250,7 @@ def _write_play(play: ContactPlay, models: PlaybackModels) -> None:  # tables, f
         ):
             signal = Signal(samples, rate_hz, table_kind.quantity, table_kind.unit, table_kind.header[1:])
             write_trajectory(folder / name, Trajectory(signal))
-        write_pictures(folder, [contact_picture(play.normal, rate_hz, play.reference, *_list_plays(play))])
+        write_pictures(folder, [make_contact_picture(play.normal, rate_hz, play.reference, *_list_plays(play))])
         provenance = gather_provenance(seeds={"device": play.plan.seed}).as_dict()
         document = {**summarise_contact(play), "model_sha256": models.sha256, "provenance": provenance}
         write_json(folder / "contact.json", "hapteq-contact", 1, document, overwrite=False)

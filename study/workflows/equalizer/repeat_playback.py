@@ -1,5 +1,9 @@
-"""Iterative learning on the device: play forces, compare with the wanted signal, correct, play again (`hapteq
-equalize --repeat N`)."""
+"""Iterative learning control on the device: play forces, measure the acceleration, correct the forces, play again.
+
+Order: check the plan, open the device, announce the motion, measure the noise at rest, then play and correct until the
+iteration ends or all repeats are played; the best forces are written. Called by `repeat_trajectory` (`hapteq equalize
+--repeat N`).
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -34,64 +38,73 @@ from study.workflows.equalizer.play_forces import (
 from study.workflows.equalizer.repeat_results import RepeatPlan, RepeatResult, make_result, write_best_forces
 
 REST_S = 2.0
-"""Rest (s) before the first play, to measure the sensor's noise."""
+"""Duration (s) without force before the first play, in which the noise of the sensor is measured (chosen)."""
 RESTART_ADVICE = "Start again; a run for the same trajectory and model can continue from forces that were written."
 """What to do after an interruption or a fault."""
 
 OnProgress = Callable[[int, float], None]
-"""Called with the number of the play, from 0, and the share of it that is done."""
+"""Called with the index of the play, from 0, and the share of it that is done, 0 to 1."""
 
 
 def repeat_playback(
     plan: RepeatPlan, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
 ) -> RepeatResult:
-    """Play and correct. If interrupted (KeyboardInterrupt) or stopped by the device, the best result so far is written
-    and the error says so.
+    """Play the forces, then correct them and play again, at most `plan.repeats` times; write the best forces.
 
-    before_moving: see `BeforeMoving`. Raises StudyError before anything moves if a person holds the handle, forces
-    exceed the cap, or a name is taken.
+    before_moving: see `BeforeMoving`. Raises StudyError before anything moves if a person holds the handle, the rates
+    differ, forces exceed the cap, or an output exists or has no folder. Raises UserInterruptError after an interruption
+    (KeyboardInterrupt) and DeviceError after a fault of the device; the best forces so far, if any, are written then,
+    and the error says so.
     """
-    _check(plan)
+    _check_plan(plan)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     with contextlib.closing(open_device(plan.device, plan.settings, clock, plan.seed)) as device:
-        plays: list[PlaybackResult] = []
+        play_results: list[PlaybackResult] = []
         states: list[IterationState] = []
         try:
             total_s = (plan.repeats + 1) * plan.reference.signal.duration_s
             announce_motion(device, plan.settings.limits.stimulus_cap_n, total_s, before_moving)
-            _play_all(plan, device, states, plays, on_progress)
+            _play_all(plan, device, states, play_results, on_progress)
         except KeyboardInterrupt as interruption:
-            saved = _write_best(plan, states, plays)
+            saved_text = _write_best(plan, states, play_results)
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError(
-                    "The force may still be on", Fault.FORCE_LEFT.sentence, RESTART_ADVICE, saved
+                    "The force may still be on", Fault.FORCE_LEFT.sentence, RESTART_ADVICE, saved_text
                 ) from None
-            explanation = f"{len(plays)} of up to {plan.repeats + 1} plays were measured; the force was released."
-            raise UserInterruptError("Interrupted", explanation, RESTART_ADVICE, saved) from interruption
+            explanation = (
+                f"{len(play_results)} of up to {plan.repeats + 1} plays were measured; the force was released."
+            )
+            raise UserInterruptError("Interrupted", explanation, RESTART_ADVICE, saved_text) from interruption
         except DeviceError as error:
-            error.saved = _write_best(plan, states, plays)
+            error.saved = _write_best(plan, states, play_results)
             raise
         write_best_forces(plan, states[-1], interrupted=False)
-        return make_result(plan, states[-1], plays)
+        return make_result(plan, states[-1], play_results)
 
 
-def _check(plan: RepeatPlan) -> None:
+def _check_plan(plan: RepeatPlan) -> None:
+    """Raise StudyError where a hand would be on the handle, no repeat was requested, an output exists, or its folder
+    does not."""
     if plan.settings.hand_on_handle:
-        raise not_repeated(
+        raise make_not_repeated_error(
             "A person would hold the handle. Repeats learn what one hand did in one play, and play it to the next.",
             "Take the hand off the handle and open the device without one.",
         )
     if plan.repeats < 1:
-        raise not_repeated(f"{plan.repeats} repeats were requested.", "Give 1 or more to --repeat.")
+        raise make_not_repeated_error(f"{plan.repeats} repeats were requested.", "Give 1 or more to --repeat.")
     for path in () if plan.out is None else (plan.out, get_repeats_path(plan.out)):
         if path.exists():
-            raise not_repeated(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
+            raise make_not_repeated_error(
+                f"{path} exists already, and results are never overwritten.", "Choose another --out."
+            )
     if plan.out is not None and not plan.out.absolute().parent.is_dir():
-        raise not_repeated(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
+        raise make_not_repeated_error(
+            f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first."
+        )
 
 
-def not_repeated(explanation: str, advice: str) -> StudyError:
-    """The error of a refusal before anything moved."""
+def make_not_repeated_error(explanation: str, advice: str) -> StudyError:
+    """Make the error for repeats that are refused before anything moves."""
     return StudyError("Nothing was repeated", explanation, advice, saved="Nothing moved.")
 
 
@@ -99,35 +112,40 @@ def _play_all(
     plan: RepeatPlan,
     device: Device,
     states: list[IterationState],
-    plays: list[PlaybackResult],
+    play_results: list[PlaybackResult],
     on_progress: OnProgress,
 ) -> None:
+    """Measure the noise at rest, then play and correct the forces until the iteration ends or `plan.repeats`
+    corrections were played. Appends each result to `states` and `play_results` at once, so that they remain after an
+    exception."""
     initial_state = _start_iteration(plan, device)
-    zeros_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
-    rest_acceleration = read_measured_acceleration(play_forces(device, zeros_n, lambda _: None))
+    rest_forces_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
+    rest_acceleration = read_measured_acceleration(play_forces(device, rest_forces_n, lambda _: None))
     repetition = replace(
         initial_state.repetition, noise_floor=estimate_rest_noise(rest_acceleration, initial_state.repetition)
     )
     states.append(replace(initial_state, repetition=repetition, noise_floor=repetition.noise_floor))
-    while states[-1].verdict is Verdict.CONTINUE and len(plays) <= plan.repeats:
-        number = len(plays)
-        play = play_forces(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
-        measured = read_measured_acceleration(play)
-        plays.append(play)
-        states.append(update_forces(states[-1], measured))
+    while states[-1].verdict is Verdict.CONTINUE and len(play_results) <= plan.repeats:
+        play_index = len(play_results)
+        play_result = play_forces(device, states[-1].forces, lambda share: on_progress(play_index, share))  # noqa: B023
+        measured_acceleration = read_measured_acceleration(play_result)
+        play_results.append(play_result)
+        states.append(update_forces(states[-1], measured_acceleration))
 
 
 def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
+    """Make the state before the first play: reference in the band, inverse of model and spring, limits, and the first
+    forces, given or from the model. Raises StudyError where the rates differ or the forces cannot be played."""
     signal, rate_hz = plan.reference.signal, device.info.sample_rate_hz
     if signal.sample_rate_hz != rate_hz:
-        raise not_repeated(
+        raise make_not_repeated_error(
             f"The trajectory is at {signal.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz.",
             "Resample the trajectory to the device's rate.",
         )
     padding_rows = CAUSAL.count_rows(rate_hz)[1]
-    reference = np.pad(signal.samples, ((0, padding_rows), (0, 0)))
-    invert = compensate_spring(plan.inverse(len(reference)), plan.spring, rate_hz, plan.band_hz)
-    reference_in_band, limits = filter_to_band(reference, rate_hz, plan.band_hz), plan.settings.limits
+    padded_reference = np.pad(signal.samples, ((0, padding_rows), (0, 0)))
+    invert = compensate_spring(plan.inverse(len(padded_reference)), plan.spring, rate_hz, plan.band_hz)
+    reference_in_band, limits = filter_to_band(padded_reference, rate_hz, plan.band_hz), plan.settings.limits
     repetition = Repetition(
         reference=reference_in_band,
         invert=invert,
@@ -146,11 +164,15 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
         # After the last row of the table, the model's own forces are played.
         return start_iteration(repetition, np.vstack([plan.first, invert(reference_in_band)[len(signal) :]]))
     except ValueError as error:
-        raise not_repeated(f"{capitalise(str(error))}.", "Make the trajectory smaller, or correct it.") from error
+        raise make_not_repeated_error(
+            f"{capitalise(str(error))}.", "Make the trajectory smaller, or correct it."
+        ) from error
 
 
-def _write_best(plan: RepeatPlan, states: list[IterationState], plays: list[PlaybackResult]) -> str:
+def _write_best(plan: RepeatPlan, states: list[IterationState], play_results: list[PlaybackResult]) -> str:
+    """Write the best forces so far after an interruption or a fault, if there are any and the plan has an output.
+    Returns a sentence on what was written."""
     if plan.out is None or not (states and states[-1].residuals):
         return "Nothing was written."
     write_best_forces(plan, states[-1], interrupted=True)
-    return f"The best forces of {len(plays)} plays are in {plan.out}."
+    return f"The best forces of {len(play_results)} plays are in {plan.out}."

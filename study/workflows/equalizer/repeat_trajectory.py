@@ -18,7 +18,7 @@ from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.convergence import Convergence
 from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, find_largest_share
 from equalizer.tracking.learning.model_inverse import compensate_spring
-from equalizer.tracking.workspace.convergence_at_place import convergence_at
+from equalizer.tracking.workspace.convergence_at_place import predict_convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import make_inverse_at
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import get_repeats_path
@@ -35,7 +35,7 @@ from study.workflows.equalizer.play_forces import (
     require_device_alone,
 )
 from study.workflows.equalizer.playback_models import PlaybackModels
-from study.workflows.equalizer.repeat_playback import OnProgress, not_repeated, repeat_playback
+from study.workflows.equalizer.repeat_playback import OnProgress, make_not_repeated_error, repeat_playback
 from study.workflows.equalizer.repeat_results import RepeatPlan, RepeatResult, read_earlier_forces
 
 SAFE_GAIN_FRACTION = 0.9
@@ -44,8 +44,8 @@ chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
-class RepeatOrder:
-    """Order of `repeat_trajectory`: number of corrections, device, and options."""
+class RepeatOptions:
+    """Options of `repeat_trajectory`: number of corrections, device, earlier forces, seed."""
 
     repeats: int
     """Number of corrections after the first play."""
@@ -62,7 +62,7 @@ class RepeatedTrajectory:
     """Result of `repeat_trajectory`: the solution from the models, and the forces corrected by repeated playback."""
 
     equalized: EqualizedTrajectory
-    order: RepeatOrder
+    options: RepeatOptions
     repeated: RepeatResult
     convergence: Convergence | None
     """Convergence test with `gain`; None for a single model that does not state its uncertainty."""
@@ -71,7 +71,10 @@ class RepeatedTrajectory:
 
 
 def repeat_trajectory(
-    plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
+    plan: EqualizePlan,
+    options: RepeatOptions,
+    on_progress: OnProgress,
+    before_moving: BeforeMoving = refuse_unannounced,
 ) -> RepeatedTrajectory:
     """Compute the forces, play and correct them, and write the table of forces and its document.
 
@@ -82,35 +85,35 @@ def repeat_trajectory(
     equalized = solve_trajectory(plan)
     _require_repeatable(equalized.models)
     if equalized.feedforward.loss is not None:
-        raise not_repeated(
+        raise make_not_repeated_error(
             "The forces are at the cap already, so that there is no room to correct them.",
             "Scale the accelerations, or leave out --constrain or --repeat.",
         )
     spring = find_acting_spring(equalized.models)
-    gain, convergence = _test_gain(equalized, spring)
+    gain, convergence = _choose_gain(equalized, spring)
     repeat_plan = RepeatPlan(
         reference=equalized.reference,
         inverse=make_inverse_at(equalized.models.at_place, plan.weight),
         band_hz=equalized.models.band_hz,
         model_sha256=equalized.models.sha256,
         settings=make_playback_settings(plan.cap_n, equalized.models),
-        device=order.device,
-        repeats=order.repeats,
+        device=options.device,
+        repeats=options.repeats,
         first_gain=gain,
         spring=spring,
-        first=_choose_initial_forces(equalized, order, spring),
-        seed=order.seed,
+        first=_choose_initial_forces(equalized, options, spring),
+        seed=options.seed,
         out=plan.out,
     )
     return RepeatedTrajectory(
-        equalized, order, repeat_playback(repeat_plan, on_progress, before_moving), convergence, gain
+        equalized, options, repeat_playback(repeat_plan, on_progress, before_moving), convergence, gain
     )
 
 
 def summarise_repeats(result: RepeatedTrajectory) -> dict[str, Any]:
-    """Results as plain values, for a JSON document. `errors`, `noise_floor`: rms relative to that of the reference
-    trajectory; `peak_n` in N; `surviving_error`: largest fraction of an error that remains after a correction, by the
-    convergence test."""
+    """Summarise the results as plain values, for a JSON document. `errors`, `noise_floor`: rms relative to that of the
+    reference trajectory; `peak_n` in N; `surviving_error`: largest fraction of an error that remains after a
+    correction, by the convergence test."""
     repeated = result.repeated
     return {
         **summarise_equalization(result.equalized),
@@ -127,11 +130,11 @@ def summarise_repeats(result: RepeatedTrajectory) -> dict[str, Any]:
 
 
 def format_repeat_lines(result: RepeatedTrajectory) -> tuple[str, ...]:
-    """Results as lines of text for the terminal."""
+    """Format the results as lines of text for the terminal: equalization, convergence test, error of each play (%), and
+    the largest force (N)."""
     repeated = result.repeated
-    *equalized_lines, _ = format_equalization_lines(
-        result.equalized
-    )  # the last line states the spring of the solved forces
+    # The last line is left out: it states the spring of the forces before the corrections.
+    *equalized_lines, _ = format_equalization_lines(result.equalized)
     lines = [*equalized_lines, _describe_convergence(result)]
     for play_index, error in enumerate(repeated.errors):
         kept_text = ", kept" if play_index == repeated.best_play else ""
@@ -144,21 +147,21 @@ def format_repeat_lines(result: RepeatedTrajectory) -> tuple[str, ...]:
 
 
 def _compute_peak_n(repeated: RepeatResult) -> float:
-    """Largest magnitude of the force vector over the samples, N."""
+    """Compute the largest magnitude of the force vector over the samples (N)."""
     return float(np.linalg.norm(repeated.forces.signal.samples, axis=1).max())
 
 
 def _describe_verdict(result: RepeatedTrajectory) -> str:
-    """Sentence on why the corrections ended."""
+    """Describe in a sentence why the corrections ended."""
     repeated = result.repeated
-    if repeated.verdict is Verdict.BEST_KEPT and len(repeated.errors) > result.order.repeats:
+    if repeated.verdict is Verdict.BEST_KEPT and len(repeated.errors) > result.options.repeats:
         return "All repeats were played; the best forces are kept."
     return f"{capitalise(repeated.verdict.value)}."
 
 
 def _describe_convergence(result: RepeatedTrajectory) -> str:
-    """Sentence on the convergence test: largest fraction of the error that remains after a correction, and its
-    frequency (Hz)."""
+    """Describe the convergence test in a sentence: largest fraction of the error that remains after a correction, and
+    its frequency (Hz)."""
     if result.convergence is None:
         return "Convergence was not tested before playing: the model does not contain its uncertainty."
     return (
@@ -171,7 +174,7 @@ def _describe_convergence(result: RepeatedTrajectory) -> str:
 def _require_repeatable(models: PlaybackModels) -> None:
     """Raise StudyError for two models of one place, and for a model that was identified with a hand on the handle."""
     if models.two_bands is not None:
-        raise not_repeated(
+        raise make_not_repeated_error(
             "Two bands of one place were given, and of the upper one only the loudness is felt, so that its "
             "waveform cannot be corrected.",
             "Give the one model whose band shall be repeated.",
@@ -179,33 +182,33 @@ def _require_repeatable(models: PlaybackModels) -> None:
     require_device_alone(models)
 
 
-def _test_gain(equalized: EqualizedTrajectory, spring: VirtualSpring) -> tuple[float, Convergence | None]:
-    """Gain of the corrections, and the convergence test with this gain: `SAFE_GAIN_FRACTION` of the largest gain with
-    which every error decreases, at most 1. (1, None) where a single model does not state its uncertainty. Raises
+def _choose_gain(equalized: EqualizedTrajectory, spring: VirtualSpring) -> tuple[float, Convergence | None]:
+    """Choose the gain of the corrections, and test the convergence with it: `SAFE_GAIN_FRACTION` of the largest gain
+    with which every error decreases, at most 1. (1, None) where a single model does not state its uncertainty. Raises
     StudyError for a gain below `LOWEST_GAIN`."""
     models_at_place, weight = equalized.models.at_place, equalized.plan.weight
-    convergence = convergence_at(models_at_place, weight, spring)
+    convergence = predict_convergence_at(models_at_place, weight, spring)
     if convergence is None:
         return 1.0, None
     gain = min(1.0, SAFE_GAIN_FRACTION * convergence.safe_beta)
     if gain < LOWEST_GAIN:
-        raise not_repeated(
+        raise make_not_repeated_error(
             f"Repeats would not converge: at {convergence.worst_hz:.1f} Hz {convergence.remaining_share.max():.2f} of "
             "an error can remain after each with gain 1, within the models' uncertainty; a safe gain is below "
             f"{LOWEST_GAIN:g}.",
             "Record and identify at the place itself, or with more sweeps.",
         )
-    return gain, convergence if gain == 1.0 else convergence_at(models_at_place, weight, spring, gain)
+    return gain, convergence if gain == 1.0 else predict_convergence_at(models_at_place, weight, spring, gain)
 
 
 def _choose_initial_forces(
-    equalized: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring
+    equalized: EqualizedTrajectory, options: RepeatOptions, spring: VirtualSpring
 ) -> FloatArray | None:
-    """Forces of the first playback, (N, 3) in N: those of an earlier run, or the solution with compensated nonlinear
-    effects plus the compensation of the spring. None where neither applies: `repeat_playback` then computes them from
-    the model."""
-    if order.earlier is not None:
-        return read_earlier_forces(order.earlier, equalized.reference, equalized.models.sha256)
+    """Choose the forces of the first playback, (N, 3) in N: those of an earlier run, or the solution with compensated
+    nonlinear effects plus the compensation of the spring. None where neither applies: `repeat_playback` then computes
+    them from the model."""
+    if options.earlier is not None:
+        return read_earlier_forces(options.earlier, equalized.reference, equalized.models.sha256)
     if equalized.compensation is None:
         return None
     rate_hz, band_hz = equalized.reference.signal.sample_rate_hz, equalized.models.band_hz

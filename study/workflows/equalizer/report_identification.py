@@ -1,7 +1,7 @@
-"""Report of an identified device: an HTML page and its figures, in the folder of the results.
+"""Write the report of an identified device: an HTML page and its figures, in the folder of the results.
 
-The page shows estimate and model, resonances, the frequency above which the axes couple, the frequency bands with
-their control methods, and a comparison of model orders (`compare_orders`). Called by `hapteq identify`.
+The page shows estimate and model, resonances, the frequency above which the axes couple, the frequency bands with their
+control methods, and a comparison of model orders (`compare_orders`). Called by `hapteq identify`.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from study.workflows.equalizer.identify_model import IdentifiedDevice
 from study.workflows.picture_files import write_pictures
 
 DECAY_BOUND_RATIO = 1.5
-"""Ratio of the bound on the decay time in the comparison of orders to the slowest decay time that was found."""
+"""Ratio of the bound on the decay time in the comparison of orders to the slowest decay time that was found; chosen."""
 PAGE_NAME = "report.html"
 """File name of the page in the folder of the results."""
 
@@ -36,6 +36,7 @@ PAGE_NAME = "report.html"
 def report_identification(device: IdentifiedDevice, folder: Path, on_progress: Callable[[float], None]) -> Path:
     """Write report.html and figures/ into `folder`; returns the path of the page. on_progress: called with the share
     done, 0 to 1. Raises CannotWriteError."""
+    # The shares 0.8 and 0.95 are chosen: the comparison of orders takes most of the time, then the figures.
     report_findings = collect_findings(device, lambda share: on_progress(0.8 * share))
     pictures = make_identification_pictures(report_findings)
     write_pictures(folder / "figures", pictures)
@@ -49,14 +50,15 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
 def collect_findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> IdentificationFindings:
     """Collect the content of the page. on_progress: called with the share done, 0 to 1; the comparison of orders takes
     the time."""
-    onset = find_coupling_onset(device.estimate)
+    coupling_onset = find_coupling_onset(device.estimate)
+    # Bands begin at 1 Hz or above, as by default in `compute_frequency_bands`.
     lowest_hz, highest_hz = max(1.0, float(device.estimate.frequency_hz[0])), float(device.estimate.frequency_hz[-1])
     return IdentificationFindings(
         estimate=device.estimate,
         model=device.model,
         resonances=find_resonances(device.estimate),
-        onset=onset,
-        bands=compute_frequency_bands(onset.frequency_hz, lowest_hz=lowest_hz, highest_hz=highest_hz),
+        onset=coupling_onset,
+        bands=compute_frequency_bands(coupling_onset.frequency_hz, lowest_hz=lowest_hz, highest_hz=highest_hz),
         direction_limit_hz=PUBLISHED_DIRECTION_LIMIT_HZ,
         order=_compare_lower_orders(device, on_progress),
         results=format_summary(device),
@@ -65,7 +67,8 @@ def collect_findings(device: IdentifiedDevice, on_progress: Callable[[float], No
 
 
 def _compare_lower_orders(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> OrderReport | None:
-    """Compare the requested order with lower ones; None where the estimate has too few lines for it."""
+    """Compare the requested order with the lower ones of the default orders of `compare_orders`; None where the
+    estimate has too few spectral lines for it."""
     requested_order = device.plan.order
     orders = sorted({order for order in (10, 14, 16, 20, 26) if order <= requested_order} | {requested_order})
     # With a tighter bound on the decay time than the device needs, no order could fit its slowly decaying resonances.
@@ -80,8 +83,8 @@ def _compare_lower_orders(device: IdentifiedDevice, on_progress: Callable[[float
 
 
 def _format_origin(device: IdentifiedDevice) -> dict[str, str]:
-    """Format the origin of the model by heading: recordings with the first digits of their SHA-256, device, and kind of
-    input."""
+    """Format the origin of the model by heading: recordings with the first 12 digits of their SHA-256, device, and kind
+    of input."""
     parents = device.model.provenance.get("parents", [])
     return {
         "recordings": ", ".join(f"{parent['file']} ({parent['sha256'][:12]})" for parent in parents),

@@ -12,7 +12,8 @@ from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpri
 from study.errors import StudyError
 
 SPRING_TOLERANCE = 0.01
-"""Relative difference of stiffness and of damping up to which two springs count as equal."""
+"""Relative difference of stiffness and of damping up to which two springs count as equal. Chosen: allows for the
+rounding of stored numbers."""
 
 
 def find_spring_to_compensate(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:

@@ -1,7 +1,7 @@
 """Identify and validate any file, and generate the documentation of the formats from the code.
 
 `file_content` (the file, opened once) -> `recognisers`, `session_recognisers` (one function per format) -> `validate`
-(one file) -> `validate_apart` (many files, in a separate process) -> `validate_together` (files against each other).
-`format_docs` and `importing_docs` generate pages of docs/, with the prose of `format_text` and `importing_text`.
-Begin at `validate.py`.
+(one file) -> `validate_in_process` (many files, in a separate process) -> `check_model_channels` (files against each
+other). `format_docs` and `importing_docs` generate pages of docs/, with the prose of `format_text` and
+`importing_text`. Begin at `validate.py`.
 """

@@ -27,9 +27,11 @@ class FileContent:
     hdf5_format: str | None = None
     """Format attribute of an HDF5 file; empty if it has none."""
     text: str | None = None
+    """Decoded text of a text file."""
     json: Any = None
     """The parsed document, if the whole text is one. JSON Lines (`events.jsonl`) are not parsed here."""
     toml: dict[str, Any] | None = None
+    """The parsed document, if the whole text is one."""
 
     @property
     def json_format(self) -> str | None:
@@ -39,7 +41,8 @@ class FileContent:
 
     @property
     def header(self) -> tuple[str, ...]:
-        """Fields of the first line as of a CSV table, without surrounding spaces; empty if it is not one."""
+        """Fields of the first line as of a CSV table, without surrounding spaces; empty without text, or where the line
+        cannot be parsed as CSV."""
         rows = csv.reader(io.StringIO((self.text or "").partition("\n")[0]))
         try:
             return tuple(name.strip() for name in next(rows, []))
@@ -55,8 +58,8 @@ def open_content(path: Path) -> FileContent:
             return FileContent(path, is_folder=True)
         if is_hdf5(path):
             return FileContent(path, hdf5_format=read_format(path))
-    except OSError as problem:
-        raise CannotReadError(path, problem) from problem
+    except OSError as error:
+        raise CannotReadError(path, error) from error
     if path.is_file() and path.suffix.lower() in (".h5", ".hdf5"):
         raise UnusableFileError(path, "HDF5 file", ("it does not begin as HDF5 files do",))
     text = read_text(path)
@@ -64,7 +67,8 @@ def open_content(path: Path) -> FileContent:
 
 
 def _parse_json(text: str) -> Any:
-    """Parse a JSON document; None if the text is longer than `MAX_DOCUMENT_BYTES` or not JSON."""
+    """Parse a JSON document; None if the text has more than `MAX_DOCUMENT_BYTES` characters (at least as many bytes) or
+    is not JSON."""
     try:
         return load_json(text) if len(text) <= MAX_DOCUMENT_BYTES else None
     except ValueError:
@@ -72,7 +76,8 @@ def _parse_json(text: str) -> Any:
 
 
 def _parse_toml(text: str) -> dict[str, Any] | None:
-    """Parse a TOML document; None if it is not TOML, or if text or a key is too long: parsing would take minutes."""
+    """Parse a TOML document; None if it is not TOML, has more than `MAX_TOML_BYTES` characters, or has a dotted key of
+    too many parts (`find_long_key`), whose parsing would take minutes."""
     if len(text) > MAX_TOML_BYTES or find_long_key(text):
         return None
     try:

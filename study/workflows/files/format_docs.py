@@ -25,7 +25,7 @@ from protocols.document.schema import make_protocol_schema
 from protocols.trial import Trial
 from study.session.facts import log_chain
 from study.session.facts.events import EVENTS
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.store.disk.csv_rows import describe_type, list_columns
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import write_text
@@ -126,7 +126,9 @@ SCHEMAS: tuple[Schema, ...] = (
     Schema(
         "live.json",
         format_text.LIVE_STATE_DESCRIPTION,
-        lambda: make_document_schema(TypeAdapter(Live).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION),
+        lambda: make_document_schema(
+            TypeAdapter(LiveState).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION
+        ),
     ),
     Schema("request.json", format_text.REQUEST_DESCRIPTION, make_request_schema),
 )

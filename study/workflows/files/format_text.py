@@ -5,7 +5,7 @@ files, so that page and code agree.
 """
 
 from equalizer.laws.parse import FUNCTIONS, MEMORY_OPERATORS, MOST_CHARACTERS, MOST_NODES
-from equalizer.laws.program import CELLS, STACK_SIZE
+from equalizer.laws.program import MAX_CELLS, STACK_SIZE
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE
@@ -61,7 +61,7 @@ LAW_SECTION = "\n\n".join(
         f"{_FUNCTION_NAMES}. Comparisons do not exist: `maximum(x - 0.01, 0)` is a stop, `(1 + sign(vx))/2` is 1 "
         "during upward motion.",
         "**Functions with memory.** `lag(s, tau_s)` is one pole. `play(s, half_width)` follows s with play. "
-        f"`delay(s, seconds)` stores up to {CELLS} instants. `integral(s)` integrates over time. A second argument "
+        f"`delay(s, seconds)` stores up to {MAX_CELLS} instants. `integral(s)` integrates over time. A second argument "
         "must be constant. In a law of a force or response, the initial state is that of signals which have always had "
         "their first values. In a law of a command, it is that of zero signals.",
         "**Signals.** `x`, `vx`, `ax`, `fx` are position, velocity, acceleration and command of the x axis; y and z "

@@ -1,4 +1,4 @@
-"""Composes docs/importing.md: how recordings of other programs are imported, and every key of an import map.
+"""Compose docs/importing.md: how recordings of other programs are imported, and every key of an import map.
 
 `format_docs` writes the page. The prose is in `importing_text`; the tables of keys, functions and shipped maps come
 from the schema and the functions of the code that reads a map, so that page and code agree.
@@ -14,7 +14,7 @@ from study.workflows.files import importing_text
 
 
 def compose_importing_page() -> str:
-    """Text of docs/importing.md, in Markdown."""
+    """Compose the text of docs/importing.md, in Markdown."""
     sections = [
         importing_text.INTRODUCTION,
         f"```toml\n{importing_text.EXAMPLE}```",
@@ -26,8 +26,8 @@ def compose_importing_page() -> str:
         "## What is not read",
         importing_text.NOT_READ,
         "## Keys of a map",
-        _format_keys("At the top", MAP_SCHEMA),
-        *(_format_keys(_format_table_title(name, node), _resolve_table(node)) for name, node in _list_tables()),
+        _format_key_section("At the top", MAP_SCHEMA),
+        *(_format_key_section(_format_table_title(name, node), _resolve_table(node)) for name, node in _list_tables()),
         "## Maps that come with hapteq",
         importing_text.SHIPPED_MAPS,
         _format_markdown_table(("name", "files", "what"), (_format_map_row(name) for name in list_shipped_maps())),
@@ -36,13 +36,13 @@ def compose_importing_page() -> str:
 
 
 def _list_tables() -> list[tuple[str, Node]]:
-    """Name and schema of each table of an import map (TOML tables and lists of tables)."""
+    """List name and schema of each table of an import map (TOML tables and lists of tables)."""
     return [(name, node) for name, node in MAP_SCHEMA["properties"].items() if _resolve_table(node)]
 
 
 def _resolve_table(node: Node) -> Node:
-    """JSON schema of a TOML table, or of the entries of a list of tables, with references followed; empty for a plain
-    value."""
+    """Resolve the JSON schema of a TOML table, or of the entries of a list of tables, with references followed; empty
+    for a plain value."""
     resolved_node = resolve_reference(MAP_SCHEMA, node)
     entry_schema = (
         resolve_reference(MAP_SCHEMA, resolved_node["items"]) if resolved_node.get("type") == "array" else resolved_node
@@ -51,19 +51,21 @@ def _resolve_table(node: Node) -> Node:
 
 
 def _format_table_title(name: str, node: Node) -> str:
-    """Header of a table as it is written in TOML, in backticks: `[[name]]` for a list of tables, else `[name]`."""
+    """Format the header of a table as it is written in TOML, in backticks: `[[name]]` for a list of tables, else
+    `[name]`."""
     return f"`[[{name}]]`" if resolve_reference(MAP_SCHEMA, node).get("type") == "array" else f"`[{name}]`"
 
 
-def _format_keys(title: str, table: Node) -> str:
-    """Section on the plain keys of a table: heading and Markdown table of key, allowed values and meaning."""
+def _format_key_section(title: str, table: Node) -> str:
+    """Format the section on the keys of a table: heading and Markdown table of key, allowed values and meaning. Of the
+    whole map (`MAP_SCHEMA`) only keys with plain values are listed, because its tables have sections."""
     plain_keys = [
         (key, node) for key, node in table["properties"].items() if table is not MAP_SCHEMA or not _resolve_table(node)
     ]
-    required = table.get("required", ())
+    required_keys = table.get("required", ())
     rows = (
         (
-            f"`{key}`{' (needed)' if key in required else ''}",
+            f"`{key}`{' (needed)' if key in required_keys else ''}",
             describe_allowed_in_map(node, key),
             node.get("description", ""),
         )
@@ -73,12 +75,12 @@ def _format_keys(title: str, table: Node) -> str:
 
 
 def _format_map_row(name: str) -> tuple[str, str, str]:
-    """Row of the table of shipped maps: name, file patterns and title."""
+    """Format a row of the table of shipped maps: name, file patterns and title."""
     import_map = read_map(name).map
     return f"`{name}`", ", ".join(f"`{pattern}`" for pattern in import_map.files), import_map.title
 
 
 def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table. A bar within a cell would end the cell; it is replaced by a slash."""
+    """Format a Markdown table. A bar within a cell would end the cell; it is replaced by a slash."""
     rows_with_header = [header, tuple("---" for _ in header), *rows]
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |" for cells in rows_with_header)

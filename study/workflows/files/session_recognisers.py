@@ -1,4 +1,5 @@
-"""Recognisers of the files of a study, for `hapteq validate`: sessions, JSON documents derived from them, locks.
+"""Recognisers of the files of a study, for `hapteq validate` (called by `validate`): sessions, JSON documents derived
+from them, locks.
 
 A session folder is checked as a whole: its log is replayed against the rules, every recording is compared with the
 SHA-256 in the log, and the tables are compared with what the log gives.
@@ -13,7 +14,7 @@ from study.errors import StudyError
 from study.local_clock import convert_to_machine_zone
 from study.session.facts.events import SESSION_FORMAT, TrialMeasured
 from study.session.views.local_time import format_time_in_zone
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import read_json
 from study.store.disk.provenance import compute_sha256
@@ -23,7 +24,7 @@ from study.store.sessions.live_file import LIVE_FORMAT
 from study.store.sessions.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
 from study.store.sessions.request_inbox import REQUEST_FORMAT
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
-from study.store.sessions.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, describe_unfinished
+from study.store.sessions.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, describe_unfinished_withdrawal
 from study.workflows.files.file_content import FileContent
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import find_result_problems
@@ -35,7 +36,10 @@ DOCUMENTS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
     "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
     SEAL_FORMAT: ("seal of a session log", ("session", "lines", "bytes", "head", "sha256")),
-    LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live) if field.default is MISSING)),
+    LIVE_FORMAT: (
+        "live state of a session",
+        tuple(field.name for field in fields(LiveState) if field.default is MISSING),
+    ),
     REQUEST_FORMAT: ("request to a running session", ("request", "who")),
     WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
@@ -44,45 +48,47 @@ DOCUMENTS = {
 
 
 def recognise_session(content: FileContent) -> str | None:
-    """A session folder or its log; the log alone is replayed without checks of recordings and tables. None for others.
-    Raises UnusableFileError."""
+    """Recognise a session folder, or a log by its name or by the session format in its first 1000 characters. For a
+    log, the log of its folder (`LOG_NAME`) is replayed, without checks of recordings and tables. Returns the session in
+    words; None for other files. Raises UnusableFileError for a damaged session."""
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
             return _describe_withdrawn(folder, content.path)
         return _check_session(folder, content.path) if folder.log.exists() else None
     if content.path.name == LOG_NAME or f'"{SESSION_FORMAT}"' in (content.text or "")[:1000]:
-        return _describe(_fold(SessionFolder(content.path.resolve().parent), content.path))
+        return _describe_session(_replay_log(SessionFolder(content.path.resolve().parent), content.path))
     return None
 
 
 def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
-    """Kind of a withdrawn session. Raises UnusableFileError where erasing is not finished."""
-    if finish := describe_unfinished(folder):
-        raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
+    """Describe a withdrawn session. Raises UnusableFileError where erasing is not finished."""
+    if remedy := describe_unfinished_withdrawal(folder):
+        raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", remedy))
     return "withdrawn session; only its tombstone remains"
 
 
 def recognise_document(content: FileContent) -> str | None:
-    """Kind of a JSON document of `DOCUMENTS`; None for others. Raises UnusableFileError where a key is missing, and for
-    a withdrawal whose erasing is not finished."""
+    """Recognise a JSON document of `DOCUMENTS`. Returns its kind in words; None for others. Raises UnusableFileError
+    where a key is missing, for an invalid seal, and for a withdrawal whose erasing is not finished."""
     if content.json_format not in DOCUMENTS:
         return None
     kind, required_keys = DOCUMENTS[content.json_format]
     if content.json_format == WITHDRAWAL_FORMAT:
-        finish = "the erasing is not finished; `hapteq withdraw` continues it"
-        raise UnusableFileError(content.path, kind, (finish,))
+        problem = "the erasing is not finished; `hapteq withdraw` continues it"
+        raise UnusableFileError(content.path, kind, (problem,))
     if content.json_format == SEAL_FORMAT:
         read_seal(content.path)
     document = read_json(content.path, content.json_format, SUMMARY_VERSION)
-    missing = [key for key in required_keys if key not in document]
-    if missing:
-        raise UnusableFileError(content.path, kind, (f"it lacks {', '.join(missing)}",))
+    missing_keys = [key for key in required_keys if key not in document]
+    if missing_keys:
+        raise UnusableFileError(content.path, kind, (f"it lacks {', '.join(missing_keys)}",))
     return kind
 
 
 def recognise_lock(content: FileContent) -> str | None:
-    """A protocol's lock. Raises UnusableFileError where it cannot be parsed."""
+    """Recognise the lock of a protocol. Returns its protocol and time in words; None for others. Raises
+    UnusableFileError where it cannot be parsed."""
     if content.json_format != LOCK_FORMAT:
         return None
     try:
@@ -93,20 +99,20 @@ def recognise_lock(content: FileContent) -> str | None:
 
 
 def _check_session(folder: SessionFolder, path: Path) -> str:
-    """Description of a session folder whose recordings have the logged SHA-256 and whose tables agree with the log.
+    """Check and describe a session folder whose recordings have the logged SHA-256 and whose tables agree with the log.
     Raises UnusableFileError otherwise."""
-    folded_session = _fold(folder, path)
+    folded_session = _replay_log(folder, path)
     problems = [
-        *_check_recording_file(folder, folded_session),
-        *_result_problems(folder, folded_session),
+        *_find_recording_problems(folder, folded_session),
+        *_describe_result_problems(folder, folded_session),
     ]
     if problems:
         raise UnusableFileError(path, KIND, tuple(problems))
-    return _describe(folded_session)
+    return _describe_session(folded_session)
 
 
-def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
-    """The session, replayed from its log. Raises UnusableFileError for any damage, an incomplete last line included."""
+def _replay_log(folder: SessionFolder, path: Path) -> FoldedSession:
+    """Replay the session from its log. Raises UnusableFileError for any damage, an incomplete last line included."""
     try:
         folded_session = fold_session(folder)
     except UnusableFileError:
@@ -119,8 +125,8 @@ def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
     return folded_session
 
 
-def _check_recording_file(folder: SessionFolder, folded_session: FoldedSession) -> list[str]:
-    """Recordings of trials that are missing or differ from the SHA-256 in the log."""
+def _find_recording_problems(folder: SessionFolder, folded_session: FoldedSession) -> list[str]:
+    """Find recordings of trials that are missing or differ from the SHA-256 in the log."""
     problems = []
     for event in folded_session.log_contents.events:
         if not isinstance(event, TrialMeasured) or event.recording is None:
@@ -133,28 +139,29 @@ def _check_recording_file(folder: SessionFolder, folded_session: FoldedSession) 
     return problems
 
 
-def _result_problems(folder: SessionFolder, folded_session: FoldedSession) -> list[str]:
-    """Result files that contradict the log, and a missing seal. A missing table is not an error, because it can
-    be written from the log."""
-    texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded_session.seal_due else []
+def _describe_result_problems(folder: SessionFolder, folded_session: FoldedSession) -> list[str]:
+    """Describe result files that contradict the log, and a missing seal. A missing table is not an error, because it
+    can be written from the log."""
+    problem_texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded_session.seal_due else []
     for result in find_result_problems(folder, folded_session.state):
         if not result.missing:
-            texts += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
-    return texts
+            problem_texts += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
+    return problem_texts
 
 
-def _describe(folded_session: FoldedSession) -> str:
-    """Participant, protocol, number of answers, end, state of checksums and seal, and steps of the clock, in words."""
+def _describe_session(folded_session: FoldedSession) -> str:
+    """Describe a session: participant, protocol, number of answers, end, state of checksums and seal, and steps of the
+    clock."""
     state = folded_session.state
-    participant = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
-    end = state.sitting.ineligibility or ("finished" if state.closed else "not finished")
-    steps = "".join(
+    person = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
+    end_text = state.sitting.ineligibility or ("finished" if state.closed else "not finished")
+    clock_step_text = "".join(
         f". Before {format_time_in_zone(step.utc, convert_to_machine_zone)}: {step.sentence}"
         for step in state.sitting.clock_steps
     ).rstrip(".")
-    sealed = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
-    kind = f"session {state.opened.session} of {participant}, {state.protocol.name}, {state.answers} answers, {end}"
-    return f"{kind}; log {folded_session.log_contents.chain.describe()}{sealed}{steps}"
+    seal_text = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
+    summary = f"session {state.opened.session} of {person}, {state.protocol.name}, {state.answers} answers, {end_text}"
+    return f"{summary}; log {folded_session.log_contents.chain.describe()}{seal_text}{clock_step_text}"
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

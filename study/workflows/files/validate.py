@@ -2,7 +2,7 @@
 
 The recognisers are tried in turn on the content. A file that none of them recognises, and that may be a recording of
 another program, is read as `hapteq import` would read it. Remarks on access rights and on idle commands are added.
-Called by `validate_together` and `validate_apart`.
+Called by `check_model_channels` and `validate_in_process`.
 """
 
 import tomllib

@@ -121,7 +121,7 @@ def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -
 
     effect_db, threshold_name = (
         compute_true_difference_db(plan.crowd, plan.contrast_hz),
-        select_threshold_words(plan.rule).means,
+        select_threshold_words(plan.rule).noun,
     )
     write_pictures(folder, (make_power_picture(points, effect_db, plan.pair_hz, threshold_name),))
 
@@ -202,7 +202,7 @@ def _append_json_line(path: Path, row: dict[str, object]) -> None:
         raise CannotWriteError(path, problem) from problem
 
 
-def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSAL_WORDS.means) -> list[str]:
+def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSAL_WORDS.noun) -> list[str]:
     """Format a table for the terminal: power in percent with its 95 % interval, by sample size and analysis; coverage
     of the 95 % interval of the difference; bias in dB. threshold_name: name of the thresholds of single runs, in the
     plural."""

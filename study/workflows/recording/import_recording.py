@@ -1,8 +1,9 @@
-"""Import foreign recordings: files of other programs become a recording of hapteq.
+"""Import recordings of other programs: read their files and write a recording of hapteq.
 
 An import map states which columns are commands and responses, and their units. It is given, found with the files or
 among the shipped maps, or derived from the header of a table; recordings in hapteq's own format need none. The result
-records files, map and notes, so that its origin can be traced.
+states files, map and notes, so that its origin can be traced. Called by `hapteq import`, `validate` and
+`read_any_recording`, and exported as `study.import_recording`.
 """
 
 import hashlib
@@ -12,7 +13,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from equalizer.signals.joining import join, signals_left_out
+from equalizer.signals.joining import join, list_dropped_signals
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.read_arrays import Arrays
@@ -53,10 +54,11 @@ class ImportPlan:
     map: str | None
     """Name of a shipped map, or path of a map; None to find a map, or to derive one from headers."""
     out: Path
+    """Recording to write; must not exist."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Imported:
+class ImportedRecording:
     """A recording that was imported and written to `path`."""
 
     path: Path
@@ -72,39 +74,42 @@ def check_free(out_path: Path) -> None:
     require_new_outputs(out_path, title="Nothing was imported", kind="recordings")
 
 
-def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> Imported:
+def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> ImportedRecording:
     """Import a recording and write it to `plan.out`, with the files' hashes and the map in its metadata. on_progress:
     share done, 0 to 1. Raises StudyError; nothing is written then."""
     check_free(plan.out)
-    read = read_foreign(plan.files, plan.map, on_progress)
-    provenance = gather_provenance(parents=read.files).as_dict()
-    origin: dict[str, Any] = {"map": read.map, "notes": list(read.notes)}
-    if read.map_hash:
-        origin["map_sha256"] = read.map_hash
-    meta = {**read.recording.meta, "import": origin, "provenance": provenance}
-    recording = replace(read.recording, meta=meta)
+    foreign = read_foreign(plan.files, plan.map, on_progress)
+    provenance = gather_provenance(parents=foreign.files).as_dict()
+    import_metadata: dict[str, Any] = {"map": foreign.map, "notes": list(foreign.notes)}
+    if foreign.map_hash:
+        import_metadata["map_sha256"] = foreign.map_hash
+    meta = {**foreign.recording.meta, "import": import_metadata, "provenance": provenance}
+    recording = replace(foreign.recording, meta=meta)
     write_recording(plan.out, recording)
-    return Imported(plan.out, recording, read.map, read.notes)
+    return ImportedRecording(plan.out, recording, foreign.map, foreign.notes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Foreign:
-    """An imported recording that is not written yet; see `Imported`."""
+class ForeignRecording:
+    """Recording of other files, imported in memory and not written; fields as in `ImportedRecording`."""
 
     recording: Recording
     files: tuple[Path, ...]
+    """Files that were read, without folders."""
     map: str
     map_hash: str
     """SHA-256 of the map's text; empty without a map."""
     notes: tuple[str, ...]
 
 
-def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None) -> Foreign:
+def read_foreign(
+    files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None
+) -> ForeignRecording:
     """Import files into a single recording in memory; nothing is written. map_name: as `ImportPlan.map`. Raises
     StudyError, and MapNeededError where no map is found and headers do not suffice."""
     if map_name is not None:
-        source = read_map(map_name)
-        return _import_by_map(source, _expand_folders(files, source.map), on_progress)
+        map_file = read_map(map_name)
+        return _import_by_map(map_file, _expand_folders(files, map_file.map), on_progress)
     if len(files) == 1 and files[0].is_dir():
         return _import_by_found_map(files[0], on_progress)
     if all(is_hdf5(path) and read_format(path) == FORMAT for path in files):
@@ -113,16 +118,18 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
 
 
 def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path, ...]:
-    """The files, with a folder replaced by the files in it that the map applies to, except maps and notes. Raises
-    ImportRefusedError where none is left."""
+    """Replace a folder by the files in it that the map applies to, except maps and notes; files and empty folders are
+    kept. Raises ImportRefusedError where none is left."""
     data_files: list[Path] = []
     for path in files:
         folder_files = sorted(path.iterdir()) if path.is_dir() else ()
-        fitting = [
+        matching_files = [
             file for file in folder_files if any(fnmatchcase(file.name, pattern) for pattern in import_map.files)
         ]
         data_files += (
-            [file for file in fitting if file.is_file() and file.suffix not in NO_DATA] if folder_files else [path]
+            [file for file in matching_files if file.is_file() and file.suffix not in NO_DATA]
+            if folder_files
+            else [path]
         )
     if not data_files:
         raise ImportRefusedError(
@@ -133,76 +140,79 @@ def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path,
     return tuple(data_files)
 
 
-def _import_by_map(source: MapFile, files: Sequence[Path], on_progress: Progress) -> Foreign:
+def _import_by_map(map_file: MapFile, files: Sequence[Path], on_progress: Progress) -> ForeignRecording:
     """Import files by a map; its hash becomes part of the result."""
-    built = build_recording(source.map, files, on_progress)
-    digest = hashlib.sha256(source.text.encode()).hexdigest()
-    return Foreign(built.recording, tuple(files), source.name, digest, built.notes)
+    built_recording = build_recording(map_file.map, files, on_progress)
+    map_hash = hashlib.sha256(map_file.text.encode()).hexdigest()
+    return ForeignRecording(built_recording.recording, tuple(files), map_file.name, map_hash, built_recording.notes)
 
 
-def _import_by_found_map(folder: Path, on_progress: Progress) -> Foreign:
-    """Import a folder: by the only map that fits it, else by the files' headers. Raises WrongUseError where its maps
-    make several recordings."""
+def _import_by_found_map(folder: Path, on_progress: Progress) -> ForeignRecording:
+    """Import a folder by the only map that fits it; without a fitting map, by the headers of its files. Raises
+    WrongUseError where its maps make several recordings."""
     matching_maps = find_maps_for_folder(folder)
     if len(matching_maps) == 1:
         return _import_by_map(matching_maps[0].source, matching_maps[0].files, on_progress)
     if not matching_maps:
-        by_header = make_map_from_headers(folder)
-        arrays = read_without_map(by_header.files[0])
-        return _with_header(by_header.source.map, arrays, by_header.files, on_progress)
-    listed = "; ".join(
-        f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in matching_maps
+        header_map = make_map_from_headers(folder)
+        arrays = read_without_map(header_map.files[0])
+        return _import_by_header_map(header_map.source.map, arrays, header_map.files, on_progress)
+    maps_text = "; ".join(
+        f"{matching_map.source.name} for {', '.join(path.name for path in matching_map.files)}"
+        for matching_map in matching_maps
     )
     raise WrongUseError(
         "Which recording is meant?",
-        f"The folder {folder.name} makes {len(matching_maps)} recordings: {listed}.",
+        f"The folder {folder.name} makes {len(matching_maps)} recordings: {maps_text}.",
         "Give the files, and the map with --map.",
         saved=NOTHING_WRITTEN,
     )
 
 
-def _read_hapteq_recordings(files: Sequence[Path]) -> Foreign:
+def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
     """Read recordings in hapteq's own format; several are joined one after another. Raises ImportRefusedError where
     their device, sample rate or hold differ."""
     recordings = [read_recording(path) for path in files]
     if len(recordings) == 1:
-        return Foreign(recordings[0], tuple(files), "recording", "", ())
-    facts = [{"file": path.name, **recording.meta} for path, recording in zip(files, recordings, strict=True)]
+        return ForeignRecording(recordings[0], tuple(files), "recording", "", ())
+    parts = [{"file": path.name, **recording.meta} for path, recording in zip(files, recordings, strict=True)]
     try:
-        joined_recording = join(recordings, {"parts": facts})
+        joined_recording = join(recordings, {"parts": parts})
     except ValueError as error:
         raise ImportRefusedError(
             files[0].name, str(error), "Import recordings of one device, rate and hold."
         ) from error
     notes = [f"{len(files)} recordings were put one after another; time stamps were left out."]
-    if missing := signals_left_out(recordings):
-        notes.append(f"Left out, because not every recording has it: {', '.join(missing)}.")
-    return Foreign(joined_recording, tuple(files), "recording", "", tuple(notes))
+    if dropped_signals := list_dropped_signals(recordings):
+        notes.append(f"Left out, because not every recording has it: {', '.join(dropped_signals)}.")
+    return ForeignRecording(joined_recording, tuple(files), "recording", "", tuple(notes))
 
 
-def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
+def _import_by_header(files: Sequence[Path], on_progress: Progress) -> ForeignRecording:
     """Import files by the header of the first file, else by the only shipped map that fits them. Raises MapNeededError
     with a draft of a map where neither suffices."""
     arrays = read_without_map(files[0])
     import_map = make_header_map(arrays)
-    if import_map is None and (shipped := find_map_for_files(files)) is not None:
-        imported = _import_by_map(shipped, files, on_progress)
+    if import_map is None and (shipped_map := find_map_for_files(files)) is not None:
+        imported = _import_by_map(shipped_map, files, on_progress)
         return replace(
-            imported, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *imported.notes)
+            imported, notes=(f"Imported by our map '{shipped_map.name}', which fits these files.", *imported.notes)
         )
     if import_map is None:
         raise MapNeededError(files[0].name, "; ".join(find_header_problems(arrays)), make_map_skeleton(arrays))
-    return _with_header(import_map, arrays, files, on_progress)
+    return _import_by_header_map(import_map, arrays, files, on_progress)
 
 
-def _with_header(import_map: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress) -> Foreign:
+def _import_by_header_map(
+    import_map: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress
+) -> ForeignRecording:
     """Import files by a map derived from headers. arrays: those of the first file. Raises MapNeededError, with a draft
     of a map, for a problem that only a written map can solve."""
     try:
-        built = build_recording(import_map, files, on_progress)
-    except ImportRefusedError as refused:
-        if not isinstance(refused.__cause__, ImportProblemError):
+        built_recording = build_recording(import_map, files, on_progress)
+    except ImportRefusedError as refusal:
+        if not isinstance(refusal.__cause__, ImportProblemError):
             raise
-        raise MapNeededError(files[0].name, refused.happened, make_map_skeleton(arrays)) from refused
-    notes = (*describe_header_choices(arrays, import_map), *built.notes)
-    return Foreign(built.recording, tuple(files), "header", "", notes)
+        raise MapNeededError(files[0].name, refusal.happened, make_map_skeleton(arrays)) from refusal
+    notes = (*describe_header_choices(arrays, import_map), *built_recording.notes)
+    return ForeignRecording(built_recording.recording, tuple(files), "header", "", notes)

@@ -1,6 +1,8 @@
-"""Read a recording from any file: a hapteq recording directly; a file of another program (table, MATLAB, NumPy, …) by
-an import in memory, if its names state the roles of the channels, so that no import map is needed. Called by
-`look_at_recordings` and by the diagnosis (`diagnosis_input`)."""
+"""Read a recording from any file: hapteq's own format directly, other formats by an import in memory.
+
+A file of another program (table, MATLAB, NumPy, …) is imported without an import map, which requires that its names
+state the roles of the channels. Called by `look_at_recordings` and by the diagnosis (`diagnosis_input`).
+"""
 
 from pathlib import Path
 

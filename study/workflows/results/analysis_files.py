@@ -1,6 +1,8 @@
-"""Names of the files that an analysis writes, and which of them exist in a folder.
+"""Names of the files that an analysis writes, and a search for those that exist in a folder.
 
-Separate from `analyze_data`, which is slow to import because of its statistics and plots.
+Separate from `analyze_data`, which is slow to import because of its statistics and plots. Called by `analyze_data`, the
+modules that write or show an analysis (`write_results`, `session_results`, `view_session`, `end_sitting`), the commands
+`analyze` and `rehearse`, and `participant_traces`.
 """
 
 from pathlib import Path
@@ -14,13 +16,22 @@ from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 ANALYSIS_NAME = "analysis"
 """Name of the default output folder, inside the analysed folder."""
 
-OURS = ("thresholds", "medians", "units", "psychometric", "psychometric-*", "delivered", "ellipsoids", "staircases-*")
+FIGURE_NAME_PATTERNS = (
+    "thresholds",
+    "medians",
+    "units",
+    "psychometric",
+    "psychometric-*",
+    "delivered",
+    "ellipsoids",
+    "staircases-*",
+)
 """Name patterns of the figures of an analysis. Existing figures are removed before new ones are written, since they may
 show a participant who has withdrawn."""
 
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
-"""Names of the document with the statistics and of the report."""
-OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
+"""Names of the document with the statistics and of the HTML report."""
+ANALYSIS_FILE_NAMES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
 """Files of an analysis other than its figures; the report, `PAGE_NAME`, is written last."""
 
 
@@ -30,16 +41,22 @@ def is_analysis_of(folder: Path, log: Path) -> bool:
     if not (folder / PAGE_NAME).is_file():
         return False
     try:
-        origin = read_json(folder / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
-        parents = origin.get("parents") if isinstance(origin, dict) else None
+        provenance = read_json(folder / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
+        parents = provenance.get("parents") if isinstance(provenance, dict) else None
         return isinstance(parents, list) and {"file": log.name, "sha256": compute_sha256(log)} in parents
     except StudyError:
         return False
 
 
-def analysis_outputs(folder: Path) -> tuple[Path, ...]:
-    """Existing files in `folder` that an analysis writes; none behind a link to another folder."""
-    figures = folder / "figures"
-    figure_files = [path for name in OURS for kind in ("svg", "png") for path in figures.glob(f"{name}.{kind}")]
-    tables = [folder / name for name in OUR_FILES if (folder / name).is_file()]
-    return (*tables, *(figure_files if is_real_folder(figures) else ()))
+def list_analysis_outputs(folder: Path) -> tuple[Path, ...]:
+    """List the existing files in `folder` that an analysis writes; no figures where `figures` is a link to another
+    folder."""
+    figure_folder = folder / "figures"
+    figure_files = [
+        path
+        for file_name in FIGURE_NAME_PATTERNS
+        for extension in ("svg", "png")
+        for path in figure_folder.glob(f"{file_name}.{extension}")
+    ]
+    data_files = [folder / file_name for file_name in ANALYSIS_FILE_NAMES if (folder / file_name).is_file()]
+    return (*data_files, *(figure_files if is_real_folder(figure_folder) else ()))

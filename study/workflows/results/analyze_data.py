@@ -26,7 +26,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.picture_files import write_pictures
-from study.workflows.results.analysis_files import PAGE_NAME, analysis_outputs
+from study.workflows.results.analysis_files import PAGE_NAME, list_analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.export_study import collect_exported, is_exported
@@ -45,16 +45,16 @@ def analyze_data(
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected.trials, collected.protocol, collected.exclusions)
-    except ValueError as problem:
+    except ValueError as error:
         raise StudyError(
-            "The data contradict their protocol", f"{problem}.", "Nothing was written; look at the sessions named."
-        ) from problem
+            "The data contradict their protocol", f"{error}.", "Nothing was written; look at the sessions named."
+        ) from error
     ellipses = _compute_ellipses(ellipsoid)
-    parents = [*collected.input_paths, *([ellipsoid] if ellipsoid else [])]
+    input_paths = [*collected.input_paths, *([ellipsoid] if ellipsoid else [])]
     provenance = gather_provenance(
         protocol_hash=collected.protocol_hash,
         seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
-        parents=parents,
+        parents=input_paths,
     )
     pictures = study_pictures(analysis, ellipses)
     _create_private_folder(out_folder, data)
@@ -69,8 +69,8 @@ def analyze_data(
 
 
 def format_threshold_lines(analysis: StudyAnalysis) -> list[str]:
-    """Table of thresholds for the terminal: one line per frequency, means in N, with medians and the declared
-    contrast."""
+    """Format the table of thresholds for the terminal: one line per frequency, means in N, with medians and the
+    declared contrast."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
         declared_lines = describe_declared(analysis.declared_result)
@@ -81,8 +81,9 @@ def format_threshold_lines(analysis: StudyAnalysis) -> list[str]:
 
 
 def _format_frequency_lines(table: ThresholdTable, heading: str) -> list[str]:
-    """One line per frequency: mean threshold over participants in N (values limited by the force cap are included),
-    number of values limited by the cap, and number of participants. heading: of the column of means."""
+    """Format one line per frequency: mean threshold over participants in N (values limited by the force cap are
+    included), number of these (censored) values, and number of participants with a value. heading: of the column of
+    means."""
     lines = [f"{'frequency':>10}  {heading:>10}  {'cut by cap':>10}  participants"]
     for column, frequency_hz in enumerate(table.frequencies_hz):
         thresholds_n = [threshold_n for row in table.values if (threshold_n := row[column]) is not None]
@@ -93,7 +94,8 @@ def _format_frequency_lines(table: ThresholdTable, heading: str) -> list[str]:
 
 
 def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
-    """Lines on the medians (N) of the hierarchical model with their 95 % intervals; empty where it was not fitted."""
+    """Format lines on the medians (N) of the hierarchical model with their 95 % intervals; empty where it was not
+    fitted."""
     if analysis.primary is None:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
@@ -106,19 +108,20 @@ def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
 
 
 def _compute_ellipses(path: Path | None) -> tuple[EllipsoidResult, ...]:
-    """Acceleration ellipses of a recording; empty without a path. Raises StudyError where they cannot be computed."""
+    """Compute the acceleration ellipses of a recording; empty without a path. Raises StudyError where they cannot be
+    computed."""
     if path is None:
         return ()
     recording = read_recording(path)
     try:
         return compute_ellipsoids(recording, read_sensor_frame(recording))
-    except ValueError as problem:
+    except ValueError as error:
         raise StudyError(
             "No ellipsoids can be computed",
-            f"{path.name}: {problem}.",
+            f"{path.name}: {error}.",
             "Give a recording made with: hapteq record ellipsoid",
             saved="Nothing was written.",
-        ) from problem
+        ) from error
 
 
 def _create_private_folder(folder: Path, data: Path) -> None:
@@ -128,8 +131,8 @@ def _create_private_folder(folder: Path, data: Path) -> None:
         return
     try:
         make_folder(folder, private=True)
-    except OSError as problem:
-        raise CannotWriteError(folder, problem) from problem
+    except OSError as error:
+        raise CannotWriteError(folder, error) from error
     if folder.resolve() != data.resolve():
         close_to_others(folder, recursive=True)
 
@@ -149,11 +152,11 @@ def _write_files(
         if figure_folder.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
         # The report is removed first and written last: while it is missing, the other files may be of different runs.
-        for outdated_path in analysis_outputs(folder):
+        for outdated_path in list_analysis_outputs(folder):
             if outdated_path.parent == figure_folder or outdated_path.name in (DETECTION_NAME, PAGE_NAME):
                 outdated_path.unlink()
-    except OSError as problem:
-        raise CannotWriteError(figure_folder, problem) from problem
+    except OSError as error:
+        raise CannotWriteError(figure_folder, error) from error
     write_thresholds(folder / THRESHOLDS_NAME, analysis.thresholds)
     if analysis.detection:
         write_thresholds(folder / DETECTION_NAME, analysis.detection)
@@ -169,7 +172,7 @@ def _write_files(
 
 
 def _list_origin(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
-    """Label and text of the entries of the report's last section, on the origin of the results."""
+    """List label and text of the entries of the report's last section, on the origin of the results."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
         "locked before the data": collected.lock_statement,

@@ -1,4 +1,4 @@
-"""Selection of the sessions for one analysis: one protocol, one population, none withdrawn or unreadable.
+"""Select the sessions for one analysis: one protocol, one population, none withdrawn or unreadable.
 
 Used by `analyze_data`, `hapteq export`, `hapteq power` and the reproduction of the paper. People, simulated
 participants, and people at a device that did not move are never analysed together (`Population`). Every exclusion is
@@ -25,9 +25,10 @@ from study.workflows.results.session_results import finish_tables
 
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedTrials:
-    """Sessions in `data` (or `data` itself, a session) that belong together. Of several protocols: the named one (name,
-    or first 12 digits of its hash); else, of those with test or detection runs, the one with the most sessions. Of
-    several populations: the first in the order of `Population`. Raises StudyError where there is nothing to analyse."""
+    """Collect the sessions in `data` (or `data` itself, a session) that belong together. Of several protocols: the
+    named one (name, or first 12 digits of its hash); else, of those with test or detection runs, the one with the most
+    sessions. Of several populations: the first in the order of `Population`. Raises StudyError where there is nothing
+    to analyse."""
     folders = _list_folders(data)
     usable_sessions, exclusions = _fold_sessions(folders)
     session_states = [(folder, session.state) for folder, session in usable_sessions]
@@ -69,7 +70,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
 
 
 def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[FilledForm, ...]:
-    """Answers to the protocol's questions, from the logs of the sessions that are analysed."""
+    """Collect the answers to the protocol's questions, from the logs of the sessions that are analysed."""
     return tuple(
         FilledForm(folder.subject, folder.name, event.form, event.answers)
         for folder, session in sessions
@@ -79,7 +80,7 @@ def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]
 
 
 def _describe_locks(states: Sequence[SessionState]) -> str:
-    """Whether the protocol was locked when the sessions were opened, as text."""
+    """Describe whether the protocol was locked when the sessions were opened: yes, no, or for how many of them."""
     locked_count = sum(state.opened.protocol_locked for state in states)
     if not locked_count:
         return "no: what the protocol declares was not fixed by a lock"
@@ -89,8 +90,8 @@ def _describe_locks(states: Sequence[SessionState]) -> str:
 def _group_model_qualities(
     analysed_sessions: Sequence[tuple[SessionFolder, SessionState]],
 ) -> tuple[tuple[str, str], ...]:
-    """Pairs (names of sessions, sentence on the quality of their model); sessions with the same model are listed
-    together, sessions without an equalizer are left out."""
+    """Group the sessions by model, as pairs (names of sessions, sentence on the quality of their model); sessions with
+    the same model are listed together, sessions without an equalizer are left out."""
     names_by_model: dict[tuple[str, str], list[str]] = {}
     for folder, state in analysed_sessions:
         if (equalized := state.opened.equalized) is not None:
@@ -100,7 +101,8 @@ def _group_model_qualities(
 
 
 def _list_folders(data: Path) -> tuple[SessionFolder, ...]:
-    """Session folders in `data`, or `data` itself if it is a session. Raises WrongUseError where there are none."""
+    """List the session folders in `data`, or `data` itself if it is a session. Raises WrongUseError where there are
+    none."""
     if (data / LOG_NAME).exists():
         return (SessionFolder(data.resolve()),)
     folders = list_session_folders(data)
@@ -115,8 +117,8 @@ def _list_folders(data: Path) -> tuple[SessionFolder, ...]:
 
 
 def _fold_sessions(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
-    """Usable sessions with their state, rebuilt from the log, and sentences on the excluded ones. Raises StudyError
-    where none is usable."""
+    """Rebuild the state of each session from its log. Returns the usable sessions, and sentences on the excluded ones.
+    Raises StudyError where none is usable."""
     usable_sessions: list[tuple[SessionFolder, FoldedSession]] = []
     exclusions: list[str] = []
     for folder in folders:
@@ -125,8 +127,8 @@ def _fold_sessions(folders: Sequence[SessionFolder]) -> tuple[list[tuple[Session
             continue
         try:
             session = fold_session(folder)
-        except StudyError as problem:
-            exclusions.append(f"{folder.name} cannot be used. {problem.happened}")
+        except StudyError as error:
+            exclusions.append(f"{folder.name} cannot be used. {error.happened}")
             continue
         if reason := session.state.sitting.ineligibility:
             exclusions.append(f"{folder.name} does not take part: {INELIGIBILITY_REASONS[reason]}.")
@@ -144,8 +146,8 @@ def _finish_result_files(sessions: Sequence[tuple[SessionFolder, FoldedSession]]
     for folder, session in sessions:
         try:
             written_files = finish_tables(folder, session)
-        except StudyError as problem:
-            sentences.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
+        except StudyError as error:
+            sentences.append(f"{folder.name}: its results are not whole and could not be written. {error.happened}")
             continue
         if written_files:
             sentences.append(
@@ -157,7 +159,8 @@ def _finish_result_files(sessions: Sequence[tuple[SessionFolder, FoldedSession]]
 def _choose_protocol(
     session_states: Sequence[tuple[SessionFolder, SessionState]], protocol_name: str | None, data: Path
 ) -> str:
-    """Hash of the protocol to analyse. Raises WrongUseError where no session follows the named protocol."""
+    """Choose the protocol to analyse, see `collect_sessions`; returns its hash. Raises WrongUseError where no session
+    follows the named protocol."""
     states_by_hash: dict[str, list[SessionState]] = {}
     for _, state in session_states:
         states_by_hash.setdefault(state.opened.protocol_hash, []).append(state)
@@ -167,12 +170,12 @@ def _choose_protocol(
         if protocol_name in (None, states[0].protocol.name, protocol_hash[:12])
     }
     if not candidates:
-        available = ", ".join(
+        available_text = ", ".join(
             f"{states[0].protocol.name} ({protocol_hash[:12]})" for protocol_hash, states in states_by_hash.items()
         )
         raise WrongUseError(
             "No session follows that protocol",
-            f"'{protocol_name}' was asked for; {data} holds sessions of {available}.",
+            f"'{protocol_name}' was asked for; {data} holds sessions of {available_text}.",
             "Give one of these names, or the first twelve digits of its hash.",
         )
     # A protocol with training runs only has no thresholds; it is chosen only if there is no other.

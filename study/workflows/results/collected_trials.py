@@ -18,8 +18,10 @@ class CollectedTrials:
 
     protocol: StudyProtocol
     protocol_hash: str
+    """Hash of the protocol, see `hash_protocol`."""
     trials: tuple[Trial, ...]
     sessions: tuple[SessionFolder, ...]
+    """Sessions of the trials; for an export, folders of these names beside its files, which need not exist."""
     seeds: tuple[int, ...]
     """Random seeds of `sessions`, in the same order; 0 where an export does not state it."""
     devices: tuple[str, ...]
@@ -32,7 +34,8 @@ class CollectedTrials:
     """(names of sessions, sentence) on the quality of each model that equalized their stimuli; empty where forces were
     commanded without a model."""
     lock_statement: str
-    """Whether the protocol was locked when its sessions began, in words: "yes", "no: ...", "for 2 of 5 sessions"."""
+    """Whether the protocol was locked when its sessions began, in words: "yes", "no: ...", "for 2 of 5 sessions"; "not
+    known" where an export does not state it."""
     result_file_notes: tuple[str, ...]
     """Sentences on result files of sessions that were missing or out of date: written now, or why they could not be."""
     input_paths: tuple[Path, ...]

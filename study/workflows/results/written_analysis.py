@@ -1,6 +1,7 @@
-"""Result of an analysis and the path of its report, which `analyze_data` returns to the screens and the command line.
+"""Result of an analysis and the path of its report.
 
-A separate module, so that its import loads no statistics and plots.
+`analyze_data` returns it to `write_results`, the screens (`engine_commands`) and the command line. A separate module,
+so that its import loads no statistics and plots.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,9 @@
-"""Conduct a whole sitting, from opening the device to closing the log."""
+"""Conduct a whole sitting, from opening the device to closing the log.
+
+Order: open trigger line, masking noise and device, make or reload the equalizer, open or resume the session
+(`open_session`, `resume_session`), then run it (`run_session`); everything is closed at the end, also after an error.
+Called by the engine process (`engine_commands`), `hapteq conduct`, `simulate_session` and `rehearse_study`.
+"""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -43,13 +48,14 @@ from study.workflows.trial.sitting import (
 )
 
 
+# Default of `Participant.on_session_opened`.
 def _ignore_opened(folder: SessionFolder, device: Device) -> None:
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class Participant:
-    """The participant at the device, and their clock."""
+    """Ports of the participant at the device: display, hand, clock and requests."""
 
     display: Display
     hand: Hand
@@ -57,64 +63,66 @@ class Participant:
     requests: RequestPort = field(default_factory=QueuedRequests)
     """Requests from within this program: notes typed at the display, a stop from another screen."""
     on_session_opened: Callable[[SessionFolder, Device], None] = _ignore_opened
-    """Called once with the session, now locked, and the device, which may be stopped from any thread."""
+    """Called once with the session's folder, whose lock is held, and the device, which may be stopped from any
+    thread."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConductedSitting:
-    """How a sitting ended: the session's state, and why it was left."""
+    """Result of a sitting: the session's state, and why the sitting ended."""
 
     folder: SessionFolder
     device_name: str
-    """As `open_device` takes it."""
+    """Name of the device, as `open_device` takes it."""
     state: SessionState
     end_reason: str
     """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault
-    """The device fault, if that was why."""
+    """Fault of the device, if it ended the sitting; otherwise `Fault.NONE`."""
     fault_text: str = ""
-    """The driver's words about it, where there are any."""
+    """Message of the driver about the fault; empty without one."""
     withdrawn: bool = False
-    """The participant withdrew consent: the caller erases the data."""
+    """Whether the participant withdrew consent: the caller then erases the data."""
 
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> ConductedSitting:
-    """Open the device, then a new session, and run it."""
+    """Open the device, then a new session, and run it. Raises StudyError where device, model, sound output or session
+    cannot be opened, and DeviceError where a required accelerometer is missing."""
     check_model_for_protocol(plan.protocol, plan.model)
     settings = make_device_settings(plan.protocol)
     with (
-        _pulses(participant.clock) as pulse,
+        _open_pulse_line(participant.clock) as pulse,
         open_masking_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
         _check_sensor(plan.protocol, device.info)
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened_session:
-            return _run(opened_session, Equipment(device_name, device, equalized, pulse, sound), participant)
+            return _run_sitting(opened_session, Equipment(device_name, device, equalized, pulse, sound), participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> ConductedSitting:
-    """Fold the log, open the device, and continue the session."""
+    """Rebuild the state from the log, open the device, and continue the session. Raises as `conduct_new`."""
     state = fold_session(folder).state
     if state.opened.equalized is not None:
         load_equalizer()
     settings = make_device_settings(state.protocol)
     with (
-        _pulses(participant.clock) as pulse,
+        _open_pulse_line(participant.clock) as pulse,
         open_masking_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
         _check_sensor(state.protocol, device.info)
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened_session:
-            known_steps = len(state.sitting.clock_steps)
-            return _run(
-                opened_session, Equipment(device_name, device, equalized, pulse, sound), participant, known_steps
+            earlier_step_count = len(state.sitting.clock_steps)
+            return _run_sitting(
+                opened_session, Equipment(device_name, device, equalized, pulse, sound), participant, earlier_step_count
             )
 
 
 def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
-    """Raises `DeviceError` where the protocol needs an accelerometer and there is none."""
+    """Check that the device has an accelerometer if the protocol needs it. Raises DeviceError otherwise."""
     if protocol.measurement.accelerometer_needed and not info.has_sensor:
         raise DeviceError(
             "The sitting did not begin: its protocol needs the accelerometer",
@@ -124,32 +132,37 @@ def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
 
 
 @contextlib.contextmanager
-def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
-    """Trigger line of the lab; none in virtual time, which passes faster than a recorder's."""
-    line = None if clock.virtual else open_lab_onset_line()
+def _open_pulse_line(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
+    """Open the trigger line of the lab and yield the function that sends a pulse; one that sends none without a line,
+    and in virtual time, which passes faster than that of a recorder."""
+    onset_line = None if clock.virtual else open_lab_onset_line()
     try:
-        yield send_no_pulse if line is None else line.send_pulse
+        yield send_no_pulse if onset_line is None else onset_line.send_pulse
     finally:
-        if line is not None:
-            line.close()
+        if onset_line is not None:
+            onset_line.close()
 
 
 @dataclass(frozen=True, slots=True)
 class Equipment:
-    """The device of a sitting, what equalizes its stimuli, the pulse line, and the masking noise."""
+    """Equipment of a sitting: device, equalizer of the stimuli, trigger line, and masking noise."""
 
     device_name: str
-    """As `open_device` takes it."""
+    """Name of the device, as `open_device` takes it."""
     device: Device
     equalized: SessionEqualizer
+    """Equalizer of the session's stimuli, with the model and level scales for the log."""
     pulse: Callable[[], Pulse | None]
+    """Sends a pulse on the trigger line."""
     sound: SoundOutput | None
+    """Output of the masking noise; None where none is played."""
 
 
-def _run(
-    opened_session: OpenedSession, equipment: Equipment, participant: Participant, known_steps: int = 0
+def _run_sitting(
+    opened_session: OpenedSession, equipment: Equipment, participant: Participant, earlier_step_count: int = 0
 ) -> ConductedSitting:
-    """Run the session. known_steps: clock steps before this sitting; only new ones are reported."""
+    """Run the opened session. earlier_step_count: number of clock steps before this sitting; only new ones are
+    reported."""
     folder, protocol, device = opened_session.folder, opened_session.state.protocol, equipment.device
     participant.on_session_opened(folder, device)
     place_m = make_device_settings(protocol).place_m
@@ -176,10 +189,10 @@ def _run(
         pulse=equipment.pulse,
         masking_noise=equipment.sound,
     )
-    report_clock_steps(opened_session.state.sitting.clock_steps[known_steps:], sitting)
-    for name in opened_session.state.sitting.unread_sessions:
+    report_clock_steps(opened_session.state.sitting.clock_steps[earlier_step_count:], sitting)
+    for session_name in opened_session.state.sitting.unread_sessions:
         notify_experimenter(
-            f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting
+            f"{session_name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting
         )
     end = run_session(opened_session.state, sitting)
     return ConductedSitting(

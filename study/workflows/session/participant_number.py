@@ -1,4 +1,5 @@
-"""Participant number within a protocol: it selects the row of the balanced order, and which direction is labelled 1.
+"""Find and assign the participant number within a protocol (logged as "place"): it selects the row of the balanced
+order, and which direction is labelled 1.
 
 The number is assigned after the preparation, so that persons who refuse or are excluded take no row. Logs are searched
 as raw bytes where possible, because a data folder may hold many long logs, some of them damaged. Called by
@@ -41,7 +42,7 @@ def find_participant_number(data: Path, subject: str, protocol: str, simulated: 
     number was assigned has none. Numbers of withdrawn participants, and of damaged logs as far as they are readable,
     stay taken, so that no row of the balanced order is assigned twice.
     """
-    numbers = []
+    taken_numbers = []
     for folder in list_session_folders(data):
         participant = read_begun_participant(folder)
         if (
@@ -52,8 +53,8 @@ def find_participant_number(data: Path, subject: str, protocol: str, simulated: 
             continue
         if folder.subject == subject and not folder.withdrawn:
             return participant.number
-        numbers.append(participant.number)
-    return max(numbers, default=-1) + 1
+        taken_numbers.append(participant.number)
+    return max(taken_numbers, default=-1) + 1
 
 
 def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
@@ -68,10 +69,12 @@ def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
         session_opened = read_opening(folder.log)
         if not isinstance(session_opened, SessionOpened):
             return None
-        name = tomllib.loads(session_opened.protocol_text).get("name", "")
+        protocol_name = tomllib.loads(session_opened.protocol_text).get("name", "")
     except (StudyError, OSError, TypeError, ValueError, RecursionError):
         return _read_damaged_log(folder)
-    return SessionParticipant(name, session_opened.observer is not None, _read_place(folder, session_opened))
+    return SessionParticipant(
+        protocol_name, session_opened.observer is not None, _read_assigned_number(folder, session_opened)
+    )
 
 
 def _read_damaged_log(folder: SessionFolder) -> SessionParticipant | None:
@@ -82,13 +85,15 @@ def _read_damaged_log(folder: SessionFolder) -> SessionParticipant | None:
     except OSError:
         return None
     first_line = content.partition(b"\n")[0]
-    name, numbers = PROTOCOL_NAME_PATTERN.search(first_line), NUMBER_PATTERN.findall(content)
-    if name is None or not numbers:
+    protocol_name, numbers = PROTOCOL_NAME_PATTERN.search(first_line), NUMBER_PATTERN.findall(content)
+    if protocol_name is None or not numbers:
         return None
-    return SessionParticipant(name[1].decode(errors="replace"), PERSON_OBSERVER not in first_line, int(numbers[-1]))
+    return SessionParticipant(
+        protocol_name[1].decode(errors="replace"), PERSON_OBSERVER not in first_line, int(numbers[-1])
+    )
 
 
-def _read_place(folder: SessionFolder, session_opened: SessionOpened) -> int | None:
+def _read_assigned_number(folder: SessionFolder, session_opened: SessionOpened) -> int | None:
     """Read the participant number from the lines before the first trial, so that the rest of a long log is not parsed;
     the number expected at the opening where a trial comes first or a line is damaged. None if it was not assigned yet,
     or the log cannot be read."""
@@ -100,8 +105,8 @@ def _read_place(folder: SessionFolder, session_opened: SessionOpened) -> int | N
             if TRIAL_PRESENTED in line:
                 return session_opened.participant_number
             chain, event = verify_checksum(chain, line)
-            if PLACE_TAKEN in line and isinstance(place := parse_event(event), PlaceTaken):
-                return place.participant_number
+            if PLACE_TAKEN in line and isinstance(number_event := parse_event(event), PlaceTaken):
+                return number_event.participant_number
     except OSError:
         return None
     except ValueError:  # damaged before the first trial: the number expected at the opening was most likely assigned

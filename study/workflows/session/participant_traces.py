@@ -21,16 +21,16 @@ from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
-from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE
-from study.workflows.results.analysis_files import ANALYSIS_NAME, analysis_outputs
+from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME
+from study.workflows.results.analysis_files import ANALYSIS_NAME, list_analysis_outputs
 
 UNFINISHED_PATTERN = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
 """Name of an unfinished file or folder from an interrupted write."""
 
 MAX_SEARCHED_BYTES = 1 << 24
-"""Largest file (bytes) that is searched for a name; recordings and bitmaps are not searched."""
+"""Largest text file (bytes) that is searched for a name (chosen); recordings and bitmaps are not searched."""
 MAX_FIRST_LINE_BYTES = 1 << 20
-"""Largest number of bytes of a log's first line that are read."""
+"""Largest number of bytes of a log's first line that are read (chosen); a longer line counts as unreadable."""
 SEARCHED_EXTENSIONS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
 """Extensions of text files that are searched for names of a participant's sessions."""
 
@@ -106,7 +106,7 @@ def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
     if any(table_results):
         return True
     figure_pattern = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
-    if any(figure_pattern.fullmatch(path.name) for path in analysis_outputs(folder)):
+    if any(figure_pattern.fullmatch(path.name) for path in list_analysis_outputs(folder)):
         return True
     return None if all(result is None for result in table_results) else False
 
@@ -124,15 +124,15 @@ def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
 
 
 def _describe_unproved_session(path: Path, subject: str) -> str:
-    """Sentence on a folder or link that is named like a session of the subject, but is not proved to be one."""
+    """Describe a folder or link that is named like a session of the subject, but is not proved to be one."""
     if path.is_symlink():
         return f"{path.name} is a link; neither it nor what it leads to was touched."
     return f"{path.name} holds no log that says it is a session of {subject}."
 
 
 def _describe_other_folder(path: Path, subject: str) -> Iterator[str]:
-    """Sentence on a folder not named like a session that contains a log, or a diagnosis, of the subject; empty
-    otherwise."""
+    """Describe a folder not named like a session that contains a log, or a diagnosis, of the subject, in one sentence;
+    yields nothing for other folders."""
     identity = _read_opening(SessionFolder(path))
     if identity is not None and identity[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
@@ -150,13 +150,13 @@ def _may_hold_analysis(path: Path) -> bool:
 
 
 def _find_analysis_traces(folder: Path, subject: str, is_separate: bool) -> tuple[list[Path], list[Path]]:
-    """Proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. is_separate:
+    """Find proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. is_separate:
     `folder` is not the data folder itself, so that its unfinished files belong to the analysis."""
-    files = list(analysis_outputs(folder))
-    names_subject = is_subject_in_analysis(folder, subject) if files else False
+    analysis_paths = list(list_analysis_outputs(folder))
+    names_subject = is_subject_in_analysis(folder, subject) if analysis_paths else False
     proved_paths, doubtful_paths = (
-        (files if names_subject else []),
-        (files if names_subject is None and folder.name == ANALYSIS_NAME else []),
+        (analysis_paths if names_subject else []),
+        (analysis_paths if names_subject is None and folder.name == ANALYSIS_NAME else []),
     )
     searched_folders = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
     for path in (path for searched_folder in searched_folders for path in sorted(searched_folder.iterdir())):
@@ -201,7 +201,7 @@ def _is_unmanaged_file(path: Path, subject: str) -> bool:
     """Whether the program does not itself keep this file in the data folder: False for the record of the subject's
     withdrawal, the list of analyses written elsewhere, and unfinished files."""
     return (
-        path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE)
+        path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE_NAME)
         and UNFINISHED_PATTERN.fullmatch(path.name) is None
     )
 
@@ -218,7 +218,8 @@ def _has_session_name(path: Path, subject: str) -> bool:
 
 
 def _read_text_file(path: Path) -> str | None:
-    """Text of a file; None if it is not a regular file, cannot be read, or is larger than `MAX_SEARCHED_BYTES`."""
+    """Read the text of a file, with invalid UTF-8 replaced; None if it is not a regular file, cannot be read, or is
+    larger than `MAX_SEARCHED_BYTES`."""
     try:
         return read_regular(path, MAX_SEARCHED_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
     except OSError:

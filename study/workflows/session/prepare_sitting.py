@@ -1,7 +1,8 @@
-"""Preparation of each sitting: consent, exclusion criteria, set-up, and the check of device and computer.
+"""Prepare each sitting: consent, exclusion criteria, set-up, and the check of device and computer.
 
-The state decides which step is due (`find_next_preparation`) and each result is logged at once. A participant who
-refuses or is excluded leaves only that outcome.
+The state decides which step is due (`find_next_preparation`) and each result is logged at once. Of a participant who
+refuses or is excluded, only that outcome is kept. Called by `run_session`; `end_sitting` and `resume_session` raise
+`make_ineligible_error`.
 """
 
 from dataclasses import replace
@@ -68,7 +69,7 @@ def present_form(state: SessionState, form: Form, sitting: Sitting) -> SessionSt
     return state
 
 
-def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
+def close_ineligible_session(state: SessionState, sitting: Sitting) -> SessionState:
     """Close the session of a participant who refused or was excluded; pending notes and the outcome are logged."""
     state = write_notes(state, sitting)
     outcome = state.sitting.ineligibility or "refused"
@@ -93,17 +94,19 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     safety = state.protocol.safety
     report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
     # In virtual time the load of the computer has no effect.
-    load = None if clock.virtual else get_load_per_processor()
-    computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
-    daily = () if device.info.simulated else (judge_last_check(device.info, state.protocol.setup.daily_check_needed),)
-    report = replace(report, findings=(*report.findings, *computer, *daily))
+    load_per_processor = None if clock.virtual else get_load_per_processor()
+    computer_findings = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load_per_processor)
+    daily_check_findings = (
+        () if device.info.simulated else (judge_last_check(device.info, state.protocol.setup.daily_check_needed),)
+    )
+    report = replace(report, findings=(*report.findings, *computer_findings, *daily_check_findings))
     is_accepted = sitting.display.device_checked(report)
-    findings = tuple(f"{finding.name}: {finding.value}{_finding_text(finding)}" for finding in report.findings)
+    findings = tuple(f"{finding.name}: {finding.value}{_format_finding_mark(finding)}" for finding in report.findings)
     return log_and_apply(state, DeviceChecked(utc=sitting.clock.utc(), passed=is_accepted, findings=findings), sitting)
 
 
-def _finding_text(finding: DeviceFinding) -> str:
-    """Mark of a finding in the log: nothing if fine, else a warning or a fault."""
+def _format_finding_mark(finding: DeviceFinding) -> str:
+    """Format the mark of a finding in the log: empty if fine, " (warning)" or " (not fine)" otherwise."""
     if finding.fine:
         return ""
     return " (warning)" if finding.warning else " (not fine)"

@@ -26,7 +26,7 @@ from study.session.views.resume_command import format_resume_command
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import assign_place
-from study.workflows.session.prepare_sitting import prepare_sitting, present_form, turn_away
+from study.workflows.session.prepare_sitting import close_ineligible_session, prepare_sitting, present_form
 from study.workflows.trial.action_result import ActionResult
 from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
@@ -90,7 +90,7 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Prepare the sitting (forms, device check), show the instructions and perform the actions."""
     state, end_reason = prepare_sitting(state, sitting)
     if state.is_finally_ineligible:
-        return SessionEnd(turn_away(state, sitting), end_reason)
+        return SessionEnd(close_ineligible_session(state, sitting), end_reason)
     if end_reason:
         return _end_sitting(ActionResult(state, end_reason=end_reason), sitting)
     state = start_masking(assign_place(state, sitting), sitting)
@@ -106,7 +106,7 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
     state = fold_session(sitting.folder).state
     may_force_remain = sitting.device.fault() is Fault.FORCE_LEFT
     if state.is_finally_ineligible:  # nothing was played; its last line may be missing
-        state = state if state.closed else turn_away(state, sitting)
+        state = state if state.closed else close_ineligible_session(state, sitting)
         return SessionEnd(state, INELIGIBILITY_REASONS[state.sitting.ineligibility or "refused"])
     if state.closed and not may_force_remain:
         return SessionEnd(state, end_reason="")

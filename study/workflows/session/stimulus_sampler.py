@@ -14,7 +14,7 @@ from protocols.definition.apparatus import TestDirections
 from study.devices.clock import Clock
 from study.devices.device import Device
 from study.session.state.due_trial import PresentTrial
-from study.session.stimulus.delivered import Delivered, measure_delivered
+from study.session.stimulus.delivered import DeliveredMotion, measure_delivered
 from study.session.stimulus.stimulus import compute_direction_vector
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.fold_session import fold_session
@@ -45,7 +45,7 @@ class StimulusSampler:
         """Compute the duration of the measurement (s): `MEASURED_PERIODS` periods of the stimulus."""
         return MEASURED_PERIODS / stimulus.frequency_hz
 
-    def measure_stimulus(self, stimulus: PresentTrial, sign_of_life: SignOfLife) -> Delivered | None:
+    def measure_stimulus(self, stimulus: PresentTrial, sign_of_life: SignOfLife) -> DeliveredMotion | None:
         """Sample the held stimulus for `compute_duration_s(stimulus)` and return the amplitudes of the delivered
         acceleration. None without a device, where `sign_of_life` returns False (a fault or a request), or where less
         than a period was measured."""
@@ -61,8 +61,10 @@ class StimulusSampler:
         acceleration_mps2 = np.array(samples_mps2, dtype=np.float64)
         if not covers_a_period(int(np.isfinite(acceleration_mps2).all(axis=1).sum()), rate_hz, stimulus.frequency_hz):
             return None
-        vector = compute_direction_vector(self._directions, stimulus.direction)
+        unit_vector = compute_direction_vector(self._directions, stimulus.direction)
         # A recording needs a command; its values do not enter the measurement.
-        force = Signal(np.zeros_like(acceleration_mps2), rate_hz, "force", "N", ("fx", "fy", "fz"))
+        zero_force = Signal(np.zeros_like(acceleration_mps2), rate_hz, "force", "N", ("fx", "fy", "fz"))
         response = Signal(acceleration_mps2, rate_hz, "acceleration", "m/s^2", ("ax", "ay", "az"))
-        return measure_delivered(Recording(self._device.info.name, force, response), vector, stimulus.frequency_hz)
+        return measure_delivered(
+            Recording(self._device.info.name, zero_force, response), unit_vector, stimulus.frequency_hz
+        )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from equalizer.signals.masking_noise import make_masking_noise
 from study.errors import WrongUseError
-from study.store.disk.file_errors import AlreadyThereError
+from study.store.disk.file_errors import AlreadyExistsError
 from study.store.disk.wav_file import write_wav
 
 SAMPLE_RATE_HZ = 44_100
@@ -44,7 +44,7 @@ class NoisePlan:
 def write_masking_noise(path: Path, plan: NoisePlan) -> None:
     """Write the noise as a WAV file: mono, 16 bit, about 5 MB per minute.
 
-    Raises WrongUseError where the suffix is not .wav or length or band give no noise, AlreadyThereError where the file
+    Raises WrongUseError where the suffix is not .wav or length or band give no noise, AlreadyExistsError where the file
     exists, CannotWriteError where it cannot be written.
     """
     if path.suffix.lower() != ".wav":
@@ -52,7 +52,7 @@ def write_masking_noise(path: Path, plan: NoisePlan) -> None:
             "That is no name for a sound", f"{path.name} does not end in .wav.", "Give a name such as noise.wav."
         )
     if path.exists():
-        raise AlreadyThereError(path)
+        raise AlreadyExistsError(path)
     try:
         samples = make_masking_noise(round(60 * plan.minutes), plan.low_hz, plan.high_hz, plan.seed, SAMPLE_RATE_HZ)
     except ValueError as problem:

@@ -1,8 +1,7 @@
 """Play one stimulus and get the participant's answer.
 
-In a direction trial the stimulus is held until the answer, the number of a direction. In a detection
-trial it is played in one of two intervals (two-interval forced choice, 2IFC), and the question follows. Called by
-`present_trial`.
+In a direction trial the stimulus is held until the answer, the number of a direction. In a detection trial it is played
+in one of two intervals (two-interval forced choice, 2IFC), and the question follows. Called by `present_trial`.
 """
 
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ class StimulusReply:
     """Answer, or why there is none."""
     started_s: float
     """Time (s, by the session's clock) from which an answer was possible: the response time counts from here."""
-    felt_whole: bool
+    is_complete: bool
     """Whether the device had no fault until the answer. A later fault, for example during a slow disk write, does not
     make the trial void."""
     play_result: PlaybackResult | None
@@ -66,14 +65,16 @@ def _ask_detection(state: SessionState, due_trial: PresentTrial, question: Quest
     pulse: Pulse | None = None
     sitting.hand.feel(due_trial, state.answers)
     for interval in (1, 2):
-        is_held = interval == due_trial.label
-        if is_held:
+        is_stimulus_interval = interval == due_trial.label
+        if is_stimulus_interval:
             sitting.device.hold(_make_stimulus(state, due_trial, sitting))
             pulse = sitting.pulse()
         early_reply = _wait_in_interval(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
         if early_reply is not None:
-            return StimulusReply(early_reply, sitting.clock.now_s(), False, play_result, is_held, pulse=pulse)
-        if is_held:
+            return StimulusReply(
+                early_reply, sitting.clock.now_s(), False, play_result, is_stimulus_interval, pulse=pulse
+            )
+        if is_stimulus_interval:
             play_result = release_device(sitting)
         early_reply = _wait_in_interval("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
         if early_reply is not None:
@@ -90,10 +91,10 @@ def _await_reply(question: Question, sitting: Sitting) -> Reply:
     question is asked again."""
     while True:
         reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.keep_alive))
-        wants_repeat = (
+        is_repeat_request = (
             isinstance(reply, Unanswered) and reply.repeat_requested and not (reply.pause or reply.ends_sitting)
         )
-        if not wants_repeat or question.repeats_left != 0 or not sitting.supervisor.keep_alive():
+        if not is_repeat_request or question.repeats_left != 0 or not sitting.supervisor.keep_alive():
             return reply
 
 

@@ -1,5 +1,7 @@
-"""Labelled demonstration before the trials: the participant chooses a direction and a frequency and feels the stimulus,
-as often as wanted. Every stimulus is logged before it is played."""
+"""Labelled demonstration before the trials: the participant chooses directions and frequencies and feels the stimuli.
+
+The number of stimuli is not limited. Every stimulus is logged before it is played. Called by `run_session`.
+"""
 
 from protocols.procedure.schedule import draw_demo_level_n, label_direction
 from study.devices.device import Fault
@@ -26,15 +28,16 @@ from study.workflows.trial.sitting import Sitting, log_and_apply
 
 
 def demonstrate(state: SessionState, sitting: Sitting) -> ActionResult:
-    """Run the demonstration until the participant ends it, leaves, or a pause is requested. It can be run again."""
+    """Run the demonstration until the participant ends it or leaves, a pause or stop is requested, or a fault of the
+    device ends the sitting. It can be run again."""
     felt_stimuli: tuple[tuple[int, int], ...] = ()
     vibration = 1
     while True:
         sitting.supervisor.start_activity("demo")
-        choice = sitting.display.choose_demo(_menu(state, felt_stimuli, vibration), sitting.supervisor.keep_alive)
-        ended = check_end_request(state, sitting)
-        if ended is not None:
-            return ended
+        choice = sitting.display.choose_demo(_make_menu(state, felt_stimuli, vibration), sitting.supervisor.keep_alive)
+        end_result = check_end_request(state, sitting)
+        if end_result is not None:
+            return end_result
         if isinstance(choice, DemoDone):
             return ActionResult(log_and_apply(state, DemoFinished(utc=sitting.clock.utc()), sitting))
         vibration = choice.vibration
@@ -48,8 +51,9 @@ def demonstrate(state: SessionState, sitting: Sitting) -> ActionResult:
             felt_stimuli = (*felt_stimuli, (choice.vibration, choice.number))
 
 
-def _menu(state: SessionState, felt_stimuli: tuple[tuple[int, int], ...], vibration: int) -> DemoMenu:
-    """The menu. felt_stimuli: (vibration, direction number) of stimuli already played; vibration: the last chosen."""
+def _make_menu(state: SessionState, felt_stimuli: tuple[tuple[int, int], ...], vibration: int) -> DemoMenu:
+    """Make the menu. felt_stimuli: (vibration, direction number) of stimuli already played; vibration: number of the
+    frequency that was chosen last, from 1."""
     return DemoMenu(
         picture=make_direction_picture(state.protocol.directions, has_swapped_labels(state.protocol, state.opened)),
         vibrations=len(state.protocol.all_frequencies_hz),
@@ -90,9 +94,9 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
     fault = sitting.device.release().health.fault
     if end_reason := find_leaving_reason(fault):
         return ActionResult(state, end_reason=end_reason, fault=fault)
-    resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
-    if isinstance(resolved, Unanswered):
-        outcome = make_early_end_result(state, resolved)
+    final_reply = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
+    if isinstance(final_reply, Unanswered):
+        outcome = make_early_end_result(state, final_reply)
         return (
             outcome if fault is Fault.NONE or outcome.end_reason else ActionResult(state, void=fault.value, fault=fault)
         )

@@ -28,9 +28,9 @@ LOOP_S = 60
 
 @contextlib.contextmanager
 def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[SoundOutput | None]:
-    """Open the sound output with the masking noise, not yet playing; it is closed at the end of the context. Yields
-    None where the protocol plays no noise, for a simulated participant (`observer` is its name) and in virtual time.
-    Raises DeviceError where there is no sound output."""
+    """Open the sound output with the masking noise, attenuated by `settings.level_db` (dB) and not yet playing; it is
+    closed at the end of the context. Yields None where the protocol plays no noise, for a simulated participant
+    (`observer` is its name) and in virtual time. Raises DeviceError where there is no sound output."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
@@ -62,9 +62,9 @@ def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
     return state
 
 
-def was_masked(sitting: Sitting) -> bool:
-    """Whether the noise was still playing at the answer; True without a sound output. A failure is not logged here, but
-    by `check_masking` before the next trial."""
+def is_masked(sitting: Sitting) -> bool:
+    """Whether the noise is still playing, checked at the answer; True without a sound output. A failure is not logged
+    here, but by `check_masking` before the next trial."""
     if sitting.masking_noise is None:
         return True
     try:
@@ -87,7 +87,7 @@ def _log_masking(
     """Log whether the noise plays, with its settings, and return the new state. trouble: why it does not play; empty
     where it plays or was stopped as planned."""
     settings = state.protocol.masking
-    fact = MaskingPlayed(
+    event = MaskingPlayed(
         utc=sitting.clock.utc(),
         playing=playing,
         output=sound.output,
@@ -97,4 +97,4 @@ def _log_masking(
         seed=settings.seed,
         trouble=trouble,
     )
-    return log_and_apply(state, fact, sitting)
+    return log_and_apply(state, event, sitting)

@@ -16,7 +16,7 @@ from study.devices.device import Fault, PlaybackResult
 from study.session.facts.events import ProbeMeasured, ProbePlayed
 from study.session.state.probe_state import Probe
 from study.session.state.state import SessionState
-from study.session.stimulus.probe_stimulus import HELD_S, make_probe_stimulus, make_reference_commands
+from study.session.stimulus.probe_stimulus import PROBE_HOLD_S, make_probe_stimulus, make_reference_commands
 from study.session.views.form_views import FormKind
 from study.session.views.forms import judge_form, make_form, make_take_handle_form, make_words
 from study.session.views.participant_views import PlayingNotice, Unanswered
@@ -159,7 +159,7 @@ def _play_and_measure(state: SessionState, kind: ProbeKind, level_n: float, sitt
     state = _log_probe_start(state, kind, level_n, sitting)
     sitting.supervisor.start_activity("probe")
     sitting.device.hold(stimulus)
-    notice = PlayingNotice(NO_QUESTION, 0, HELD_S, picture=None)
+    notice = PlayingNotice(NO_QUESTION, 0, PROBE_HOLD_S, picture=None)
     reply = sitting.display.show_playing(notice, sitting.supervisor.keep_alive)
     play_result = release_device(sitting)
     missed_ticks = play_result.health.missed_ticks

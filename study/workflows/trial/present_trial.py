@@ -18,13 +18,13 @@ from study.session.facts.void_reasons import TOO_LITTLE_MOTION
 from study.session.state.due_trial import PresentTrial, has_swapped_labels
 from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, count_repeats_left
-from study.session.stimulus.delivered import has_hardly_moved, measure_delivered
+from study.session.stimulus.delivered import has_too_little_motion, measure_delivered
 from study.session.stimulus.stimulus import PLANE_AXES, compute_direction_vector
 from study.session.views.participant_views import HandleView, Question, Task, Unanswered, make_direction_picture
 from study.workflows.trial.action_result import ActionResult, find_leaving_reason, make_early_end_result
 from study.workflows.trial.ask_participant import StimulusReply, ask_participant
 from study.workflows.trial.judge_trial import get_void_cause, judge_trial
-from study.workflows.trial.masking import was_masked
+from study.workflows.trial.masking import is_masked
 from study.workflows.trial.sitting import Pulse, Sitting, log_and_apply, release_device
 from study.workflows.trial.trial_events import (
     TrialOutcome,
@@ -120,7 +120,7 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
     question = make_question(state, due_trial)
     state = log_and_apply(state, make_presented_event(due_trial, sitting), sitting)
     stimulus_reply = ask_participant(state, due_trial, question, sitting)
-    masked = was_masked(sitting)
+    masked = is_masked(sitting)
     if stimulus_reply.pulse is not None:
         state = _log_pulse(state, due_trial, stimulus_reply.pulse, sitting)
     if isinstance(stimulus_reply.reply, Unanswered):
@@ -134,7 +134,7 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
         attempt=due_trial.attempt,
         answer=1 if stimulus_reply.reply.answer == 1 else 2,
         response_time_s=max(0.0, stimulus_reply.reply.key_time_s - stimulus_reply.started_s),
-        health=make_answer_health(stimulus_reply.health, stimulus_reply.felt_whole)
+        health=make_answer_health(stimulus_reply.health, stimulus_reply.is_complete)
         if stimulus_reply.health is not None
         else None,
     )
@@ -172,7 +172,7 @@ def _log_answered_trial(
     correct = state.answered is not None and state.answered.answer == due_trial.label
     vector = compute_direction_vector(state.protocol.directions, due_trial.direction)
     verdict = judge_trial(
-        play_result.health, state.protocol.measurement, stimulus_reply.felt_whole, stimulus_reply.health
+        play_result.health, state.protocol.measurement, stimulus_reply.is_complete, stimulus_reply.health
     )
     recording = play_result.recording if verdict.is_measurable else None
     values = measure_delivered(recording, vector, due_trial.frequency_hz) if recording is not None else None
@@ -188,7 +188,7 @@ def _log_answered_trial(
     friction_n = state.protocol.safety.plausibility.friction_n
     measured = recording if values is not None else None
     device_kg = sitting.device.info.effective_mass_kg
-    if measured is not None and has_hardly_moved(measured, vector, due_trial.frequency_hz, friction_n, device_kg):
+    if measured is not None and has_too_little_motion(measured, vector, due_trial.frequency_hz, friction_n, device_kg):
         verdict = replace(verdict, flags=(*verdict.flags, TOO_LITTLE_MOTION))
     outcome = TrialOutcome(play_result, values, verdict.flags, vector, verdict.is_measurable)
     state = log_and_apply(state, record_measured_trial(due_trial, outcome, state, sitting), sitting)

@@ -14,13 +14,13 @@ class RequestPort(Protocol):
     """Source of requests to a running session."""
 
     def take(self) -> tuple[Request, ...]:
-        """Return the new requests since the last call, oldest first. Must be fast, because it is called about twenty
-        times a second, and must not raise."""
+        """Return the new requests since the last call, oldest first; empty without any. Must be fast, because it is
+        called about twenty times a second, and must not raise."""
         ...
 
 
 class QueuedRequests:
-    """Queue of requests from within the program."""
+    """Queue of requests from within the program, for any number of threads that send."""
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Request] = SimpleQueue()
@@ -30,6 +30,7 @@ class QueuedRequests:
         self._queue.put(request)
 
     def take(self) -> tuple[Request, ...]:
+        """Remove and return the requests in the queue, oldest first. Does not wait."""
         requests = []
         while True:
             try:
@@ -39,7 +40,7 @@ class QueuedRequests:
 
 
 class CombinedRequests:
-    """Combination of several sources of requests."""
+    """Source that combines several sources of requests."""
 
     def __init__(self, *sources: RequestPort) -> None:
         self._sources = sources

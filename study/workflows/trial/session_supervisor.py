@@ -9,7 +9,7 @@ from collections.abc import Callable
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Look
 from study.session.views.participant_views import Answered, Reply, Unanswered
-from study.session.watching.live_state import Activity, Live
+from study.session.watching.live_state import Activity, LiveState
 from study.session.watching.requests import NoteAsked, PauseAsked, RequestSource, StopAsked
 from study.workflows.trial.requests_port import RequestPort
 
@@ -31,7 +31,7 @@ class SessionSupervisor:
         device: Device,
         clock: Clock,
         requests: RequestPort,
-        publish: Callable[[Live], None],
+        publish: Callable[[LiveState], None],
         buttons: tuple[int, ...] = (),
         place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
@@ -150,11 +150,11 @@ class SessionSupervisor:
         (x, y, z), (x0, y0, z0) = look.position_m, self._place_m
         return (x - x0, y - y0, z - z0)
 
-    def _make_live_state(self, look: Look) -> Live:
+    def _make_live_state(self, look: Look) -> LiveState:
         """Make the state of device and session for viewers: distance from the start position in mm, magnitude of the
         acceleration in m/s²; None without a reading."""
         fault, offset_m, acceleration_mps2 = self._device.fault(), self.compute_offset_m(look), look.acceleration_mps2
-        return Live(
+        return LiveState(
             utc=self._clock.utc(),
             activity=self._activity,
             since_utc=self._activity_start_utc,

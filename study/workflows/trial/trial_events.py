@@ -16,7 +16,7 @@ from study.session.facts.answer_given import AnswerHealth
 from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoiled
 from study.session.state.due_trial import PresentTrial
 from study.session.state.state import SessionState
-from study.session.stimulus.delivered import Delivered
+from study.session.stimulus.delivered import DeliveredMotion
 from study.store.disk.provenance import list_versions
 from study.store.sessions.trial_recordings import recording_name, save_trial_recording
 from study.workflows.trial.sitting import Sitting
@@ -28,7 +28,7 @@ class TrialOutcome:
 
     play_result: PlaybackResult
     """Recording of the stimulus, and counters of the device."""
-    delivered: Delivered | None
+    delivered: DeliveredMotion | None
     """Delivered amplitudes; None where less than a period was measured or the acceleration cannot be trusted."""
     flags: tuple[str, ...]
     """Reasons, in words, why the stimulus should be inspected; empty without any."""
@@ -57,12 +57,12 @@ def make_presented_event(due_trial: PresentTrial, sitting: Sitting) -> TrialPres
     )
 
 
-def make_answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
-    """Make the counters of the device that are logged with the answer. felt_whole: whether the stimulus was complete
+def make_answer_health(health: Health, is_complete: bool) -> AnswerHealth:
+    """Make the counters of the device that are logged with the answer. is_complete: whether the device had no fault
     until the answer."""
     return AnswerHealth(
         fault=health.fault.name,
-        felt_whole=felt_whole,
+        felt_whole=is_complete,
         ticks=health.ticks,
         missed_ticks=health.missed_ticks,
         stimulus_clipped=health.stimulus_clipped,
@@ -157,8 +157,8 @@ def _compute_largest_offset_mm(play_result: PlaybackResult, sitting: Sitting) ->
     without finite positions."""
     if play_result.recording is None or play_result.recording.position is None:
         return None
-    offset_m = np.linalg.norm(play_result.recording.position.samples - np.asarray(sitting.place_m), axis=1)
-    return 1000.0 * float(np.nanmax(offset_m)) if np.isfinite(offset_m).any() else None
+    distance_m = np.linalg.norm(play_result.recording.position.samples - np.asarray(sitting.place_m), axis=1)
+    return 1000.0 * float(np.nanmax(distance_m)) if np.isfinite(distance_m).any() else None
 
 
 def _make_recording_metadata(

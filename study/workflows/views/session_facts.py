@@ -11,19 +11,19 @@ from study.session.views.local_time import Zone, format_time_in_zone
 from study.workflows.results.fold_session import FoldedSession
 
 _HASH_DIGITS = 12
-"""Digits of the protocol's hash that are shown."""
+"""Number of digits of the protocol's hash that are shown; as many select a protocol in `collect_sessions`."""
 
 
 def list_session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
-    """Pairs (label, value) in display order. zone: time zone of the displayed times."""
+    """List pairs (label, value) in display order. zone: time zone of the displayed times."""
     state, events = folded_session.state, folded_session.log_contents.events
     session_opened = state.opened
-    participant = f"simulated ({session_opened.observer})" if session_opened.observer else "a person"
+    participant_text = f"simulated ({session_opened.observer})" if session_opened.observer else "a person"
     lock_text = "locked" if session_opened.protocol_locked else "not locked"
     # A simulated participant runs faster than real time, so that the log may end in the future.
     time_remark = ", in simulated time, which runs ahead of the clock" if session_opened.observer else ""
     facts = [
-        ("participant", f"{session_opened.subject}, {participant}, {_describe_number(state)}"),
+        ("participant", f"{session_opened.subject}, {participant_text}, {_describe_number(state)}"),
         ("protocol", f"{state.protocol.name} ({session_opened.protocol_hash[:_HASH_DIGITS]}, {lock_text})"),
         ("title", state.protocol.title),
         ("device", _describe_device(session_opened)),
@@ -44,27 +44,27 @@ def list_session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple
 
 
 def _name_end_time(state: SessionState) -> str:
-    """Label of the time of the log's last event: of a participant turned away, a finished session, or an unfinished
-    one."""
+    """Name the time of the log's last event: of a participant turned away, a finished session, or an unfinished one."""
     if state.sitting.ineligibility:
         return "ended"
     return "finished" if state.closed else "last entry"
 
 
 def _describe_number(state: SessionState) -> str:
-    """Number of the participant in the counterbalanced order of the protocol, from 1."""
+    """Describe the number of the participant in the counterbalanced order of the protocol, from 1."""
     if not state.has_final_place:
         return "without a place in the order of this protocol"
     return f"number {state.opened.participant_number + 1} of this protocol"
 
 
 def _describe_quality(session_opened: SessionOpened) -> str:
-    """Quality of the model that equalizes the stimuli; empty without an equalizer."""
+    """Describe the quality of the model that equalizes the stimuli; empty without an equalizer."""
     return "" if session_opened.equalized is None else session_opened.equalized.quality or NOT_STORED
 
 
 def _format_reachable_levels(session_opened: SessionOpened) -> str:
-    """Acceleration (m/s²) that both directions reach at the force cap, by frequency; empty without an equalizer."""
+    """Format the acceleration (m/s²) that both directions reach at the force cap, by frequency; empty without an
+    equalizer."""
     if session_opened.equalized is None:
         return ""
     return ", ".join(
@@ -73,14 +73,15 @@ def _format_reachable_levels(session_opened: SessionOpened) -> str:
 
 
 def _describe_device(session_opened: SessionOpened) -> str:
-    """Name of the device, whether it is simulated, and its sample rate."""
+    """Describe the device: its name, whether it is simulated, and its sample rate (Hz)."""
     device = session_opened.device
     simulated_text = ", simulated: nothing moves" if device.simulated else ""
     return f"{device.name}{simulated_text}, {device.sample_rate_hz:g} Hz"
 
 
 def _describe_answers(folded_session: FoldedSession) -> str:
-    """Number of answers and of void presentations; a presentation that still waits for its answer is not void."""
+    """Describe the number of answers and of void presentations; a presentation that still waits for its answer is not
+    void."""
     state = folded_session.state
     void_count = len(state.trials) - state.answers - (state.presented is not None and state.answered is None)
     if not void_count:
@@ -92,7 +93,7 @@ def _describe_answers(folded_session: FoldedSession) -> str:
 
 
 def _find_last_utc(folded_session: FoldedSession) -> str:
-    """UTC time of the session's end, or else of the last event."""
+    """Find the UTC time of the session's end, or else of the last event."""
     closing_utc = next(
         (event.utc for event in folded_session.log_contents.events if isinstance(event, SessionClosed)), ""
     )
@@ -100,25 +101,25 @@ def _find_last_utc(folded_session: FoldedSession) -> str:
 
 
 def _describe_log(folded_session: FoldedSession) -> str:
-    """Number of lines of the log, and the evidence that it is unchanged: checksums and seals."""
+    """Describe the log: number of lines, and the evidence that it is unchanged: checksums and seals."""
     length_text = f"{folded_session.log_contents.chain.lines} lines"
     seal_text = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
     return f"{length_text}, {folded_session.log_contents.chain.describe()}{seal_text}"
 
 
 def _list_form_answers(folded_session: FoldedSession) -> tuple[tuple[str, str], ...]:
-    """Pairs (label, value) of consent and answers to questions. Free text is left out, because it may concern
+    """List pairs (label, value) of consent and answers to questions. Free text is left out, because it may concern
     health."""
     protocol = folded_session.state.protocol
     questions_by_form = {"questionnaire": protocol.before, "debrief": protocol.debrief}
-    facts = []
+    answer_facts = []
     for event in folded_session.log_contents.events:
         if isinstance(event, FormFilled) and event.form == "consent":
-            facts.append(("consent", f"{'given' if event.passed else 'not given'}, version {event.version}"))
+            answer_facts.append(("consent", f"{'given' if event.passed else 'not given'}, version {event.version}"))
         if isinstance(event, FormFilled) and event.form in questions_by_form:
-            facts += [
+            answer_facts += [
                 ("said", f"{question.question} {event.answers[question.key]}")
                 for question in questions_by_form[event.form]
                 if question.key in event.answers and not question.is_free_text
             ]
-    return tuple(facts)
+    return tuple(answer_facts)

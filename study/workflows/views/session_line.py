@@ -22,7 +22,7 @@ from study.store.sessions.event_log import read_opening
 from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.log_seal import find_seals, is_sealed
 from study.store.sessions.session_summary import SUMMARY_NAME
-from study.store.sessions.withdrawal_files import describe_unfinished, read_intent, read_tombstone
+from study.store.sessions.withdrawal_files import describe_unfinished_withdrawal, read_intent, read_tombstone
 from study.workflows.results.fold_session import fold_session
 
 MEASURED_EVENT = b',"event":"trial_measured",'
@@ -93,7 +93,7 @@ def _make_withdrawn_line(folder: SessionFolder) -> SessionLine:
         begun_facts = {"protocol": intended_session.protocol}
     protocol = str(begun_facts.get("protocol", "")) if isinstance(begun_facts, dict) else ""
     remark_text = "The participant withdrew; the data were erased."
-    if unfinished_text := describe_unfinished(folder):
+    if unfinished_text := describe_unfinished_withdrawal(folder):
         remark_text = f"The participant withdrew, and not everything is erased. {unfinished_text}"
     return SessionLine(
         folder.name, str(folder.path), folder.subject, protocol, withdrawn_utc, None, 0, 0, 0, "withdrawn", remark_text

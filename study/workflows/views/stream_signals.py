@@ -1,8 +1,8 @@
 """Stream the signals of a running session's device over the lab streaming layer (LSL): force, acceleration, motion and
 status of the control loop at every tick, in addition to the session's markers.
 
-A separate program (`hapteq stream`) reads them from the telemetry ring buffer of the loop, so that streaming never
-delays the loop. `stream_session` calls `SignalStreams.push` repeatedly.
+A separate program (`hapteq stream`, `study.cli.stream`) reads them from the telemetry ring buffer of the loop, so that
+streaming never delays the loop. `stream_session` calls `SignalStreams.push` repeatedly.
 """
 
 from collections.abc import Callable
@@ -24,20 +24,20 @@ CALLS_PER_RING_CHECK = 10
 """Number of calls of `push` per check whether the session uses another ring buffer, as after resuming. Chosen."""
 
 
-def _name_components(name: str) -> tuple[str, str, str]:
-    """Names of the three components of a vector: NAME_x, NAME_y, NAME_z."""
+def _make_component_names(name: str) -> tuple[str, str, str]:
+    """Make the names of the three components of a vector: NAME_x, NAME_y, NAME_z."""
     return (f"{name}_x", f"{name}_y", f"{name}_z")
 
 
 STREAMS = (
     StreamDescription(
-        "hapteq force", "Force", (*_name_components("commanded"), *_name_components("applied")), ("N",) * 6
+        "hapteq force", "Force", (*_make_component_names("commanded"), *_make_component_names("applied")), ("N",) * 6
     ),
-    StreamDescription("hapteq acceleration", "Acceleration", _name_components("acceleration"), ("m/s^2",) * 3),
+    StreamDescription("hapteq acceleration", "Acceleration", _make_component_names("acceleration"), ("m/s^2",) * 3),
     StreamDescription(
         "hapteq motion",
         "Motion",
-        (*_name_components("position"), *_name_components("velocity")),
+        (*_make_component_names("position"), *_make_component_names("velocity")),
         ("m",) * 3 + ("m/s",) * 3,
     ),
     StreamDescription("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
@@ -70,12 +70,12 @@ class SignalStreams:
 
     def _switch_ring(self) -> None:
         """Open the session's present ring buffer if it is another one, and the outlets for the first."""
-        live = read_live(self._folder)
-        if live is None or live.telemetry == self._ring_path:
+        live_state = read_live(self._folder)
+        if live_state is None or live_state.telemetry == self._ring_path:
             return
         try:
-            self._reader = open_telemetry(live.telemetry) if live.telemetry else None
-            self._ring_path = live.telemetry
+            self._reader = open_telemetry(live_state.telemetry) if live_state.telemetry else None
+            self._ring_path = live_state.telemetry
         except StudyError:  # the sitting has ended, or its ring cannot be opened yet: the next check tries again
             self._reader, self._ring_path = None, ""
         if self._reader is not None and not self._outlets:
@@ -86,17 +86,17 @@ class SignalStreams:
         since."""
         if self._reader is None:
             return 0
-        lost_before = self._reader.lost
+        earlier_lost_count = self._reader.lost
         rows = self._reader.read()
         if len(rows):
-            status: FloatArray = np.stack([rows.tick, rows.phase, rows.fault, rows.missed], axis=1)
+            loop_status: FloatArray = np.stack([rows.tick, rows.phase, rows.fault, rows.missed], axis=1)
             signals = (
                 np.hstack([rows.commanded_n, rows.applied_n]),
                 rows.acceleration_mps2,
                 np.hstack([rows.position_m, rows.velocity_m_per_s]),
-                status,
+                loop_status,
             )
             for outlet, samples in zip(self._outlets, signals, strict=True):
                 outlet.push(samples, rows.time_s + offset_s)
             self.sent_ticks += len(rows)
-        return self._reader.lost - lost_before
+        return self._reader.lost - earlier_lost_count

@@ -1,6 +1,6 @@
 """View of a diagnosis as sentences and tables, from its document `diagnosis.json`. Only reads files.
 
-Used by `hapteq show` and the screen.
+Called by `hapteq show` and the engine of the screens (`engine_commands`).
 """
 
 from pathlib import Path
@@ -31,10 +31,10 @@ named effects, and the noise between repeats."""
 
 
 def make_diagnosis_view(path: Path) -> DiagnosisView:
-    """The view of a diagnosis. path: its document; the improved model and the HTML report are searched for in the same
-    folder. Raises CannotReadError or UnusableFileError where the document cannot be used."""
+    """Make the view of a diagnosis. path: its document; the improved model and the HTML report are searched for in the
+    same folder. Raises CannotReadError or UnusableFileError where the document cannot be used."""
     diagnosis, device = read_diagnosis(path), _read_device(path.parent / MODEL_NAME)
-    report = path.parent / "report.html"
+    report_path = path.parent / "report.html"
     view = DiagnosisView(
         path=str(path),
         verdict=describe_verdict(diagnosis, device=device),
@@ -44,7 +44,7 @@ def make_diagnosis_view(path: Path) -> DiagnosisView:
         fit=(ERROR_HEADER, _format_error_row("fit", diagnosis.fit.fit), _format_error_row("test", diagnosis.fit.test)),
         remainder=_tabulate_mismatches(diagnosis.remainder),
         next_experiment=_describe_next_experiment(diagnosis),
-        report=str(report) if report.is_file() else "",
+        report=str(report_path) if report_path.is_file() else "",
         notes=_list_notes(diagnosis),
         candidates=describe_candidates(diagnosis, device),
     )
@@ -52,8 +52,8 @@ def make_diagnosis_view(path: Path) -> DiagnosisView:
 
 
 def _read_device(path: Path) -> DeviceWording | None:
-    """Number of axes and units of the improved model in this file, for the wording of parameters; None if it cannot be
-    read."""
+    """Read number of axes and units of the improved model in this file, for the wording of parameters; None if it
+    cannot be read."""
     try:
         model = read_mechanical_model(path)
     except StudyError:
@@ -62,21 +62,21 @@ def _read_device(path: Path) -> DeviceWording | None:
 
 
 def _describe_named_effect(effect: NamedEffect) -> tuple[str, ...]:
-    """Sentences on a named effect, and on effects that the recording cannot distinguish from it."""
-    text = (
+    """Describe in sentences a named effect, and the effects that the recording cannot distinguish from it."""
+    effect_text = (
         f"{describe_effect(effect)} It explains {_format_percent(effect.share)} of the mismatch that remains after "
         f"re-tuning (probability {_format_probability(effect.probability)})."
     )
-    return tuple(filter(None, (text, describe_equivalents(effect))))
+    return tuple(filter(None, (effect_text, describe_equivalents(effect))))
 
 
 def _tabulate_mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:
-    """Table of mismatches with its header; empty without any."""
+    """Tabulate mismatches below their header; empty without any."""
     return (MISMATCH_HEADER, *map(_format_mismatch_row, mismatches)) if mismatches else ()
 
 
 def _format_mismatch_row(mismatch: Mismatch) -> tuple[str, ...]:
-    """Row of the table of mismatches, under `MISMATCH_HEADER`."""
+    """Format a row of the table of mismatches, under `MISMATCH_HEADER`."""
     return (
         mismatch.output,
         mismatch.input,
@@ -88,35 +88,35 @@ def _format_mismatch_row(mismatch: Mismatch) -> tuple[str, ...]:
     )
 
 
-def _format_error_row(record: str, errors: Errors) -> tuple[str, ...]:
-    """Row of the table of errors, under `ERROR_HEADER`. record: name of the set of samples."""
+def _format_error_row(sample_set: str, errors: Errors) -> tuple[str, ...]:
+    """Format a row of the table of errors, under `ERROR_HEADER`. sample_set: name of the set of samples."""
     values = (errors.before, errors.retuned, errors.after, errors.noise)
-    return (record, *(MISSING if value is None else f"{value:.4f}" for value in values))
+    return (sample_set, *(MISSING if value is None else f"{value:.4f}" for value in values))
 
 
 def _describe_next_experiment(diagnosis: Diagnosis) -> str:
-    """Command, reason and discriminated effects of the proposed next experiment; empty without a proposal."""
+    """Describe command, reason and discriminated effects of the proposed next experiment; empty without a proposal."""
     experiment = diagnosis.next_experiment
     if experiment is None:
         return ""
     proposed_effect, *rivals = (get_noun(name) for name in experiment.splits) if experiment.splits else ("",)
-    splits = f" This distinguishes {proposed_effect} from {conjoin(rivals)}." if rivals else ""
-    return f"{experiment.command}\n{experiment.why}{splits}"
+    discrimination_text = f" This distinguishes {proposed_effect} from {conjoin(rivals)}." if rivals else ""
+    return f"{experiment.command}\n{experiment.why}{discrimination_text}"
 
 
 def _list_notes(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Sentences on the error measure, the re-tuned parameters, and the remaining mismatch."""
-    retuned = (f"Re-tuned: {conjoin(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
-    remainder = (describe_remainder(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
-    measured = f"Errors are normalised root-mean-square over the channels, measured by {diagnosis.error}."
-    return (measured, *retuned, *remainder)
+    """List sentences on the error measure, the re-tuned parameters, and the remaining mismatch."""
+    retuned_note = (f"Re-tuned: {conjoin(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
+    remainder_note = (describe_remainder(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
+    measure_note = f"Errors are normalised root-mean-square over the channels, measured by {diagnosis.error}."
+    return (measure_note, *retuned_note, *remainder_note)
 
 
 def _format_percent(share: float) -> str:
-    """The share in whole percent."""
+    """Format a share (1 = 100 %) in whole percent."""
     return f"{100 * share:.0f} %"
 
 
 def _format_probability(probability: float) -> str:
-    """The probability with two decimals; above 0.99 only that it is above."""
+    """Format a probability with two decimals; above 0.99 as "> 0.99"."""
     return "> 0.99" if probability > 0.99 else f"{probability:.2f}"

@@ -1,7 +1,7 @@
 """View of one session for screen and command line: facts, thresholds, staircases, and the log as sentences.
 
-Used by `hapteq show` and the screen (`study.tui.engine.engine_commands`). Nothing is changed. A damaged session is
-shown as far as it can be read, with warnings; it never raises a StudyError.
+Called by `hapteq show` and the engine of the screens (`study.tui.engine.engine_commands`). Nothing is changed. A
+damaged session is shown as far as it can be read, with warnings; it never raises a StudyError.
 """
 
 from pathlib import Path
@@ -33,13 +33,13 @@ THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "tri
 
 
 def make_session_view(path: Path, zone: Zone = to_utc) -> SessionView:
-    """The view of the session in the folder `path`. zone: time zone of the displayed times, UTC by default; a screen
-    for a person takes `study.local_clock.convert_to_machine_zone`."""
+    """Make the view of the session in the folder `path`. zone: time zone of the displayed times, UTC by default; a
+    screen for a person takes `study.local_clock.convert_to_machine_zone`."""
     folder = SessionFolder(path.absolute())
     try:
         folded_session = None if folder.withdrawn else fold_session(folder)
-    except StudyError as problem:
-        return make_printable(_make_damaged_view(folder, problem, zone))
+    except StudyError as error:
+        return make_printable(_make_damaged_view(folder, error, zone))
     return make_printable(
         _make_minimal_view(folder, make_session_line(folder))
         if folded_session is None
@@ -48,7 +48,7 @@ def make_session_view(path: Path, zone: Zone = to_utc) -> SessionView:
 
 
 def _make_full_view(folder: SessionFolder, folded_session: FoldedSession, zone: Zone) -> SessionView:
-    """View of a session whose log was read without damage."""
+    """Make the view of a session whose log was read without damage."""
     state = folded_session.state
     analysis, analysis_problem = _analyse_session(state)
     clock_remarks = (
@@ -72,7 +72,8 @@ def _make_full_view(folder: SessionFolder, folded_session: FoldedSession, zone: 
 
 
 def _list_log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
-    """Sentences on an incomplete last line, on results that are missing or out of date, and on missing checksums."""
+    """List sentences on an incomplete last line, on results that are missing or out of date, and on missing
+    checksums."""
     due_files = ", ".join(list_due_results(folder, folded_session))
     remarks = (
         (
@@ -85,44 +86,44 @@ def _list_log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> t
             "The log contains no checksums: an older version wrote it.",
         ),
     )
-    return tuple(text for applies, text in remarks if applies)
+    return tuple(text for is_due, text in remarks if is_due)
 
 
-def _make_damaged_view(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
-    """View of a damaged session: its line, the problem, and the events that can be read."""
+def _make_damaged_view(folder: SessionFolder, error: StudyError, zone: Zone) -> SessionView:
+    """Make the view of a damaged session: its line, the problem, and the events that can be read."""
     line = make_session_line(folder)
     if line.standing != "unreadable":  # the line reads only parts of the log, and did not find the damage
         line = SessionLine(
             line.name, line.path, line.subject, line.protocol, line.begun_utc, line.observer,
-            line.answers, 0, line.runs, "unreadable", problem.happened,
+            line.answers, 0, line.runs, "unreadable", error.happened,
         )  # fmt: skip
-    sentences = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
+    sentences = tuple(part for part in (error.happened, error.saved, error.do_now) if part)
     events = describe_log(read_valid_events(folder.log), zone)
-    return _make_minimal_view(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
+    return _make_minimal_view(folder, line, warnings=(f"{error.title}.", *sentences), events=events)
 
 
 def _make_minimal_view(
     folder: SessionFolder, line: SessionLine, warnings: tuple[str, ...] = (), events: tuple[str, ...] = ()
 ) -> SessionView:
-    """View of a withdrawn or damaged session, without thresholds and staircases."""
+    """Make the view of a withdrawn or damaged session, without thresholds and staircases."""
     facts = (("participant", line.subject), ("folder", str(folder.path)))
     notes = warnings or ((line.remark,) if line.remark else ())
     return SessionView(line, facts, (), notes, (), events, _find_report(folder), _list_figures(folder))
 
 
 def _analyse_session(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
-    """Analysis of this session alone, or None with a sentence on why there is none."""
+    """Analyse this session alone. Returns the analysis and no sentence, or None and a sentence on why there is none."""
     # Imported here: statistics load slowly, and programs that import this module must start at once.
     from analysis.psychophysics.study_analysis import analyse_study
 
     try:
         return analyse_study(state.trials, state.protocol), ()
-    except ValueError as problem:
-        return None, (f"No thresholds: {problem}.",)
+    except ValueError as error:
+        return None, (f"No thresholds: {error}.",)
 
 
 def _tabulate_thresholds(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[tuple[str, ...], ...]:
-    """Table of thresholds with its header; empty while no run is complete."""
+    """Tabulate the thresholds below their header; empty while no run is complete."""
     thresholds = (*analysis.thresholds, *analysis.detection) if analysis else ()
     if not any(threshold.complete for threshold in thresholds):
         return ()
@@ -133,7 +134,7 @@ def _tabulate_thresholds(state: SessionState, analysis: "StudyAnalysis | None") 
 
 
 def _format_threshold_row(threshold: Threshold, run: Run) -> tuple[str, ...]:
-    """Row of a run under `THRESHOLD_HEADER`: threshold in N and, where it was measured, in m/s²."""
+    """Format the row of a run under `THRESHOLD_HEADER`: threshold in N and, where it was measured, in m/s²."""
     remark = "cut by the cap" if threshold.censored else ""
     if not threshold.complete:
         remark = "trial limit" if threshold.ended is RunEnd.TRIAL_LIMIT else "not complete"
@@ -152,7 +153,7 @@ def _format_threshold_row(threshold: Threshold, run: Run) -> tuple[str, ...]:
 
 
 def _list_staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
-    """Staircases of all runs with counted trials, except practice."""
+    """List the staircases of all runs with counted trials, except practice."""
     thresholds_by_run = (
         {threshold.run: threshold for threshold in (*analysis.thresholds, *analysis.detection)} if analysis else {}
     )
@@ -162,11 +163,11 @@ def _list_staircases(state: SessionState, analysis: "StudyAnalysis | None") -> t
 
 
 def _make_staircase(state: SessionState, run: Run, threshold: Threshold | None) -> Staircase:
-    """Levels (N), answers and reversals of the counted trials of a run, without catch trials."""
+    """Make the staircase of a run: levels (N), answers and reversals of its counted trials, without catch trials."""
     counted_trials = [
-        session_trial
-        for session_trial in state.trials
-        if session_trial.run == run.index and session_trial.is_valid and session_trial.phase is not Phase.CATCH
+        presented_trial
+        for presented_trial in state.trials
+        if presented_trial.run == run.index and presented_trial.is_valid and presented_trial.phase is not Phase.CATCH
     ]
     is_complete = run.index < state.run
     return Staircase(
@@ -181,11 +182,11 @@ def _make_staircase(state: SessionState, run: Run, threshold: Threshold | None) 
 
 
 def _find_report(folder: SessionFolder) -> str:
-    """Path of the report of the session's analysis; empty if there is none."""
+    """Find the path of the report of the session's analysis; empty if there is none."""
     report_path = folder.path / ANALYSIS_NAME / "report.html"
     return str(report_path) if report_path.is_file() else ""
 
 
 def _list_figures(folder: SessionFolder) -> tuple[str, ...]:
-    """Paths of the PNG figures of the session's analysis."""
+    """List the paths of the PNG figures of the session's analysis, by name; empty without any."""
     return tuple(str(path) for path in sorted((folder.path / ANALYSIS_NAME / "figures").glob("*.png")))

@@ -15,7 +15,7 @@ from study.session.facts.log_chain import Chain, ChainBrokenError, verify_checks
 from study.session.facts.log_time import compute_wall_clock_s
 from study.session.state.presentation_check import LogContradiction
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import LIVE_TIMEOUT_S
@@ -156,7 +156,7 @@ class Follower:
         self._chain = chain
         return ""
 
-    def _has_writer(self, live: Live | None, now_utc: str) -> bool | None:
+    def _has_writer(self, live: LiveState | None, now_utc: str) -> bool | None:
         """Whether a program has the log open for writing; None while a recent live state makes the check
         unnecessary."""
         if self._log_missing:

@@ -13,7 +13,7 @@ def raise_value_error(*arguments):
 def test_the_others_are_drawn_and_the_crash_is_reported(friction_findings, friction_pictures, monkeypatch):
     monkeypatch.setattr(module, "held_out_picture", raise_value_error)
     guard = Guard(enabled=True)
-    drawn = module.diagnosis_pictures(friction_findings, guard)
+    drawn = module.draw_diagnosis_pictures(friction_findings, guard)
     assert len(drawn) == len(friction_pictures) - 1
     (said,) = guard.sentences
     assert said.startswith("The figure of held-out errors was left out") and "broadcast" in said
@@ -22,4 +22,4 @@ def test_the_others_are_drawn_and_the_crash_is_reported(friction_findings, frict
 def test_without_the_guard_a_crash_is_an_error(friction_findings, monkeypatch):
     monkeypatch.setattr(module, "held_out_picture", raise_value_error)
     with pytest.raises(ValueError, match="broadcast"):
-        module.diagnosis_pictures(friction_findings)
+        module.draw_diagnosis_pictures(friction_findings)

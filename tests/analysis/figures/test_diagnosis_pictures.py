@@ -11,7 +11,7 @@ from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectra
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, make_mismatch_map_picture
-from analysis.figures.diagnosis.remainder import draw_remainder
+from analysis.figures.diagnosis.residual_spectra import draw_residual_spectra
 from analysis.figures.diagnosis.rivals import draw_rivals, list_explanations, make_rivals_pictures
 from analysis.figures.diagnosis.signature import draw_signature
 from analysis.figures.picture import render_picture_svg
@@ -197,7 +197,7 @@ def test_without_held_out_data_nothing_is_drawn(friction_findings):
     series = replace(friction_findings.time_series[0], tested=())
     assert compute_remainder_spectra((series,), friction_findings.floor) == ()
     sentence = "There are no held-out data to draw."
-    assert [text.get_text() for text in draw_remainder(()).texts] == [sentence]
+    assert [text.get_text() for text in draw_residual_spectra(()).texts] == [sentence]
     assert [text.get_text() for text in draw_held_out(None, {}, {}).texts] == [sentence]
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.figures.frequency_bands import draw_frequency_bands, frequency_bands_picture
+from analysis.figures.frequency_bands import draw_frequency_bands, make_frequency_bands_picture
 from equalizer.identification.frequency_response.coupling_onset import CouplingOnset, find_coupling_onset
 from equalizer.identification.frequency_response.frequency_bands import compute_frequency_bands
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
@@ -60,6 +60,6 @@ def test_coupled_from_the_start_is_written(response):
 
 def test_the_caption_states_the_rule_and_why_each_band_is_driven_so(response):
     onset = find_coupling_onset(response)
-    picture = frequency_bands_picture(response, onset, compute_frequency_bands(onset.frequency_hz), 35.0)
+    picture = make_frequency_bands_picture(response, onset, compute_frequency_bands(onset.frequency_hz), 35.0)
     assert onset.rule in picture.caption
     assert "Middle: Directions are felt, but the device mixes its axes." in picture.caption

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.figures.model_order import model_order_picture
+from analysis.figures.model_order import make_model_order_picture
 from equalizer.identification.state_space.order_report import OrderReport, OrderRow
 
 
@@ -16,12 +16,12 @@ def report():
 def test_the_caption_names_the_order_and_the_one_that_would_do(report):
     assert (
         "This model has order 20; of those tried, the lowest that is as good as the best is 14."
-        in model_order_picture(report, 20).caption
+        in make_model_order_picture(report, 20).caption
     )
 
 
 def test_seen_and_noise_are_two_kinds_of_points_and_both_costs_are_drawn(report):
-    left, right, cost = model_order_picture(report, 20).figure.axes
+    left, right, cost = make_model_order_picture(report, 20).figure.axes
     seen, noise = left.lines[:2]
     assert (len(seen.get_xdata()), len(noise.get_xdata())) == (3, 2)
     assert list(right.lines[0].get_ydata()) == pytest.approx([0.5, 5 / 14, 0.25])

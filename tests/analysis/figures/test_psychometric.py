@@ -78,7 +78,7 @@ def test_units_stand_side_by_side_with_cuts_and_medians(analysis):
     force, acceleration = draw_thresholds_by_unit(tables).axes
     assert (force.get_ylabel(), acceleration.get_ylabel()) == ("Commanded (N)", "Delivered (m/s²)")
     cut = [text for text in force.texts if text.arrow_patch is not None]
-    assert len(cut) == analysis.table.cut > 0
+    assert len(cut) == analysis.table.censored_count > 0
     medians = [line.get_ydata()[0] for line in force.lines if line.get_linewidth() == 2.2]
     np.testing.assert_allclose(medians, np.median(np.array(analysis.table.values), axis=0))
     # The simulated device delivers in proportion, so the picture is the same.

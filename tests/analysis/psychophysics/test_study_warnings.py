@@ -78,7 +78,7 @@ def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate
     assert stopped.startswith("4 runs are stopped by the limit of 90 trials, without a threshold: s01 at 45 Hz (")
     assert "the remaining means are too low" in stopped
     assert not any("not complete" in sentence for sentence in analysis.warnings)
-    assert "4 are missing because of the trial limit" in analysis.table.coverage
+    assert "4 are missing because of the trial limit" in analysis.table.coverage_warning
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.psychophysics.coverage.coverage_words import describe_coverage
-from analysis.psychophysics.coverage.measured_coverage import MEASURED
+from analysis.psychophysics.coverage.measured_coverage import MEASURED_COVERAGES
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.psychophysics.two_analyses import SIMULATED_RULE, describe_comparison, describe_declaration
@@ -29,7 +29,7 @@ def test_what_the_cap_hides_is_reported(analysis):
     assert "differ: at " in analysis.compared
     assert "45 Hz" in analysis.compared
     for name in ("means", "tukey", "one-way"):
-        assert describe_coverage(MEASURED, name) in analysis.compared
+        assert describe_coverage(MEASURED_COVERAGES, name) in analysis.compared
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def test_where_all_guess_no_difference_is_told(protocol, simulate_study):
 def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_it(analysis, protocol, simulate_study):
     page = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
     for name in ("model", "means", "tobit", "tukey", "run", "one-way"):
-        assert describe_coverage(MEASURED, name) in html.unescape(page)
+        assert describe_coverage(MEASURED_COVERAGES, name) in html.unescape(page)
     assert [contrast.frequency_hz for contrast in analysis.tobit] == [15.0, 25.0, 35.0] and "Tobit" in page
     low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
     assert low.tobit == () and "Tobit" not in render_study_report(low, (), {}, "2026-01-02T03:04:05Z")

@@ -224,7 +224,7 @@ def test_a_device_can_be_calibrated_from_here(run, stub, tmp_path):
 
 
 def test_a_handle_that_is_not_brought_there_is_an_error(run, stub, tmp_path, monkeypatch):
-    monkeypatch.setattr(doctor, "CALIBRATION_S", 0.1)
+    monkeypatch.setattr(doctor, "CALIBRATION_TIMEOUT_S", 0.1)
     stub.set("calibrated", 0)
     stub.set("reset_after_s", 100)
     assert run("--device", "omega3", "--data", tmp_path, "--timing", 0, "--calibrate")[0] == 3

@@ -15,12 +15,12 @@ ROOT = Path(__file__).parents[3]
 NAMED_IN = {
     "SafeDevice": {"study/devices/opening.py"},
     "RIGS_BY_NAME": {"study/devices/opening.py"},
-    "find_rig": {"study/devices/opening.py"},
+    "build_rig": {"study/devices/opening.py"},
     "make_simulated_rig": set(),
     "make_replay_rig": {"study/devices/rigs_by_name.py"},
     "build_omega3": {"study/devices/rigs_by_name.py"},
     "open_force_dimension_rig": {"study/devices/rigs_by_name.py"},
-    "ForceDimensionRig": {"study/devices/force_dimension/rigs.py"},
+    "ForceDimensionRig": {"study/devices/force_dimension/open_rig.py"},
     "set_force": {
         "study/devices/force_dimension/handle.py",
         "study/devices/force_dimension/rig.py",

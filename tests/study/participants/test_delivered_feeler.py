@@ -9,7 +9,7 @@ from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import PerceivedStimulus
 from study.participants.observer_catalogue import find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N, draw_person, make_member
-from study.session.stimulus.delivered import Delivered
+from study.session.stimulus.delivered import DeliveredMotion
 
 TARGET = 0.5 ** (1 / 3)
 PER_NEWTON = 2.7
@@ -24,7 +24,7 @@ def observer():
 def felt(level_n=THRESHOLD_N, along=1.0, across=0.0, harmonics=0.0, trial=0):
     """At 15 Hz; along: as a share of what a flawless device delivers, across and harmonics as shares of that."""
     mps2 = PER_NEWTON * level_n * along
-    delivered = Delivered(mps2, across * mps2, 0.1, harmonics * mps2)
+    delivered = DeliveredMotion(mps2, across * mps2, 0.1, harmonics * mps2)
     return PerceivedStimulus(0, trial, 0, Phase.TEST, 15.0, level_n, 1, trial, delivered=delivered)
 
 

@@ -14,7 +14,7 @@ from study.devices.safe import SafeDevice
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.packing import pack_parameters
 from study.devices.simulated.parameters import Hand, Omega3Parameters
-from study.session.stimulus.delivered import HEAVIEST_KG, has_hardly_moved, measure_delivered
+from study.session.stimulus.delivered import MAX_HAND_MASS_KG, has_too_little_motion, measure_delivered
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import compute_direction_vector
 from study.store.formats.protocol_files import read_study_protocol
@@ -84,10 +84,10 @@ def test_no_grip_is_taken_for_motors_that_do_nothing(frequency_hz, grip):
     """Not even one that is twenty times as firm."""
     for level_n, told in ((0.6, False), (3.0, True)):
         recording = recorded(frequency_hz, (grip, grip), 1, level_n)
-        assert not has_hardly_moved(recording, VECTOR, frequency_hz, FRICTION_N, DEVICE_KG)
+        assert not has_too_little_motion(recording, VECTOR, frequency_hz, FRICTION_N, DEVICE_KG)
         response = recording.response
         still = replace(recording, response=replace(response, samples=0.02 * response.samples))
-        assert has_hardly_moved(still, VECTOR, frequency_hz, FRICTION_N, DEVICE_KG) is told
+        assert has_too_little_motion(still, VECTOR, frequency_hz, FRICTION_N, DEVICE_KG) is told
 
 
 def moved(mass_kg: float, frequency_hz: float) -> Recording:
@@ -103,9 +103,9 @@ def moved(mass_kg: float, frequency_hz: float) -> Recording:
 @pytest.mark.parametrize("device_kg", [0.1, 1.0, 4.0])
 def test_a_heavy_device_in_the_heaviest_hand_is_not_taken_for_motors_that_do_nothing(device_kg):
     """At 45 Hz, where mass opposes most: only what moves less than hand and declared mass together is told."""
-    heavy = moved(HEAVIEST_KG + device_kg, 45.0)
-    assert not has_hardly_moved(heavy, VECTOR, 45.0, FRICTION_N, device_kg)
-    assert has_hardly_moved(moved(2 * (HEAVIEST_KG + device_kg), 45.0), VECTOR, 45.0, FRICTION_N, device_kg)
+    heavy = moved(MAX_HAND_MASS_KG + device_kg, 45.0)
+    assert not has_too_little_motion(heavy, VECTOR, 45.0, FRICTION_N, device_kg)
+    assert has_too_little_motion(moved(2 * (MAX_HAND_MASS_KG + device_kg), 45.0), VECTOR, 45.0, FRICTION_N, device_kg)
 
 
 def test_motors_that_give_30_percent_less_look_like_a_firmer_grip():

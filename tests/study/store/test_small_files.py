@@ -10,7 +10,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, SensorLimits, Toler
 from equalizer.plant.mechanical_model_toml import MATRICES, parse_mechanical_model
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from study.store.disk.file_errors import AlreadyThereError, CannotReadError, UnusableFileError
+from study.store.disk.file_errors import AlreadyExistsError, CannotReadError, UnusableFileError
 from study.store.disk.provenance import gather_provenance
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.diagnosis_file import read_diagnosis, write_diagnosis
@@ -64,7 +64,7 @@ def test_a_mechanical_model_goes_to_disk_and_back(tmp_path):
     model = parse_mechanical_model(MODEL)
     write_mechanical_model(tmp_path / "m.toml", model)
     assert read_mechanical_model(tmp_path / "m.toml").mass == model.mass
-    with pytest.raises(AlreadyThereError):
+    with pytest.raises(AlreadyExistsError):
         write_mechanical_model(tmp_path / "m.toml", model)
 
 

@@ -7,7 +7,7 @@ import pytest
 from study.session.views.participant_views import DirectionPicture
 from study.tui.drawing.braille import Canvas
 from study.tui.drawing.direction_picture import draw_large_direction
-from study.tui.drawing.number_picture import large_number
+from study.tui.drawing.number_picture import draw_large_digit
 
 DIAGONAL = DirectionPicture("yz", (135.0, 45.0))
 
@@ -83,10 +83,10 @@ def test_both_segments_are_equally_long_and_only_one_is_broken():
 
 @pytest.mark.parametrize(("columns", "rows"), [(2, 1), (6, 3), (20, 10), (92, 46)])
 def test_drawings_fit_any_room(columns, rows):
-    for drawn in (draw_large_direction(DIAGONAL, 2, columns, rows), large_number(2, columns, rows)):
+    for drawn in (draw_large_direction(DIAGONAL, 2, columns, rows), draw_large_digit(2, columns, rows)):
         assert len(drawn) == rows and all(len(line) == columns for line in drawn)
 
 
 def test_large_numbers_are_two_different_ones():
-    assert large_number(1, 30, 15) != large_number(2, 30, 15)
-    assert dots(large_number(1, 30, 15)) and dots(large_number(2, 30, 15))
+    assert draw_large_digit(1, 30, 15) != draw_large_digit(2, 30, 15)
+    assert dots(draw_large_digit(1, 30, 15)) and dots(draw_large_digit(2, 30, 15))

@@ -2,7 +2,7 @@
 
 The variable is that of the largest correlation ratio (variance of bin means over variance). Where none reaches
 `_MAIN_CORRELATION_RATIO`, the missing force is drawn against the law's own value, so that a correct law is a straight
-line.
+line. Called by `signature_curves`.
 """
 
 from collections.abc import Mapping
@@ -31,11 +31,12 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 _EXTRAPOLATED_SHARE = 0.25
-"""Share of the visited range by which a formula is drawn beyond it, on either side."""
+"""Share of the visited range by which a formula is drawn beyond it, on either side. Chosen by hand."""
 _MAIN_CORRELATION_RATIO = 0.5
-"""Correlation ratio of a law's force with one variable from which the curve is drawn against it alone. By hand."""
+"""Correlation ratio of a law's force with one variable from which the curve is drawn against it alone.
+Chosen by hand."""
 _LINE_POINTS = 400
-"""Number of points of a drawn law."""
+"""Number of points of a drawn law. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +53,8 @@ def compute_law_signature(
     evidence: Evidence, placed_effect: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
 ) -> Signature | None:
     """Compute the curve of a discovered law along the measured motion; for a law of the command, of its change of the
-    command. None where it acts on a response, or depends on a signal other than time, motions and commands. axes:
-    names."""
+    command. None where it is no discovered law, acts on a response, or depends on a signal other than time, motions and
+    commands. axes: names."""
     if placed_effect.effect.law is None or placed_effect.effect.law.acts_on == "response":
         return None
     law = with_law_values(placed_effect.effect.law, placed_effect.values)
@@ -65,20 +66,20 @@ def compute_law_signature(
         return None
     rate_hz, axis = evidence.sample_rate_hz, placed_effect.sites[0]
     force = evaluate(law, {name: variables[name].values for name in law.variables}, rate_hz)
-    used = (evidence.used > 0) & np.isfinite(force)
+    is_used = (evidence.used > 0) & np.isfinite(force)
     correlation_ratios = {
-        name: compute_correlation_ratio(variables[name].values[used], force[used]) for name in law.variables
+        name: compute_correlation_ratio(variables[name].values[is_used], force[is_used]) for name in law.variables
     }
     variable = variables[max(correlation_ratios, key=lambda name: correlation_ratios[name])]
     abscissa, visited_range = variable.name, None
     if max(correlation_ratios.values()) < _MAIN_CORRELATION_RATIO:  # only the variables together explain most of it
         variable = _Variable(f"force of the law ({system.force})", force)
-        abscissa, law_abscissa, law_force = variable.name, *_make_identity_line(force[used])
+        abscissa, law_abscissa, law_force = variable.name, *_make_identity_line(force[is_used])
     elif len(law.variables) == 1 and not has_memory(law):
-        law_abscissa, law_force, visited_range = _evaluate_extrapolated(law, variable.values[used], rate_hz)
+        law_abscissa, law_force, visited_range = _evaluate_extrapolated(law, variable.values[is_used], rate_hz)
     else:
-        law_abscissa, law_force = compute_law_bin_means(variable.values[used], force[used])
-    bin_centres, mean, spread = compute_bin_means(variable.values, evidence.axis_force[:, axis], used, rate_hz)
+        law_abscissa, law_force = compute_law_bin_means(variable.values[is_used], force[is_used])
+    bin_centres, mean, spread = compute_bin_means(variable.values, evidence.axis_force[:, axis], is_used, rate_hz)
     return Signature(
         placed_effect.effect.name,
         axes[axis],
@@ -119,8 +120,8 @@ def _evaluate_extrapolated(
     margin = _EXTRAPOLATED_SHARE * (high - low)
     abscissa = np.linspace(low - margin, high + margin, _LINE_POINTS)
     law_force = evaluate(law, {law.variables[0]: abscissa}, rate_hz)
-    is_known = np.isfinite(law_force)
-    return abscissa[is_known], law_force[is_known], (low, high)
+    is_finite = np.isfinite(law_force)
+    return abscissa[is_finite], law_force[is_finite], (low, high)
 
 
 def _make_identity_line(values: FloatArray) -> tuple[FloatArray, FloatArray]:

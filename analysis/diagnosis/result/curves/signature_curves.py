@@ -29,6 +29,7 @@ from equalizer.signals.spectral_density import estimate_spectral_density
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Abscissa = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
+"""Variable of a curve; "growth": running rms over time, for an error that grows."""
 
 ABSCISSA: Mapping[str, Abscissa] = {
     "coulomb_friction": "velocity",
@@ -60,14 +61,15 @@ ABSCISSA: Mapping[str, Abscissa] = {
 }
 """Variable of each effect's curve; an effect that is not listed is shown as a spectrum ("frequency")."""
 _FREQUENCY_LINES = 1024
-"""Number of spectral lines before they are averaged in twelfths of an octave."""
+"""Number of spectral lines before they are averaged in twelfths of an octave. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class CurveNames:
     """Names and units on the axes of a curve."""
 
     axes: tuple[str, ...]
+    """Names of the driven axes."""
     channels: tuple[str, ...]
     """Names of the response's channels."""
     unit: str
@@ -76,13 +78,13 @@ class Names:
 
 
 def compute_signature(
-    evidence: Evidence, complete: FloatArray, placed_effect: PlacedEffect, names: Names, hold: Hold
+    evidence: Evidence, complete_prediction: FloatArray, placed_effect: PlacedEffect, names: CurveNames, hold: Hold
 ) -> Signature:
-    """Compute the curve of one effect. evidence: of the final model with all its effects except this one. complete: (n,
-    p), prediction of the final model with all its effects."""
-    law = compute_law_signature(evidence, placed_effect, names.axes, names.system)
-    if law is not None:
-        return law
+    """Compute the curve of one effect. evidence: of the final model with all its effects except this one.
+    complete_prediction: (n, p), prediction of the final model with all its effects."""
+    law_signature = compute_law_signature(evidence, placed_effect, names.axes, names.system)
+    if law_signature is not None:
+        return law_signature
     action, abscissa = placed_effect.effect.action, ABSCISSA.get(placed_effect.effect.name, "frequency")
     if abscissa in ("velocity", "position", "acceleration") and not isinstance(action, (OnCommand, OnResponse)):
         return _compute_motion_signature(evidence, placed_effect, abscissa, names, hold)
@@ -95,11 +97,11 @@ def compute_signature(
         if abscissa == "reading":
             return _compute_reading_signature(evidence, placed_effect, changed_signal - evidence.predicted, names)
         return _compute_time_signature(evidence, placed_effect, changed_signal - evidence.predicted, names, abscissa)
-    return _compute_frequency_signature(evidence, complete - evidence.predicted, placed_effect, names)
+    return _compute_frequency_signature(evidence, complete_prediction - evidence.predicted, placed_effect, names)
 
 
 def _compute_motion_signature(
-    evidence: Evidence, placed_effect: PlacedEffect, abscissa: Abscissa, names: Names, hold: Hold
+    evidence: Evidence, placed_effect: PlacedEffect, abscissa: Abscissa, names: CurveNames, hold: Hold
 ) -> Signature:
     """Compute the curve of the missing force over the motion, on the effect's axis with the largest missing force."""
     axis = _find_strongest_site(placed_effect.sites, evidence.axis_force)
@@ -107,97 +109,105 @@ def _compute_motion_signature(
     force = simulated.axis_force
     if isinstance(placed_effect.effect.action, Structure):
         force = _compute_equivalent_force(evidence, simulated, hold)
-    used, unit = evidence.used > 0, names.system.length
+    is_used, unit = evidence.used > 0, names.system.length
     unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[abscissa]
-    visited, simulated_abscissa = (
+    measured_abscissa, simulated_abscissa = (
         _compute_abscissa(position[:, axis], velocity[:, axis], abscissa, evidence.sample_rate_hz)
         for position, velocity in (
             (evidence.axis_position, evidence.axis_velocity),
             (simulated.axis_position, simulated.axis_velocity),
         )
     )
-    bin_centres, mean, spread = compute_bin_means(visited, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_abscissa, law = compute_law_bin_means(simulated_abscissa[used], force[used, axis])
+    bin_centres, mean, spread = compute_bin_means(
+        measured_abscissa, evidence.axis_force[:, axis], is_used, evidence.sample_rate_hz
+    )
+    law_abscissa, law_force = compute_law_bin_means(simulated_abscissa[is_used], force[is_used, axis])
     return Signature(
         placed_effect.effect.name, names.axes[axis], f"{abscissa} of {names.axes[axis]} ({unit})",
-        f"missing force ({names.system.force})", bin_centres, mean, spread, law_abscissa, law,
+        f"missing force ({names.system.force})", bin_centres, mean, spread, law_abscissa, law_force,
     )  # fmt: skip
 
 
 def _compute_abscissa(position: FloatArray, velocity: FloatArray, abscissa: Abscissa, rate_hz: float) -> FloatArray:
-    """(n,): position, velocity or acceleration of an axis."""
+    """Compute (n,): position, velocity or acceleration of an axis."""
     if abscissa == "acceleration":
         return np.asarray(np.gradient(velocity) * rate_hz)
     return velocity if abscissa == "velocity" else position
 
 
 def _compute_equivalent_force(evidence: Evidence, with_effect: SimulationResult, hold: Hold) -> FloatArray:
-    """(n, m), N: the force on the model without the effect that would cause the same responses, by deconvolution."""
+    """Compute (n, m), N (N m): the force on the model without the effect that would cause the same responses, by
+    deconvolution."""
     without_effect = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
     response_changes, noise_levels = [with_effect.response - without_effect.response], [evidence.noise]
     if evidence.position_noise is not None:
         response_changes.append(with_effect.position - without_effect.position)
         noise_levels.append(evidence.position_noise)
-    expected = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
+    # The least rms keeps the prior of the deconvolution positive for an axis without command.
+    expected_force = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
     noise = np.concatenate(noise_levels)
     return estimate_missing_force(
-        evidence.model, np.hstack(response_changes) / noise, noise, evidence.sample_rate_hz, expected
+        evidence.model, np.hstack(response_changes) / noise, noise, evidence.sample_rate_hz, expected_force
     ).force
 
 
-def _compute_command_signature(evidence: Evidence, placed_effect: PlacedEffect, names: Names) -> Signature:
+def _compute_command_signature(evidence: Evidence, placed_effect: PlacedEffect, names: CurveNames) -> Signature:
     """Compute the curve of the missing force over the command of its axis; the law is the change of the command."""
     assert isinstance(placed_effect.effect.action, OnCommand)
     axis = _find_strongest_site(placed_effect.sites, evidence.axis_force)
-    command, used = evidence.command[:, axis], evidence.used > 0
+    command, is_used = evidence.command[:, axis], evidence.used > 0
     changed_command = placed_effect.effect.action.change(command, 1 / evidence.sample_rate_hz, placed_effect.values)
-    bin_centres, mean, spread = compute_bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_abscissa, law = compute_law_bin_means(command[used], (changed_command - command)[used])
+    bin_centres, mean, spread = compute_bin_means(
+        command, evidence.axis_force[:, axis], is_used, evidence.sample_rate_hz
+    )
+    law_abscissa, law_values = compute_law_bin_means(command[is_used], (changed_command - command)[is_used])
     unit = names.system.force
     return Signature(
         placed_effect.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})",
-        f"missing force ({unit})", bin_centres, mean, spread, law_abscissa, law,
+        f"missing force ({unit})", bin_centres, mean, spread, law_abscissa, law_values,
     )  # fmt: skip
 
 
 def _compute_reading_signature(
-    evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: Names
+    evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: CurveNames
 ) -> Signature:
     """Compute the curve of a channel's error over the predicted reading that explains most of it. change: (n, p), by
     the effect."""
-    used = evidence.used > 0
-    predictions = evidence.predicted[used]
+    is_used = evidence.used > 0
+    predictions = evidence.predicted[is_used]
     # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
     # other.
-    projections = np.abs(change[used].T @ predictions) / np.maximum(np.sqrt(np.sum(predictions**2, axis=0)), 1e-300)
+    projections = np.abs(change[is_used].T @ predictions) / np.maximum(np.sqrt(np.sum(predictions**2, axis=0)), 1e-300)
     channel, predictor = np.unravel_index(int(np.argmax(projections)), projections.shape)
     errors = (evidence.response - evidence.predicted)[:, channel]
     bin_centres, mean, spread = compute_bin_means(
-        evidence.predicted[:, predictor], errors, used, evidence.sample_rate_hz
+        evidence.predicted[:, predictor], errors, is_used, evidence.sample_rate_hz
     )
-    law_abscissa, law = compute_law_bin_means(predictions[:, predictor], change[used, channel])
+    law_abscissa, law_values = compute_law_bin_means(predictions[:, predictor], change[is_used, channel])
     return Signature(
         placed_effect.effect.name, names.channels[channel], f"predicted {names.channels[predictor]} ({names.unit})",
-        f"error of {names.channels[channel]} ({names.unit})", bin_centres, mean, spread, law_abscissa, law,
+        f"error of {names.channels[channel]} ({names.unit})", bin_centres, mean, spread, law_abscissa, law_values,
     )  # fmt: skip
 
 
 def _compute_time_signature(
-    evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: Names, abscissa: Abscissa
+    evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: CurveNames, abscissa: Abscissa
 ) -> Signature:
     """Compute the curve over time of the error of the channel with the largest change; its running rms where it grows
     with time ("growth")."""
-    used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
-    channel = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
+    is_used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
+    channel = int(np.argmax(np.sqrt(np.mean(change[is_used] ** 2, axis=0)) / evidence.noise))
     errors, seconds = (evidence.response - evidence.predicted)[:, channel], np.arange(len(change)) / rate_hz
     ordinate = f"error of {names.channels[channel]} ({names.unit})"
     if abscissa == "growth":
-        bin_centres, mean, spread = compute_running_rms(seconds, errors, used)
-        law_abscissa, law, _ = compute_running_rms(seconds, np.hypot(change[:, channel], evidence.noise[channel]), used)
+        bin_centres, mean, spread = compute_running_rms(seconds, errors, is_used)
+        law_abscissa, law_values, _ = compute_running_rms(
+            seconds, np.hypot(change[:, channel], evidence.noise[channel]), is_used
+        )
         ordinate = f"rms {ordinate}"
     else:
-        bin_centres, mean, spread = compute_bin_means(seconds, errors, used, rate_hz)
-        law_abscissa, law = compute_law_bin_means(seconds[used], change[used, channel])
+        bin_centres, mean, spread = compute_bin_means(seconds, errors, is_used, rate_hz)
+        law_abscissa, law_values = compute_law_bin_means(seconds[is_used], change[is_used, channel])
     return Signature(
         placed_effect.effect.name,
         names.channels[channel],
@@ -207,30 +217,31 @@ def _compute_time_signature(
         mean,
         spread,
         law_abscissa,
-        law,
+        law_values,
     )
 
 
 def _compute_frequency_signature(
-    evidence: Evidence, change: FloatArray, placed_effect: PlacedEffect, names: Names
+    evidence: Evidence, change: FloatArray, placed_effect: PlacedEffect, names: CurveNames
 ) -> Signature:
     """Compute the spectrum of the error of the channel with the largest change, and that of the change by the effect.
     change: (n, p)."""
-    rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
+    rate_hz, is_used = evidence.sample_rate_hz, evidence.used > 0
     errors = evidence.response - evidence.predicted
-    channel = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
-    frequency_hz, measured, spread = _compute_spectrum(errors[used, channel], rate_hz)
-    _, law, _ = _compute_spectrum(change[used, channel], rate_hz)
+    channel = int(np.argmax(np.sqrt(np.mean(change[is_used] ** 2, axis=0)) / evidence.noise))
+    frequency_hz, measured, spread = _compute_spectrum(errors[is_used, channel], rate_hz)
+    _, law_values, _ = _compute_spectrum(change[is_used, channel], rate_hz)
     return Signature(
         placed_effect.effect.name, names.channels[channel], "frequency (Hz)",
         f"error of {names.channels[channel]}, amplitude density ({names.unit}/√Hz)",
-        frequency_hz, measured, spread, frequency_hz, law,
+        frequency_hz, measured, spread, frequency_hz, law_values,
     )  # fmt: skip
 
 
 def _compute_spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Compute frequency (Hz), amplitude density (unit/√Hz) in twelfths of an octave, and its standard error.
-    Half-overlapping Hann windows count as 1.5 independent ones per window length."""
+    Half-overlapping Hann windows count as 1.5 independent ones per window length; the relative error of an amplitude is
+    half that of its power."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
     lines_hz, power = estimate_spectral_density(signal, rate_hz, length)
     window_count = max(1.0, 1.5 * len(signal) / length)

@@ -63,7 +63,7 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
         diagnose_and_count(
             folder,
             names,
-            options.answering,
+            options.diagnosis_workers,
             partial(on_progress, "diagnosing"),
             keep=options.keep,
             diagnosable=diagnosable,

@@ -94,7 +94,7 @@ def _collect_arrays(motions: Sequence[FreshTestMotion]) -> dict[str, Any]:
     for number, motion in enumerate(motions):
         motion_arrays = (motion.motion.position, motion.motion.velocity, motion.motion.acceleration)
         for name, values in zip(
-            _ARRAY_NAMES, (*motion_arrays, motion.command, motion.reading, motion.lawful), strict=True
+            _ARRAY_NAMES, (*motion_arrays, motion.command, motion.reading, motion.law_force), strict=True
         ):
             arrays[f"{name}_{number}"] = values
     return arrays

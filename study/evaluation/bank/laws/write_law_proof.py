@@ -1,4 +1,4 @@
-"""Writes the result of a blind test of laws (`prove_laws`): devices with concealed laws outside the effect catalogue.
+"""Write the result of a blind test of laws (`prove_laws`): devices with concealed laws outside the effect catalogue.
 
 `write_law_proof` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
 `write_law_table` writes figures and misses as small CSV tables that can be kept under version control.
@@ -25,7 +25,7 @@ from study.store.disk.text_file import write_text
 
 FORMAT, VERSION = "hapteq-proof", 1
 """Name and version of the format of `proof.json`."""
-DOCUMENT, TABLE = "proof.json", "proof.csv"
+DOCUMENT_FILE, TABLE_FILE = "proof.json", "proof.csv"
 """Names of the files in the folder of the test."""
 
 
@@ -34,7 +34,9 @@ class LawRow:
     """A case of the test as a row of proof.csv and of the table of misses; the fields are the columns, in order."""
 
     number: int
+    """Number of the case in the bank, from 0."""
     seed: int
+    """Seed of its device."""
     kind: str
     """law, nothing, decoy (an effect of the catalogue) or mode (a linear mode)."""
     concealed: str
@@ -46,6 +48,7 @@ class LawRow:
     shows: bool
     """Whether the concealed law or effect is detectable."""
     verdict: str
+    """Verdict of the diagnosis."""
     named: str
     """Laws that the diagnosis names."""
     names: str
@@ -57,41 +60,43 @@ class LawRow:
     error: float | None
     """Relative error of the law in the answer, in the visited range; None (here and below): unknown or infinite."""
     louder: float | None
-    """The same at a higher level than recorded."""
+    """Relative error of the law at a higher level than recorded."""
     retuned: float | None
     """Rms error of the re-tuned model over the noise's rms, in the worst channel."""
     after: float | None
-    """The same ratio for the model with the named effects."""
+    """Rms error of the model with the named effects over the noise's rms, in the worst channel."""
     seconds: float | None
     """Processor time of the diagnosis (s)."""
     miss: bool
+    """Whether the answer is wrong (`LawOutcome.missed`)."""
 
 
 def write_law_proof(result: LawBlindTest) -> None:
-    """Write `proof.json` and `proof.csv` into the folder of the test, replacing earlier ones. Raises StudyError."""
+    """Write `proof.json` and `proof.csv` into the folder of the test, replacing earlier ones. Raises StudyError where
+    one cannot be written."""
     document = {
-        **_collect_facts(result),
+        **_collect_shared_fields(result),
         "commit": read_current_commit(),
         "command": " ".join(anonymise_arguments(sys.argv)),
     }
-    write_json(result.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
+    write_json(result.folder.path / DOCUMENT_FILE, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
     rows = [_make_row(outcome) for outcome in result.outcomes]
-    write_text(result.folder.path / TABLE, format_csv_table(rows, LawRow), overwrite=True)
+    write_text(result.folder.path / TABLE_FILE, format_csv_table(rows, LawRow), overwrite=True)
 
 
 def write_law_table(path: Path, result: LawBlindTest) -> None:
     """Write the figures as a CSV table at `path`, and the misses as a second one, whose name ends in -misses. Raises
-    StudyError."""
+    StudyError where one cannot be written."""
     figures = [
         FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
     ]
-    lines = [
+    header_lines = [
         f"# {len(result.outcomes)} cases of laws, seeds {result.plan.seed} to "
         f"{result.plan.seed + result.plan.cases - 1}",
         f"# commit {read_current_commit()}, code of the diagnosis {' '.join(result.engines)}",
         f"# seal of the labels {result.seal}",
     ]
-    write_text(path, "\n".join(lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
+    write_text(path, "\n".join(header_lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
     misses = [_make_row(miss) for miss in result.score.misses]
     write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), format_csv_table(misses, LawRow), overwrite=True)
 
@@ -116,11 +121,11 @@ def format_law_lines(result: LawBlindTest) -> Iterator[str]:
 
 def format_law_summary(result: LawBlindTest) -> str:
     """Format the result as JSON text."""
-    return json.dumps({"folder": str(result.folder.path), **_collect_facts(result)}, indent=2)
+    return json.dumps({"folder": str(result.folder.path), **_collect_shared_fields(result)}, indent=2)
 
 
-def _collect_facts(result: LawBlindTest) -> dict[str, Any]:
-    """Values that the document and the summary share."""
+def _collect_shared_fields(result: LawBlindTest) -> dict[str, Any]:
+    """Collect the fields that `proof.json` and the summary share."""
     return {
         "of": "laws",
         "seed": result.plan.seed,
@@ -134,37 +139,37 @@ def _collect_facts(result: LawBlindTest) -> dict[str, Any]:
 
 
 def _format_answer(outcome: LawOutcome) -> str:
-    """The answer in words: verdict, effects, laws or candidates, and the error of the law in percent."""
+    """Format the answer as text: verdict, effects, laws or candidates, and the error of the law in percent."""
     laws = " and ".join(_format_law(law) for law in outcome.laws)
-    prefix = "" if outcome.named or not outcome.candidates else "candidate "
-    names = ", ".join(outcome.names)
+    candidate_prefix = "" if outcome.named or not outcome.candidates else "candidate "
+    effect_names = ", ".join(outcome.names)
     error_text = f", {100 * outcome.errors[0]:.3g} % off" if outcome.errors else ""
     return (
-        f"{outcome.verdict}: {names}{' and ' if names and laws else ''}{prefix}"
-        f"{laws or ('' if names else 'no law')}{error_text}"
+        f"{outcome.verdict}: {effect_names}{' and ' if effect_names and laws else ''}{candidate_prefix}"
+        f"{laws or ('' if effect_names else 'no law')}{error_text}"
     )
 
 
 def _format_law(law: Law) -> str:
-    """The law as place, axis and formula."""
+    """Format a law as place, axis and formula."""
     return f"{law.acts_on} {law.axis} = {law.text}"
 
 
 def _make_row(outcome: LawOutcome) -> LawRow:
-    """The outcome of a case as a row; lists are joined to text."""
-    numbers = {} if outcome.truth is None else outcome.truth.numbers
-    error, louder_error = outcome.errors or (None, None)
+    """Convert the outcome of a case to a row; lists are joined to text."""
+    parameters = {} if outcome.truth is None else outcome.truth.numbers
+    law_error, louder_error = outcome.errors or (None, None)
     return LawRow(
         outcome.number, outcome.seed, outcome.kind, outcome.concealed,
         " ".join(outcome.axes if outcome.truth is None else outcome.truth.axes),
-        " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), outcome.detectable, outcome.verdict,
+        " ".join(f"{name}={value:.4g}" for name, value in parameters.items()), outcome.detectable, outcome.verdict,
         " and ".join(map(_format_law, outcome.named)), " ".join(outcome.names),
-        " and ".join(map(_format_law, outcome.candidates)), outcome.structured, _round(error), _round(louder_error),
+        " and ".join(map(_format_law, outcome.candidates)), outcome.structured, _round(law_error), _round(louder_error),
         _round(outcome.compute_worst_error("retuned")), _round(outcome.compute_worst_error("after")),
         _round(outcome.seconds), outcome.missed,
     )  # fmt: skip
 
 
 def _round(value: float | None) -> float | None:
-    """The value with four decimals; None for NaN and infinity."""
+    """Round to four decimals; None for None, NaN and +infinity."""
     return None if value is None or value != value or value == float("inf") else round(value, 4)

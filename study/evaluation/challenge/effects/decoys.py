@@ -63,10 +63,10 @@ def _draw_stiffness_switching(context: EffectContext) -> dict[str, float]:
 
 def _build_stiffness_switching(device: Device, axis: int, values: Values) -> Device:
     """Add a square wave to the ground stiffness of the axis, `depth` times its stiffness."""
-    modulation = device.varying.copy()
+    modulation = device.modulation.copy()
     stiffness_n_per_m = values["depth"] * device.bench.stiffness[axis, axis]
     modulation[axis] = (values["rate_hz"], 0.0, stiffness_n_per_m, 0.0, 1.0)
-    return replace(device, varying=modulation)
+    return replace(device, modulation=modulation)
 
 
 def _draw_sensor_distortion(context: EffectContext) -> dict[str, float]:

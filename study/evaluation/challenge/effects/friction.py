@@ -8,6 +8,7 @@
 
 All are a bristle with elastic presliding (Dahl; `friction_kernel`). Where the law has no presliding, the bristle has
 3e6 N/m and slides within 0.1 um. The ranges of the levels go from 0.003 or 0.01 N (strength 0) to 0.2 or 0.25 N (1).
+All ranges were chosen by hand. `EFFECTS` is part of the table from which `draw_case` chooses.
 """
 
 from dataclasses import replace
@@ -24,76 +25,102 @@ from study.evaluation.challenge.friction_kernel import (
     STRIBECK_SPEED,
 )
 
-STIFF_N_PER_M = 3e6
-"""Stiffness of the bristle where the effect has none of its own: far stiffer than any part of a bench."""
+RIGID_BRISTLE_N_PER_M = 3e6
+"""Stiffness of the bristle of an effect without presliding (N/m). Chosen: far stiffer than any part of a bench."""
 
 
 def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
-    """The device with these columns of friction on an axis; `STIFF_N_PER_M` where `cells` has no stiffness."""
-    return replace(device, friction=with_cells(device.friction, axis, {BRISTLE_STIFFNESS: STIFF_N_PER_M} | cells))
+    """Set these columns of the friction on an axis; returns a new device. `RIGID_BRISTLE_N_PER_M` where `cells` has no
+    stiffness."""
+    return replace(
+        device, friction=with_cells(device.friction, axis, {BRISTLE_STIFFNESS: RIGID_BRISTLE_N_PER_M} | cells)
+    )
 
 
-def _draw_coulomb(context: EffectContext) -> dict[str, float]:
+def _draw_coulomb_friction(context: EffectContext) -> dict[str, float]:
+    """Draw the level (N)."""
     return {"level": context.interpolate_log(0.003, 0.25)}
 
 
-def _build_coulomb(device: Device, axis: int, values: Values) -> Device:
+def _build_coulomb_friction(device: Device, axis: int, values: Values) -> Device:
+    """Build in the same level for both directions."""
     return _with_bristle(device, axis, {LEVEL_POSITIVE: values["level"], LEVEL_NEGATIVE: values["level"]})
 
 
-def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
-    mean, asymmetry = context.interpolate_log(0.01, 0.25), context.draw_sign() * context.random.uniform(0.2, 0.6)
-    return {"level_positive": mean * (1 + asymmetry), "level_negative": mean * (1 - asymmetry)}
+def _draw_asymmetric_friction(context: EffectContext) -> dict[str, float]:
+    """Draw the levels (N) of the two directions, which differ from their mean by 20 to 60 %."""
+    mean_level_n, asymmetry = (
+        context.interpolate_log(0.01, 0.25),
+        context.draw_sign() * context.random.uniform(0.2, 0.6),
+    )
+    return {"level_positive": mean_level_n * (1 + asymmetry), "level_negative": mean_level_n * (1 - asymmetry)}
 
 
-def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
+def _build_asymmetric_friction(device: Device, axis: int, values: Values) -> Device:
+    """Build in a level for each direction."""
     return _with_bristle(
         device, axis, {LEVEL_POSITIVE: values["level_positive"], LEVEL_NEGATIVE: values["level_negative"]}
     )
 
 
-def _draw_stribeck(context: EffectContext) -> dict[str, float]:
-    coulomb = context.interpolate_log(0.01, 0.2)
+def _draw_stribeck_friction(context: EffectContext) -> dict[str, float]:
+    """Draw the Coulomb level (N), the static level, 1.3 to 2.2 times that, and the Stribeck speed (m/s)."""
+    coulomb_level_n = context.interpolate_log(0.01, 0.2)
     return {
-        "coulomb": coulomb,
-        "static": coulomb * context.random.uniform(1.3, 2.2),
+        "coulomb": coulomb_level_n,
+        "static": coulomb_level_n * context.random.uniform(1.3, 2.2),
         "speed": context.draw_log_uniform(0.003, 0.02),
     }
 
 
-def _build_stribeck(device: Device, axis: int, values: Values) -> Device:
-    level = values["coulomb"]
-    ratio = values["static"] / level if level > 0.0 else 1.0
+def _build_stribeck_friction(device: Device, axis: int, values: Values) -> Device:
+    """Build in the Stribeck friction; the ratio of the levels is 1 where the Coulomb level is 0."""
+    coulomb_level_n = values["coulomb"]
+    static_ratio = values["static"] / coulomb_level_n if coulomb_level_n > 0.0 else 1.0
     return _with_bristle(
         device,
         axis,
-        {LEVEL_POSITIVE: level, LEVEL_NEGATIVE: level, STATIC_RATIO: ratio, STRIBECK_SPEED: values["speed"]},
+        {
+            LEVEL_POSITIVE: coulomb_level_n,
+            LEVEL_NEGATIVE: coulomb_level_n,
+            STATIC_RATIO: static_ratio,
+            STRIBECK_SPEED: values["speed"],
+        },
     )
 
 
 def _draw_presliding(context: EffectContext) -> dict[str, float]:
-    level = context.interpolate_log(0.01, 0.25)
-    return {"level": level, "stiffness": level / context.draw_log_uniform(5e-5, 5e-4)}
+    """Draw the level (N) and the stiffness (N/m), which reaches the level after 0.05 to 0.5 mm."""
+    level_n = context.interpolate_log(0.01, 0.25)
+    return {"level": level_n, "stiffness": level_n / context.draw_log_uniform(5e-5, 5e-4)}
 
 
 def _build_presliding(device: Device, axis: int, values: Values) -> Device:
-    level = values["level"]
+    """Build in a level with a soft bristle."""
+    level_n = values["level"]
     return _with_bristle(
-        device, axis, {LEVEL_POSITIVE: level, LEVEL_NEGATIVE: level, BRISTLE_STIFFNESS: values["stiffness"]}
+        device, axis, {LEVEL_POSITIVE: level_n, LEVEL_NEGATIVE: level_n, BRISTLE_STIFFNESS: values["stiffness"]}
     )
 
 
 def _draw_position_dependent(context: EffectContext) -> dict[str, float]:
-    slope = context.draw_sign() * context.random.uniform(0.3, 0.7) / context.travel_m[context.axis]
-    bend = context.random.uniform(-0.25, 0.6) / context.travel_m[context.axis] ** 2
-    return {"level": context.interpolate_log(0.01, 0.25), "slope_per_m": float(slope), "bend_per_m2": float(bend)}
+    """Draw the level (N) at the centre, and its changes at the end of the travel: linear +-30 to 70 %, square -25 to
+    60 %."""
+    slope_per_m = context.draw_sign() * context.random.uniform(0.3, 0.7) / context.travel_m[context.axis]
+    bend_per_m2 = context.random.uniform(-0.25, 0.6) / context.travel_m[context.axis] ** 2
+    return {
+        "level": context.interpolate_log(0.01, 0.25),
+        "slope_per_m": float(slope_per_m),
+        "bend_per_m2": float(bend_per_m2),
+    }
 
 
 def _build_position_dependent(device: Device, axis: int, values: Values) -> Device:
-    level = values["level"]
+    """Build in the level with its slope and bend."""
+    level_n = values["level"]
     cells = {
-        LEVEL_POSITIVE: level,
-        LEVEL_NEGATIVE: level,
+        LEVEL_POSITIVE: level_n,
+        LEVEL_NEGATIVE: level_n,
         LEVEL_SLOPE: values["slope_per_m"],
         LEVEL_CURVATURE: values["bend_per_m2"],
     }
@@ -101,12 +128,12 @@ def _build_position_dependent(device: Device, axis: int, values: Values) -> Devi
 
 
 EFFECTS = (
-    ConcealedEffect("coulomb_friction", "mechanism", True, _draw_coulomb, _build_coulomb),
-    ConcealedEffect("asymmetric_friction", "mechanism", True, _draw_asymmetric, _build_asymmetric),
-    ConcealedEffect("stribeck_friction", "mechanism", True, _draw_stribeck, _build_stribeck),
+    ConcealedEffect("coulomb_friction", "mechanism", True, _draw_coulomb_friction, _build_coulomb_friction),
+    ConcealedEffect("asymmetric_friction", "mechanism", True, _draw_asymmetric_friction, _build_asymmetric_friction),
+    ConcealedEffect("stribeck_friction", "mechanism", True, _draw_stribeck_friction, _build_stribeck_friction),
     ConcealedEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
     ConcealedEffect(
         "position_dependent_friction", "mechanism", True, _draw_position_dependent, _build_position_dependent
     ),
 )
-"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""
+"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

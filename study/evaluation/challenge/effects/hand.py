@@ -13,7 +13,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, PHASE, RATE, STIFFNESS_DEPTH
+from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, MODULATION_HZ, PHASE, STIFFNESS_DEPTH
 
 
 def _draw_hand(context: EffectContext) -> dict[str, float]:
@@ -53,11 +53,11 @@ def _draw_grip(context: EffectContext) -> dict[str, float]:
 
 
 def _build_grip(device: Device, axis: int, values: Values) -> Device:
-    varying = np.zeros((3, 5))
-    varying[:, RATE], varying[:, PHASE] = values["rate_hz"], values["phase"]
-    varying[:, DAMPING_DEPTH] = values["depth"] * np.diag(device.bench.damping)
-    varying[:, STIFFNESS_DEPTH] = values["stiffness_share"] * values["depth"] * np.diag(device.bench.stiffness)
-    return replace(device, varying=varying)
+    modulation = np.zeros((3, 5))
+    modulation[:, MODULATION_HZ], modulation[:, PHASE] = values["rate_hz"], values["phase"]
+    modulation[:, DAMPING_DEPTH] = values["depth"] * np.diag(device.bench.damping)
+    modulation[:, STIFFNESS_DEPTH] = values["stiffness_share"] * values["depth"] * np.diag(device.bench.stiffness)
+    return replace(device, modulation=modulation)
 
 
 EFFECTS = (

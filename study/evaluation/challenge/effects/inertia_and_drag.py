@@ -10,7 +10,8 @@
   in contact a stiff spring (N/m) with little damping (N s/m) couples them.
 
 Ranges were set by hand for a device of the size of the omega.3. Strengths 0 and 1 are the ends of the main parameter's
-range (`EffectContext.log_between`); other parameters are drawn independently of the strength.
+range (`EffectContext.interpolate_log`); other parameters are drawn independently of the strength. `EFFECTS` is part of
+the table from which `draw_case` chooses.
 """
 
 from dataclasses import replace
@@ -23,39 +24,46 @@ from study.evaluation.challenge.handle_force_kernel import QUADRATIC_DAMPING
 
 
 def _add_to_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
-    """The device with a mass (kg) and a viscous damping (N s/m) added to one axis of the handle."""
+    """Add a mass (kg) and a viscous damping (N s/m) to one axis of the handle; returns a new device."""
     mass, damping_matrix = device.bench.mass.copy(), device.bench.damping.copy()
     mass[axis, axis] += mass_kg
     damping_matrix[axis, axis] += damping
     return replace(device, bench=replace(device.bench, mass=mass, damping=damping_matrix))
 
 
-def _draw_viscous(context: EffectContext) -> dict[str, float]:
+def _draw_viscous_damping(context: EffectContext) -> dict[str, float]:
+    """Draw the damping (N s/m)."""
     return {"damping": context.interpolate_log(0.2, 6.0)}
 
 
-def _build_viscous(device: Device, axis: int, values: Values) -> Device:
+def _build_viscous_damping(device: Device, axis: int, values: Values) -> Device:
+    """Add the damping to one axis."""
     return _add_to_handle(device, axis, 0.0, values["damping"])
 
 
-def _draw_added(context: EffectContext) -> dict[str, float]:
+def _draw_added_mass(context: EffectContext) -> dict[str, float]:
+    """Draw the mass (kg)."""
     return {"mass": context.interpolate_log(0.003, 0.08)}
 
 
-def _build_added(device: Device, axis: int, values: Values) -> Device:
+def _build_added_mass(device: Device, axis: int, values: Values) -> Device:
+    """Add the mass to one axis."""
     return _add_to_handle(device, axis, values["mass"], 0.0)
 
 
-def _draw_quadratic(context: EffectContext) -> dict[str, float]:
+def _draw_quadratic_damping(context: EffectContext) -> dict[str, float]:
+    """Draw the coefficient c (N s²/m²)."""
     return {"coefficient": context.interpolate_log(1.0, 60.0)}
 
 
-def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
+def _build_quadratic_damping(device: Device, axis: int, values: Values) -> Device:
+    """Set the quadratic damping of one axis."""
     return with_forces(device, axis, {QUADRATIC_DAMPING: values["coefficient"]})
 
 
-def _draw_pose(context: EffectContext) -> dict[str, float]:
-    """per_m (1/m): the mass changes by 1 to 50 % over the largest distance from the centre."""
+def _draw_pose_dependent_inertia(context: EffectContext) -> dict[str, float]:
+    """Draw per_m (1/m), by which the mass changes by 1 to 50 % over the largest distance from the centre, and
+    whole_handle (1: whole handle, 0: this axis only)."""
     whole_handle = float(context.random.integers(2))
     return {
         "per_m": context.draw_sign() * context.interpolate_log(0.01, 0.5) / context.travel_m[context.axis],
@@ -63,7 +71,8 @@ def _draw_pose(context: EffectContext) -> dict[str, float]:
     }
 
 
-def _build_pose(device: Device, axis: int, values: Values) -> Device:
+def _build_pose_dependent_inertia(device: Device, axis: int, values: Values) -> Device:
+    """Add the change of the inertia of the whole handle, or of the mass of one axis."""
     change_per_m = np.zeros(3)
     change_per_m[axis] = values["per_m"]
     if values["whole_handle"]:
@@ -71,9 +80,9 @@ def _build_pose(device: Device, axis: int, values: Values) -> Device:
     return replace(device, axis_mass_per_m=device.axis_mass_per_m + change_per_m * device.bench.mass[axis, axis])
 
 
-def _draw_mode(context: EffectContext) -> dict[str, float]:
-    """Parameters of the oscillator. The tilts are components of its direction along the two other axes, in cyclic
-    order."""
+def _draw_extra_mode(context: EffectContext) -> dict[str, float]:
+    """Draw the oscillator: frequency (Hz), mass (kg), damping ratio. The tilts are components of its direction along
+    the two other axes, in cyclic order."""
     tilts = context.random.uniform(-0.25, 0.25, 2)
     return {
         "frequency": context.draw_log_uniform(18.0, 190.0),
@@ -84,7 +93,8 @@ def _draw_mode(context: EffectContext) -> dict[str, float]:
     }
 
 
-def _build_mode(device: Device, axis: int, values: Values) -> Device:
+def _build_extra_mode(device: Device, axis: int, values: Values) -> Device:
+    """Attach the oscillator to the handle; with a mass of 0 the device is unchanged."""
     direction = np.roll((1.0, values["tilt_next"], values["tilt_after_next"]), axis)
     direction /= np.linalg.norm(direction)
     if values["mass"] == 0.0:
@@ -96,29 +106,34 @@ def _build_mode(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_backlash(context: EffectContext) -> dict[str, float]:
-    """The motor has 20 to 40 % of the axis's mass m; contact stiffness m (2 pi f)² with f from 220 to 400 Hz, contact
-    damping 2 zeta sqrt(stiffness m) with zeta from 0.015 to 0.06."""
-    mass = context.bench.mass[context.axis, context.axis] * context.random.uniform(0.2, 0.4)
-    spring = mass * (2 * np.pi * context.draw_log_uniform(220.0, 400.0)) ** 2
+    """Draw the gap, the motor mass m, 20 to 40 % of the axis's mass, the contact stiffness m (2 pi f)² with f from 220
+    to 400 Hz, and the contact damping 2 zeta sqrt(stiffness m) with zeta from 0.015 to 0.06."""
+    motor_mass_kg = context.bench.mass[context.axis, context.axis] * context.random.uniform(0.2, 0.4)
+    contact_stiffness = motor_mass_kg * (2 * np.pi * context.draw_log_uniform(220.0, 400.0)) ** 2
     return {
         "gap": context.interpolate_log(3e-6, 1.5e-4),
-        "motor_mass": float(mass),
-        "contact_stiffness": float(spring),
-        "contact_damping": float(2 * context.draw_log_uniform(0.015, 0.06) * np.sqrt(spring * mass)),
+        "motor_mass": float(motor_mass_kg),
+        "contact_stiffness": float(contact_stiffness),
+        "contact_damping": float(
+            2 * context.draw_log_uniform(0.015, 0.06) * np.sqrt(contact_stiffness * motor_mass_kg)
+        ),
     }
 
 
 def _build_backlash(device: Device, axis: int, values: Values) -> Device:
+    """Set the play of the device, replacing an earlier one."""
     names = ("motor_mass", "gap", "contact_stiffness", "contact_damping")
     return replace(device, play=np.array([axis, *(values[name] for name in names)]))
 
 
 EFFECTS = (
-    ConcealedEffect("viscous_damping", "mechanism", True, _draw_viscous, _build_viscous),
-    ConcealedEffect("added_mass", "mechanism", True, _draw_added, _build_added),
-    ConcealedEffect("quadratic_damping", "mechanism", True, _draw_quadratic, _build_quadratic),
-    ConcealedEffect("pose_dependent_inertia", "mechanism", True, _draw_pose, _build_pose),
-    ConcealedEffect("extra_mode", "mechanism", True, _draw_mode, _build_mode),
+    ConcealedEffect("viscous_damping", "mechanism", True, _draw_viscous_damping, _build_viscous_damping),
+    ConcealedEffect("added_mass", "mechanism", True, _draw_added_mass, _build_added_mass),
+    ConcealedEffect("quadratic_damping", "mechanism", True, _draw_quadratic_damping, _build_quadratic_damping),
+    ConcealedEffect(
+        "pose_dependent_inertia", "mechanism", True, _draw_pose_dependent_inertia, _build_pose_dependent_inertia
+    ),
+    ConcealedEffect("extra_mode", "mechanism", True, _draw_extra_mode, _build_extra_mode),
     ConcealedEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
 )
 """Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

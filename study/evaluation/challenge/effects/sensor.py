@@ -7,7 +7,8 @@ that repeats the sample before); logger offset (s; positive: the acceleration is
 
 Accelerations are in m/s^2. Drift and hum have a random share in each channel; the largest share is 1. The strength
 interpolates each range geometrically. `challenge.sensor` applies the effects; `EFFECTS` is part of the table from which
-`draw_case` chooses. A `_draw_...` function draws parameters, a `_build_...` function builds them into a device.
+`draw_case` chooses. A `_draw_...` function draws parameters, a `_build_...` function builds them into a device; all
+ranges were chosen by hand. `axis` is not used where an effect acts on all channels.
 """
 
 from dataclasses import replace
@@ -22,19 +23,19 @@ from study.evaluation.challenge.sensor import Sensor
 
 
 def _with_sensor(device: Device, sensor: Sensor) -> Device:
-    """The device with another sensor."""
+    """Replace the sensor; returns a new device."""
     return replace(device, sensor=sensor)
 
 
 def _set_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
-    """Copy of the table (3,) with the value of a channel replaced."""
+    """Replace the value of a channel in a copy of the table (3,)."""
     new_table = table.copy()
     new_table[axis] = value
     return new_table
 
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:
-    """Bandwidth, 420 Hz (weakest) to 30 Hz."""
+    """Draw the bandwidth, 420 Hz (weakest) to 30 Hz."""
     return {"bandwidth": context.interpolate_log(420.0, 30.0)}
 
 
@@ -44,7 +45,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_clipping(context: EffectContext) -> dict[str, float]:
-    """Limit (m/s^2) that cuts 2 % to 70 % off the largest reading."""
+    """Draw the limit (m/s^2) that cuts 2 % to 70 % off the largest reading."""
     return {"limit": context.peak_mps2[context.axis] * (1.0 - context.interpolate_log(0.02, 0.7))}
 
 
@@ -56,14 +57,14 @@ def _build_clipping(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_misalignment(context: EffectContext) -> dict[str, float]:
-    """Angle of 0.1 to 15 degrees, and the rotation vector (degrees)."""
+    """Draw an angle of 0.1 to 15 degrees, and the rotation vector (degrees)."""
     degrees = context.interpolate_log(0.1, 15.0)
     rotation_deg = degrees * context.draw_direction()
     return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, rotation_deg), strict=True))
 
 
 def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
-    """Replace the orientation of the sensor by the rotation."""
+    """Replace the orientation of the sensor by the rotation, also the cross-axis sensitivity of a nuisance effect."""
     rotation_deg = np.array([values["about_x"], values["about_y"], values["about_z"]])
     return _with_sensor(
         device, replace(device.sensor, orientation=Rotation.from_rotvec(rotation_deg, degrees=True).as_matrix())
@@ -71,7 +72,7 @@ def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_gain(context: EffectContext) -> dict[str, float]:
-    """Gain that differs from 1 by 0.5 % to 30 %, in either direction."""
+    """Draw a gain that differs from 1 by 0.5 % to 30 %, in either direction."""
     return {"gain": 1.0 + context.draw_sign() * context.interpolate_log(0.005, 0.3)}
 
 
@@ -81,7 +82,7 @@ def _build_gain(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
-    """cubic, 1/(m/s^2)^2: at the largest reading, the cubic term is 0.5 % to 25 % of the reading."""
+    """Draw cubic, 1/(m/s^2)^2: at the largest reading, the cubic term is 0.5 % to 25 % of the reading."""
     return {"cubic": context.draw_sign() * context.interpolate_log(0.005, 0.25) / context.peak_mps2[context.axis] ** 2}
 
 
@@ -93,7 +94,7 @@ def _build_nonlinearity(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_shares(context: EffectContext) -> dict[str, float]:
-    """Random shares of the three channels, of either sign; the largest in magnitude among those that are read is 1."""
+    """Draw shares of the three channels, of either sign; the largest in magnitude among those that are read is 1."""
     shares = context.draw_direction()
     read_shares = shares[list(context.axes)]
     shares /= read_shares[np.argmax(np.abs(read_shares))]
@@ -101,12 +102,12 @@ def _draw_shares(context: EffectContext) -> dict[str, float]:
 
 
 def _stack_shares(values: Values) -> FloatArray:
-    """(3,): shares of the channels."""
+    """Stack the shares of the channels, (3,)."""
     return np.array([values["share_x"], values["share_y"], values["share_z"]])
 
 
 def _draw_drift(context: EffectContext) -> dict[str, float]:
-    """Drift over the whole recording, 0.01 to 2 m/s^2 of either sign, and shares of the channels."""
+    """Draw the drift over the whole recording, 0.01 to 2 m/s^2 of either sign, and shares of the channels."""
     return {"total": context.draw_sign() * context.interpolate_log(0.01, 2.0)} | _draw_shares(context)
 
 
@@ -116,7 +117,7 @@ def _build_drift(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_quantization(context: EffectContext) -> dict[str, float]:
-    """Step, 0.02 to 1.5 m/s^2."""
+    """Draw the step, 0.02 to 1.5 m/s^2."""
     return {"step": context.interpolate_log(0.02, 1.5)}
 
 
@@ -126,7 +127,8 @@ def _build_quantization(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_hum(context: EffectContext) -> dict[str, float]:
-    """Amplitude, 0.01 to 1 m/s^2; frequency, 50 or 60 Hz up to 0.05 Hz off; phase (rad); shares of the channels."""
+    """Draw the amplitude, 0.01 to 1 m/s^2; frequency, 50 or 60 Hz up to 0.05 Hz off; phase (rad); shares of the
+    channels."""
     mains_hz = float(context.random.choice((50.0, 60.0))) + context.random.uniform(-0.05, 0.05)
     phase = context.random.uniform(0.0, 2 * np.pi)
     return {"amplitude": context.interpolate_log(0.01, 1.0), "frequency": mains_hz, "phase": phase} | _draw_shares(
@@ -135,7 +137,7 @@ def _draw_hum(context: EffectContext) -> dict[str, float]:
 
 
 def _build_hum(device: Device, axis: int, values: Values) -> Device:
-    """Set the cosine and sine amplitudes of the hum, (2, 3), m/s^2, and its frequency."""
+    """Set the hum amplitude * share * sin(2 pi frequency t + phase): amplitudes of sine and cosine, (2, 3), m/s^2."""
     amplitudes = values["amplitude"] * _stack_shares(values)
     return _with_sensor(
         device,
@@ -148,7 +150,7 @@ def _build_hum(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_clock_error(context: EffectContext) -> dict[str, float]:
-    """Clock error, 0.5 to 100 ppm of either sign."""
+    """Draw the clock error, 0.5 to 100 ppm of either sign."""
     return {"ppm": context.draw_sign() * context.interpolate_log(0.5, 100.0)}
 
 
@@ -158,7 +160,7 @@ def _build_clock_error(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_lost_samples(context: EffectContext) -> dict[str, float]:
-    """Fraction of lost samples, 0.01 % to 4 %."""
+    """Draw the fraction of lost samples, 0.01 % to 4 %."""
     return {"fraction": context.interpolate_log(1e-4, 0.04)}
 
 
@@ -168,7 +170,7 @@ def _build_lost_samples(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_cross_axis(context: EffectContext) -> dict[str, float]:
-    """Shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
+    """Draw shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
     angle = context.random.uniform(0.0, 2 * np.pi)
     share = context.interpolate_log(0.003, 0.15)
     return {"from_next": float(share * np.cos(angle)), "from_after_next": float(share * np.sin(angle))}
@@ -184,7 +186,7 @@ def _build_cross_axis(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_offset(context: EffectContext) -> dict[str, float]:
-    """Offset, 0.0005 to 0.5 m/s^2 of either sign."""
+    """Draw the offset, 0.0005 to 0.5 m/s^2 of either sign."""
     return {"offset": context.draw_sign() * context.interpolate_log(5e-4, 0.5)}
 
 
@@ -196,7 +198,7 @@ def _build_offset(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_logger_offset(context: EffectContext) -> dict[str, float]:
-    """Delay of the acceleration, 10 µs to 5 ms; negative: it is early."""
+    """Draw the delay of the acceleration, 10 µs to 5 ms (in s); negative: it is early."""
     return {"offset": context.draw_sign() * context.interpolate_log(1e-5, 5e-3)}
 
 
@@ -220,4 +222,4 @@ EFFECTS = (
     ConcealedEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
     ConcealedEffect("logger_offset", "sensor", False, _draw_logger_offset, _build_logger_offset),
 )
-"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""
+"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

@@ -6,7 +6,8 @@
     cogging      F = amplitude sin(2 pi x / pitch + phase)       N, m, rad (random phase)
     end stop     F = -stiffness (x - position) beyond position   N/m, m; on one side or on both, which is drawn
 
-The strength interpolates the range of the main parameter geometrically. `handle_force_kernel` computes the force.
+The strength interpolates the range of the main parameter geometrically. `handle_force_kernel` computes the force;
+`EFFECTS` is part of the table from which `draw_case` chooses. All ranges were chosen by hand.
 """
 
 import numpy as np
@@ -26,17 +27,19 @@ from study.evaluation.challenge.handle_force_kernel import (
 )
 
 
-def _draw_hardening(context: EffectContext) -> dict[str, float]:
-    """k3 such that the force at the end of the travel is 0.005 to 0.4 N."""
+def _draw_hardening_stiffness(context: EffectContext) -> dict[str, float]:
+    """Draw k3 such that the force at the end of the travel is 0.005 to 0.4 N."""
     return {"k3": context.interpolate_log(0.005, 0.4) / context.travel_m[context.axis] ** 3}
 
 
-def _build_hardening(device: Device, axis: int, values: Values) -> Device:
+def _build_hardening_stiffness(device: Device, axis: int, values: Values) -> Device:
+    """Set the cubic stiffness of one axis."""
     return with_forces(device, axis, {CUBIC_STIFFNESS: values["k3"]})
 
 
-def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
-    # k2 x at the end of the travel over the ground's stiffness; above 0.5 the tangent stiffness would be negative.
+def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
+    """Draw k2 such that k2 x at the end of the travel is 0.5 to 30 % of the ground's stiffness."""
+    # Above 50 % the tangent stiffness would be negative there.
     stiffness = context.bench.stiffness[context.axis, context.axis]
     return {
         "k2": float(
@@ -45,19 +48,23 @@ def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
     }
 
 
-def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
+def _build_asymmetric_stiffness(device: Device, axis: int, values: Values) -> Device:
+    """Set the square stiffness of one axis."""
     return with_forces(device, axis, {SQUARE_STIFFNESS: values["k2"]})
 
 
-def _draw_constant(context: EffectContext) -> dict[str, float]:
+def _draw_constant_force(context: EffectContext) -> dict[str, float]:
+    """Draw a force of 0.001 to 0.3 N, of either sign."""
     return {"force": context.draw_sign() * context.interpolate_log(0.001, 0.3)}
 
 
-def _build_constant(device: Device, axis: int, values: Values) -> Device:
+def _build_constant_force(device: Device, axis: int, values: Values) -> Device:
+    """Set the constant force on one axis."""
     return with_forces(device, axis, {CONSTANT_FORCE: values["force"]})
 
 
 def _draw_cogging(context: EffectContext) -> dict[str, float]:
+    """Draw amplitude (N), pitch (0.4 to 4 mm) and phase (rad)."""
     return {
         "amplitude": context.interpolate_log(0.004, 0.15),
         "pitch": context.draw_log_uniform(4e-4, 4e-3),
@@ -66,12 +73,14 @@ def _draw_cogging(context: EffectContext) -> dict[str, float]:
 
 
 def _build_cogging(device: Device, axis: int, values: Values) -> Device:
+    """Set the cogging force on one axis."""
     cells = {COGGING_AMPLITUDE: values["amplitude"], COGGING_PITCH: values["pitch"], COGGING_PHASE: values["phase"]}
     return with_forces(device, axis, cells)
 
 
-def _draw_stop(context: EffectContext) -> dict[str, float]:
-    """Position at 99.8 % (weakest) to 40 % of the travel without the stop; opposite: 1 for a stop on both sides."""
+def _draw_end_stop(context: EffectContext) -> dict[str, float]:
+    """Draw the position, at 99.8 % (weakest) to 40 % of the travel without the stop, of either sign; the stiffness
+    (N/m); opposite: 1 for a stop on both sides, else 0."""
     travel_share = 1.0 - 0.6 * context.interpolate_log(0.003, 1.0)
     return {
         "position": context.draw_sign() * travel_share * context.travel_m[context.axis],
@@ -80,18 +89,19 @@ def _draw_stop(context: EffectContext) -> dict[str, float]:
     }
 
 
-def _build_stop(device: Device, axis: int, values: Values) -> Device:
-    position = values["position"]
-    near_side, far_side = (UPPER_STOP, LOWER_STOP) if position > 0.0 else (LOWER_STOP, UPPER_STOP)
-    cells = {near_side: position, STOP_STIFFNESS: values["stiffness"]}
-    return with_forces(device, axis, cells | ({far_side: -position} if values["opposite"] else {}))
+def _build_end_stop(device: Device, axis: int, values: Values) -> Device:
+    """Set one end stop, or two at equal distances from the centre."""
+    position_m = values["position"]
+    near_side, far_side = (UPPER_STOP, LOWER_STOP) if position_m > 0.0 else (LOWER_STOP, UPPER_STOP)
+    cells = {near_side: position_m, STOP_STIFFNESS: values["stiffness"]}
+    return with_forces(device, axis, cells | ({far_side: -position_m} if values["opposite"] else {}))
 
 
 EFFECTS = (
-    ConcealedEffect("hardening_stiffness", "mechanism", True, _draw_hardening, _build_hardening),
-    ConcealedEffect("asymmetric_stiffness", "mechanism", True, _draw_asymmetric, _build_asymmetric),
-    ConcealedEffect("constant_force", "mechanism", True, _draw_constant, _build_constant),
+    ConcealedEffect("hardening_stiffness", "mechanism", True, _draw_hardening_stiffness, _build_hardening_stiffness),
+    ConcealedEffect("asymmetric_stiffness", "mechanism", True, _draw_asymmetric_stiffness, _build_asymmetric_stiffness),
+    ConcealedEffect("constant_force", "mechanism", True, _draw_constant_force, _build_constant_force),
     ConcealedEffect("cogging", "mechanism", True, _draw_cogging, _build_cogging),
-    ConcealedEffect("end_stop", "mechanism", True, _draw_stop, _build_stop),
+    ConcealedEffect("end_stop", "mechanism", True, _draw_end_stop, _build_end_stop),
 )
-"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""
+"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

@@ -1,7 +1,8 @@
 """Faults of sensor, clock and line applied to readings of a real device.
 
 Every function takes the readings (n, p), the sample rate (Hz), the parameters by name and a random generator, and
-returns new readings (n, p). Amplitudes are in the unit of the readings. `injections` draws the parameters.
+returns new readings (n, p), n >= 1. Amplitudes are in the unit of the readings. Called by `injections`, which draws the
+parameters. Arguments that a fault does not need are ignored.
 """
 
 from collections.abc import Mapping
@@ -14,119 +15,125 @@ from equalizer.signals.signal import FloatArray
 
 
 def apply_lag(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """First-order low-pass with the corner frequency `bandwidth` (Hz), at rest at the first reading."""
-    smoothing = 1.0 - np.exp(-2 * np.pi * values["bandwidth"] / rate_hz)
-    filtered, _ = lfilter([smoothing], [1.0, smoothing - 1.0], samples, axis=0, zi=(1.0 - smoothing) * samples[:1])
+    """Apply a first-order low-pass with the corner frequency `bandwidth` (Hz), at rest at the first reading."""
+    smoothing = 1.0 - np.exp(-2 * np.pi * parameters["bandwidth"] / rate_hz)
+    filtered, _ = lfilter([smoothing], [1.0, smoothing - 1.0], readings, axis=0, zi=(1.0 - smoothing) * readings[:1])
     return np.asarray(filtered)
 
 
 def clip_readings(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Clipping at +-limit."""
-    return np.asarray(np.clip(samples, -values["limit"], values["limit"]))
+    """Clip the readings at +-limit."""
+    return np.asarray(np.clip(readings, -parameters["limit"], parameters["limit"]))
 
 
 def add_hum(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Mains hum, the same in all channels: `amplitude`, `frequency` (Hz), phase `turn` (turns)."""
-    turns = values["frequency"] * np.arange(len(samples)) / rate_hz + values["turn"]
-    return np.asarray(samples + values["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
+    """Add mains hum, the same in all channels: `amplitude`, `frequency` (Hz), phase `turn` (turns)."""
+    turns = parameters["frequency"] * np.arange(len(readings)) / rate_hz + parameters["turn"]
+    return np.asarray(readings + parameters["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
 
 
 def add_drift(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Drift, the same in all channels: linear from 0 at the start to `total` at the end."""
-    return samples + values["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
+    """Add a drift, the same in all channels: linear from 0 at the start to `total` at the end."""
+    return readings + parameters["total"] * np.linspace(0.0, 1.0, len(readings))[:, None]
 
 
 def add_offset(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Constant `offset`, the same in all channels."""
-    return samples + values["offset"]
+    """Add the constant `offset`, the same in all channels."""
+    return readings + parameters["offset"]
 
 
 def quantize_readings(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Quantization to multiples of `step`."""
-    return np.asarray(values["step"] * np.round(samples / values["step"]))
+    """Quantize the readings to the nearest multiple of `step`."""
+    return np.asarray(parameters["step"] * np.round(readings / parameters["step"]))
 
 
 def lose_samples(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Each sample is lost with probability `fraction` and then repeats the previous sample."""
-    is_lost = random.random(len(samples)) < values["fraction"]
+    """Lose each sample but the first with probability `fraction`: all channels repeat the last sample that was not
+    lost."""
+    is_lost = random.random(len(readings)) < parameters["fraction"]
     is_lost[0] = False
-    source_index = np.maximum.accumulate(np.where(is_lost, 0, np.arange(len(samples))))
-    return np.asarray(samples[source_index])
+    source_index = np.maximum.accumulate(np.where(is_lost, 0, np.arange(len(readings))))
+    return np.asarray(readings[source_index])
 
 
 def shift_clock(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Clock error: readings taken at t (1 + ppm 1e-6), interpolated linearly."""
-    index = np.arange(len(samples), dtype=np.float64)
-    read_index = index * (1.0 + 1e-6 * values["ppm"])
-    return np.column_stack([np.interp(read_index, index, channel) for channel in samples.T])
+    """Apply a clock error: readings taken at t (1 + 1e-6 ppm), interpolated linearly; past the end, the last
+    reading."""
+    index = np.arange(len(readings), dtype=np.float64)
+    read_index = index * (1.0 + 1e-6 * parameters["ppm"])
+    return np.column_stack([np.interp(read_index, index, channel) for channel in readings.T])
 
 
 def rotate_readings(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Misalignment: rotation of the three channels by `degrees` about the unit vector (about_x, about_y, about_z)."""
-    axis = np.array([values["about_x"], values["about_y"], values["about_z"]])
-    return np.asarray(Rotation.from_rotvec(np.radians(values["degrees"]) * axis).apply(np.array(samples)))
+    """Rotate exactly three channels, as a misaligned sensor, by `degrees` about the unit vector (about_x, about_y,
+    about_z)."""
+    axis = np.array([parameters["about_x"], parameters["about_y"], parameters["about_z"]])
+    return np.asarray(Rotation.from_rotvec(np.radians(parameters["degrees"]) * axis).apply(np.array(readings)))
 
 
 def scale_readings(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Factor `gain` in all channels."""
-    return values["gain"] * samples
+    """Multiply all channels by `gain`."""
+    return parameters["gain"] * readings
 
 
 def delay_readings(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Readings delayed by `offset` (s), interpolated linearly."""
-    index = np.arange(len(samples), dtype=np.float64)
-    return np.column_stack([np.interp(index - values["offset"] * rate_hz, index, channel) for channel in samples.T])
+    """Delay the readings by `offset` (s; negative: advance), interpolated linearly; the end values are repeated."""
+    index = np.arange(len(readings), dtype=np.float64)
+    return np.column_stack(
+        [np.interp(index - parameters["offset"] * rate_hz, index, channel) for channel in readings.T]
+    )
 
 
 def add_cubic_term(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Cubic nonlinearity a + cubic a^3."""
-    return np.asarray(samples + values["cubic"] * samples**3)
+    """Apply the cubic nonlinearity a + cubic a^3 to the readings a."""
+    return np.asarray(readings + parameters["cubic"] * readings**3)
 
 
 def add_square_term(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Quadratic nonlinearity a + square a^2."""
-    return np.asarray(samples + values["square"] * samples**2)
+    """Apply the quadratic nonlinearity a + square a^2 to the readings a."""
+    return np.asarray(readings + parameters["square"] * readings**2)
 
 
 def add_noise(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Added white normal noise with the given `rms`."""
-    return np.asarray(samples + values["rms"] * random.normal(size=samples.shape))
+    """Add white normal noise with the standard deviation `rms`, independent in each channel."""
+    return np.asarray(readings + parameters["rms"] * random.normal(size=readings.shape))
 
 
 def apply_play(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Hysteresis (play operator) with the total width `gap`. A missing reading (NaN) stays missing."""
-    output, previous, half_gap = np.empty_like(samples), samples[0], 0.5 * values["gap"]
-    for index, reading in enumerate(samples):
+    """Apply a hysteresis (play operator) with the total width `gap`, from the first reading. A missing reading (NaN)
+    stays missing."""
+    output, previous, half_gap = np.empty_like(readings), readings[0], 0.5 * parameters["gap"]
+    for index, reading in enumerate(readings):
         is_finite = np.isfinite(reading)
         previous = np.where(
             is_finite,
@@ -138,10 +145,10 @@ def apply_play(
 
 
 def mix_channels(
-    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+    readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Cross-axis sensitivity: the first channel also reads the second, scaled to the standard deviation of the first,
-    times `from_next`."""
-    output = samples.copy()
-    output[:, 0] += values["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
+    """Apply a cross-axis sensitivity: the first channel also reads the second, scaled to the standard deviation of the
+    first, times `from_next`. At least two channels; the second must vary."""
+    output = readings.copy()
+    output[:, 0] += parameters["from_next"] * readings[:, 1] * np.nanstd(readings[:, 0]) / np.nanstd(readings[:, 1])
     return np.asarray(output)

@@ -1,7 +1,8 @@
-"""Draws the cases of a bank of laws: devices with a law outside the catalogue, and controls without such a law.
+"""Draw the cases of a bank of laws: devices with a law outside the catalogue, and controls without such a law.
 
 A turn of twenty cases has twelve with a law, four with nothing missing, three with an effect of the catalogue and one
-with an additional linear mode, in random order. All laws, and all effects, are used before any is used again.
+with an additional linear mode, in random order. All laws, and all effects, are used before any is used again. Called by
+`study.evaluation.bank.laws.seal_laws`. All numbers were chosen.
 """
 
 from dataclasses import dataclass
@@ -33,35 +34,37 @@ from study.evaluation.challenge.sensor import read_sensor
 
 LawBankKind = Literal["law", "nothing", "decoy", "mode"]
 """What is concealed: a law, nothing, an effect of the catalogue, or a linear mode."""
-COUNTS: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "mode": 1}
+CASES_PER_TURN: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "mode": 1}
 """Number of cases of each kind in a turn of twenty."""
-TURN: tuple[LawBankKind, ...] = tuple(kind for kind, count in COUNTS.items() for _ in range(count))
-"""Kind of each case of a turn; the turn repeats."""
-LOWEST = 0.35
+TURN_KINDS: tuple[LawBankKind, ...] = tuple(kind for kind, count in CASES_PER_TURN.items() for _ in range(count))
+"""Kind of each case of a turn, before it is shuffled."""
+LOWEST_STRENGTH = 0.35
 """Lowest strength of a concealed law, effect or mode; the highest is 1."""
-MODE = "extra_mode"
+MODE_EFFECT = "extra_mode"
 """Effect of the kind `mode`."""
-CATALOGUED = tuple(name for name in EFFECTS if name not in (*THREE_AXIS_EFFECTS, MODE, "hand_impedance"))
+DECOY_EFFECTS = tuple(name for name in EFFECTS if name not in (*THREE_AXIS_EFFECTS, MODE_EFFECT, "hand_impedance"))
 """Effects of the kind `decoy`: all of the catalogue that can be identified on a single axis, except a hand."""
-ONE_AXIS = 0.75
+SINGLE_AXIS_FRACTION = 0.75
 """Fraction of the cases with one driven axis, of those whose law, if any, needs a single axis; the others have two."""
 LOUD_N = 4.5
 """Level (N) of an additional test segment and of the second fresh motion: 1.5 times the highest level of the fit."""
-FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
+FRESH_LEVEL_N, FRESH_PERIOD_SAMPLES, FRESH_PERIODS = 2.0, 2000, 2
 """Fresh test motion, which no recording contains: nominal peak of its multisine (N), samples per period, periods."""
 
 
 @dataclass(frozen=True, slots=True)
 class LawDraw:
-    """The draw for a number of the bank of laws."""
+    """Drawn settings of one case of the bank of laws."""
 
     number: int
+    """Number of the case, from 0."""
     seed: int
+    """Seed of its device: seed of the bank + number."""
     kind: LawBankKind
     concealed: str
     """Name of the concealed law or effect; empty for nothing."""
     strength: float
-    """`LOWEST_STRENGTHS` to 1."""
+    """`LOWEST_STRENGTH` to 1; without meaning where nothing is concealed."""
     model: ModelOrigin
     """Origin of the model, calibrated or retuned."""
     settings: CaseSettings
@@ -80,8 +83,8 @@ class FreshTestMotion:
     """True motion, SI units."""
     reading: FloatArray
     """m/s^2, with the law of the sensor but no other sensor effect."""
-    lawful: FloatArray
-    """N: force of the laws, with the change of the command by a law of the drive."""
+    law_force: FloatArray
+    """N: force of the laws, plus the change of the command by a law of the drive."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,33 +95,43 @@ class LawCase:
     truth: LawTruth | None
     """Label of the law; None where no law is concealed."""
     fresh_motions: tuple[FreshTestMotion, ...]
-    """For devices with a law: a motion at the level `FRESH_N`, then at `LOUD_N`. Empty for others."""
+    """For devices with a law: a motion at the level `FRESH_LEVEL_N`, then at `LOUD_N`. Empty for others."""
 
 
-def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
+def draw_law(seed: int, case_number: int, brief: bool = False) -> LawDraw:
     """Draw the case of a number. The same seed and number give the same case. brief: periods of half the length."""
-    turn, position = divmod(number, len(TURN))
-    order = np.random.default_rng([seed, 41, turn]).permutation(len(TURN))
-    kind = TURN[order[position]]
-    random = np.random.default_rng([seed, 42, number])
-    earlier_cases = turn * COUNTS[kind] + sum(TURN[bank_kind] == kind for bank_kind in order[:position])
-    names = tuple(law_kind.name for law_kind in LAW_KINDS) if kind == "law" else CATALOGUED
+    # 41 to 43, and 44 below: arbitrary fixed numbers that make the random sequences of a seed independent.
+    turn_number, turn_index = divmod(case_number, len(TURN_KINDS))
+    kind_order = np.random.default_rng([seed, 41, turn_number]).permutation(len(TURN_KINDS))
+    kind = TURN_KINDS[kind_order[turn_index]]
+    random = np.random.default_rng([seed, 42, case_number])
+    earlier_cases = turn_number * CASES_PER_TURN[kind] + sum(
+        TURN_KINDS[bank_kind] == kind for bank_kind in kind_order[:turn_index]
+    )
+    concealed_names = tuple(law_kind.name for law_kind in LAW_KINDS) if kind == "law" else DECOY_EFFECTS
     name_index = int(
-        np.random.default_rng([seed, 43, earlier_cases // len(names)]).permutation(len(names))[
-            earlier_cases % len(names)
+        np.random.default_rng([seed, 43, earlier_cases // len(concealed_names)]).permutation(len(concealed_names))[
+            earlier_cases % len(concealed_names)
         ]
     )
-    concealed = {"law": names[name_index], "decoy": names[name_index], "mode": MODE, "nothing": ""}[kind]
-    has_two_axes = (kind == "law" and LAWS_BY_NAME[concealed].axes == 2) or random.random() > ONE_AXIS
+    concealed = {
+        "law": concealed_names[name_index],
+        "decoy": concealed_names[name_index],
+        "mode": MODE_EFFECT,
+        "nothing": "",
+    }[kind]
+    has_two_axes = (kind == "law" and LAWS_BY_NAME[concealed].axes == 2) or random.random() > SINGLE_AXIS_FRACTION
     axes = tuple(sorted(int(axis) for axis in random.choice(3, 2 if has_two_axes else 1, replace=False)))
     model = cast(ModelOrigin, str(random.choice(["calibrated", "retuned"])))
     settings = CaseSettings(axes, 1000 if brief else 2000, 3, 1.0, STEPS_PER_SAMPLE, LOUD_N)
-    return LawDraw(number, seed + number, kind, concealed, float(random.uniform(LOWEST, 1.0)), model, settings)
+    return LawDraw(
+        case_number, seed + case_number, kind, concealed, float(random.uniform(LOWEST_STRENGTH, 1.0)), model, settings
+    )
 
 
 def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
     """Generate the drawn case. name: device name in recording and model. Raises ValueError where the motion diverges
-    with the law at any strength that is tried."""
+    or becomes too large at each strength that `_build_stable_law` tries."""
     if law_draw.kind != "law":
         effects = (law_draw.concealed,) if law_draw.concealed else ()
         strengths = law_draw.strength if effects else None
@@ -127,7 +140,7 @@ def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
     bench, plan = draw_bench(random), draw_plan(random, settings)
     baseline = add_nuisance_effects(Device(bench, steps=settings.steps), settings.extras, law_draw.seed)
     base_motion = simulate_full_motion(baseline, plan.command)
-    device, true_motion, truth = _build_law_scaled(law_draw, baseline, (base_motion, plan), random)
+    device, true_motion, truth = _build_stable_law(law_draw, baseline, (base_motion, plan), random)
     response, position = read_sensor(device.sensor, true_motion.acceleration, true_motion.position, RATE_HZ, random)
     if law_draw.model == "calibrated":
         nominal, tolerance = draw_calibration(bench, random, settings.axes)
@@ -135,32 +148,35 @@ def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
         nominal, tolerance = retune(bench, response, plan, settings.axes)
     model = as_model(name, nominal, tolerance, settings.axes)
     recording = make_recording(name, plan, response, position, settings)
-    motions = tuple((part.acceleration, part.position) for part in (base_motion, true_motion))
+    motion_pairs = tuple(
+        (simulated_motion.acceleration, simulated_motion.position) for simulated_motion in (base_motion, true_motion)
+    )
     case = Case(
         recording,
         model,
         (),
-        _refuse_repeat,
-        compute_detectability(baseline, device, (motions[0], motions[1]), settings),
+        _refuse_further_recording,
+        compute_detectability(baseline, device, (motion_pairs[0], motion_pairs[1]), settings),
     )
     return LawCase(
-        case, truth, tuple(_make_fresh_motion(device, settings, random, level) for level in (FRESH_N, LOUD_N))
+        case, truth, tuple(_make_fresh_motion(device, settings, random, level) for level in (FRESH_LEVEL_N, LOUD_N))
     )
 
 
-def _build_law_scaled(
+def _build_stable_law(
     law_draw: LawDraw, baseline: Device, base_motion: tuple[Motion, DrivePlan], random: np.random.Generator
 ) -> tuple[Device, Motion, LawTruth]:
-    """Build in a law at the drawn strength, or at a half or a quarter of it where the motion would diverge or exceed
-    three times that without the law. Raises ValueError where all three do. The parameters are the same for each."""
+    """Build in a law at the drawn strength, or at a half or a quarter of it where the motion would diverge, or reach
+    three times the largest position without the law. Raises ValueError where it does at all three. The parameters a
+    and b are the same for each. base_motion: motion without the law, and its plan."""
     (motion, plan), axes = base_motion, law_draw.settings.axes
     first_index = int(random.integers(len(axes)))
-    places = (axes[first_index], axes[(first_index + 1) % len(axes)])
+    axis_pair = (axes[first_index], axes[(first_index + 1) % len(axes)])
     state = random.bit_generator.state
     for strength in (law_draw.strength, law_draw.strength / 2, law_draw.strength / 4):
         random.bit_generator.state = state
         device, truth = build_law(
-            baseline, LAWS_BY_NAME[law_draw.concealed], (motion, plan.command), places, strength, random
+            baseline, LAWS_BY_NAME[law_draw.concealed], (motion, plan.command), axis_pair, strength, random
         )
         try:
             law_motion = simulate_full_motion(device, plan.command)
@@ -171,24 +187,26 @@ def _build_law_scaled(
     raise ValueError(f"the device runs away with the law '{law_draw.concealed}', seed {law_draw.seed}")
 
 
-def _refuse_repeat(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
-    """`Case.record_again` of a device with a law: such cases have no further experiments. Raises ValueError."""
+def _refuse_further_recording(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+    """Refuse a further recording of a device with a law, as `Case.record_again`: such cases have no further
+    experiments. Always raises ValueError."""
     raise ValueError("a device with a law is not recorded again")
 
 
 def _make_fresh_motion(
     device: Device, settings: CaseSettings, random: np.random.Generator, level_n: float
 ) -> FreshTestMotion:
-    """Motion of the device under a new multisine on all driven axes."""
-    command = np.zeros((FRESH_PERIOD * FRESH_PERIODS, 3))
+    """Simulate the device under a new multisine on all driven axes. level_n: peak per axis times the root of the number
+    of axes (N)."""
+    command = np.zeros((FRESH_PERIOD_SAMPLES * FRESH_PERIODS, 3))
     for axis in settings.axes:
         command[:, axis] = np.tile(
-            draw_multisine(random, level_n / len(settings.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS
+            draw_multisine(random, level_n / len(settings.axes) ** 0.5, FRESH_PERIOD_SAMPLES), FRESH_PERIODS
         )
     motion, axes = simulate_full_motion(device, command), list(settings.axes)
     changed_command = command if device.drive_law is None else device.drive_law(command)
     reading = motion.acceleration if device.sensor.static_law is None else device.sensor.static_law(motion.acceleration)
     return FreshTestMotion(
-        level_n, command[:, axes], Motion(*(part[:, axes] for part in motion)), reading[:, axes],
-        (motion.lawful + changed_command - command)[:, axes],
+        level_n, command[:, axes], Motion(*(motion_array[:, axes] for motion_array in motion)), reading[:, axes],
+        (motion.law_force + changed_command - command)[:, axes],
     )  # fmt: skip

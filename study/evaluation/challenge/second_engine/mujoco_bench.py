@@ -18,15 +18,15 @@ from study.evaluation.challenge.bench import Bench, Oscillators
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 
 STEPS_PER_SAMPLE = 10
-"""Integration steps per sample."""
+"""Integration steps per sample. Chosen: the integrator is of fourth order, so that fewer steps than in `device` do."""
 STEP_S = 1.0 / (RATE_HZ * STEPS_PER_SAMPLE)
 """Step of integration (s)."""
 HANDLE_MASS_RATIO = 0.4
 """Mass of the handle's body over that of the lightest axis. The rest of an axis's mass is armature, the inertia of that
-joint alone."""
+joint alone. Chosen: the armature stays positive beside a motor of up to 0.4 of the axis's mass."""
 CONTACT_IMPEDANCE = 0.01
 """MuJoCo's constraint impedance (0 to 1) of a contact: small, so that the contact force is that of a spring and a
-damper with their nominal values."""
+damper with their nominal values. Chosen."""
 
 Values = Mapping[str, float]
 """Drawn parameters of an effect, by name."""
@@ -34,7 +34,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MujocoBench:
-    """Parameters of the bench and of its concealed effects; each array (3,), of the driven axes."""
+    """Parameters of the bench and of its concealed effects; each array (3,), a value per axis."""
 
     mass_kg: FloatArray
     """Mass that moves along each axis (kg), without the oscillators."""
@@ -55,7 +55,7 @@ class MujocoBench:
     lag_s: float = 0.0
     """Time constant of the actuators' first-order lag (s); 0 = none."""
     delay_s: float = 0.0
-    """Delay of the commands (s), rounded to integration steps by the simulation."""
+    """Delay of the commands (s), rounded to integration steps (of 0.1 ms) by the simulation."""
     stop: tuple[int, float, float, float] | None = None
     """End stop: axis, lower and upper end (m), stiffness (N/m)."""
     play: tuple[int, Values] | None = None
@@ -63,16 +63,16 @@ class MujocoBench:
 
 
 def make_baseline_bench(bench: Bench) -> MujocoBench:
-    """The closest MuJoCo equivalent of a bench, without concealed effects: the off-diagonal terms of mass, damping and
-    stiffness are dropped."""
+    """Make the closest MuJoCo equivalent of a bench, without concealed effects: the off-diagonal terms of mass, damping
+    and stiffness are dropped."""
     mass, damping, stiffness = (np.diag(matrix).copy() for matrix in (bench.mass, bench.damping, bench.stiffness))
     zeros = np.zeros(3)
     return MujocoBench(mass, damping, stiffness, bench.oscillators, zeros, zeros, np.ones(3), zeros)
 
 
 def linearise(bench: MujocoBench) -> Bench:
-    """The linear part as a bench, without gain, lag and delay. Perpendicular to its slide, an oscillator moves with the
-    handle, so that its mass adds to the handle's in these directions."""
+    """Convert the linear part to a bench, without gain, lag and delay. Perpendicular to its slide, an oscillator moves
+    with the handle, so that its mass adds to the handle's in these directions."""
     mass = np.diag(bench.mass_kg)
     for oscillator_kg, direction in zip(bench.oscillators.mass_kg, bench.oscillators.direction, strict=True):
         mass += oscillator_kg * (np.eye(3) - np.outer(direction, direction))
@@ -80,7 +80,8 @@ def linearise(bench: MujocoBench) -> Bench:
 
 
 def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Acceleration (m/s²) and position (m) of the handle, (samples, 3) each, just before each command is written.
+    """Simulate acceleration (m/s²) and position (m) of the handle, (samples, 3) each, just before each command is
+    written.
 
     The delay consists of whole samples and remaining integration steps. command: (samples, 3), N. Raises ValueError
     where the motion is not finite or reaches 1 m.
@@ -106,17 +107,18 @@ def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray
 
 
 def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
-    """The bench with a delay (s) rounded to whole steps, at least one, so that the label is exact."""
+    """Set a delay (s), rounded to whole steps and at least one, so that the label is exact; returns a new bench."""
     return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
 
 
 def _select_command(command: FloatArray, sample: int) -> FloatArray:
-    """Command (3,), N, of a sample; zero before the first."""
+    """Select the command (3,), N, of a sample; zero before the first."""
     return command[sample] if sample >= 0 else np.zeros(3)
 
 
 def _format_mjcf(bench: MujocoBench) -> str:
-    """MuJoCo's description of the bench (MJCF). Armature adds inertia along a single joint, so that axes differ."""
+    """Format the bench as a MuJoCo model (MJCF, XML). Armature adds inertia along a single joint, so that axes
+    differ."""
     root = Xml.Element("mujoco")
     _add_element(root, "compiler", {"autolimits": "true"})
     solver_options = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
@@ -173,7 +175,8 @@ def _add_oscillators(handle: Xml.Element, oscillators: Oscillators) -> None:
 
 
 def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
-    """Backlash: a tendon between motor and handle limits their distance, a one-sided contact at each end of the gap."""
+    """Add backlash: a tendon between motor and handle limits their distance, a one-sided contact at each end of the
+    gap."""
     motor_kg = values["motor_mass"]
     mass, _, _ = linearise(bench).assemble_matrices()
     mass[axis, axis] -= motor_kg
@@ -209,7 +212,7 @@ def _add_actuators(parent: Xml.Element, bench: MujocoBench) -> None:
 
 def _add_slide(body: Xml.Element, name: str, direction: FloatArray, attributes: Mapping[str, float]) -> None:
     """Add a sliding joint along a direction (3,); attributes (MJCF names) that are zero are left out. Dry friction is a
-    nearly rigid constraint with a time constant of two steps and a damping ratio of 1."""
+    nearly rigid constraint with a time constant of two steps and a damping ratio of 1 (chosen)."""
     joint = _add_element(
         body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{component:.15g}" for component in direction)}
     )

@@ -1,5 +1,8 @@
-"""Concealed-physics cases simulated by MuJoCo. Parameters are drawn as for the other bench; the physics is the
-engine's."""
+"""Cases with concealed effects whose motion is simulated by MuJoCo instead of hapteq's own integrator.
+
+Parameters are drawn as in `challenge.draw_case`; `mujoco_bench` simulates the motion, `challenge.sensor` the readings.
+Called by `mujoco_access`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -33,17 +36,17 @@ from study.evaluation.challenge.second_engine.mujoco_bench import (
 )
 from study.evaluation.challenge.sensor import RANGE_MPS2, read_sensor
 
-Build = Callable[[MujocoBench, int, Values], MujocoBench]
-"""build(bench, axis, values): the bench with an effect."""
+BuildEffect = Callable[[MujocoBench, int, Values], MujocoBench]
+"""build(bench, axis, values): a new bench with an effect."""
 
 
 def draw_mujoco_case(
     seed: int, effects: Sequence[str], origin: ModelOrigin, strength: Sequence[float], name: str, settings: CaseSettings
 ) -> Case:
-    """Draw a case as `draw_case` does, moved by MuJoCo. Raises ValueError for an effect that the engine cannot
-    express."""
-    if unknown := set(effects) - set(BUILDERS) - set(SENSOR_EFFECTS):
-        raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown))}")
+    """Draw a case as `challenge.draw_case.draw_case` does, with the motion from MuJoCo. Raises ValueError for an effect
+    that is neither in `BUILDERS` nor in `SENSOR_EFFECTS`, and where the motion diverges."""
+    if unknown_effects := set(effects) - set(BUILDERS) - set(SENSOR_EFFECTS):
+        raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown_effects))}")
     random = np.random.default_rng([seed, len(effects), 2])
     drawn_bench, plan = draw_bench(random), draw_plan(random, settings)
     baseline = make_baseline_bench(drawn_bench)
@@ -72,8 +75,8 @@ def draw_mujoco_case(
 
     def record_again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
         repeat_plan = make_further_plan(command, kind, settings)
-        heavier = replace(device, mass_kg=device.mass_kg + added_kg)
-        measured_motion = simulate_motion(heavier, repeat_plan.command)
+        loaded_bench = replace(device, mass_kg=device.mass_kg + added_kg)
+        measured_motion = simulate_motion(loaded_bench, repeat_plan.command)
         readings = read_sensor(measured.sensor, *measured_motion, RATE_HZ, np.random.default_rng([seed, noise]))
         return replace(make_recording(name, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
 
@@ -82,55 +85,63 @@ def draw_mujoco_case(
 
 
 def _add_on_axis(table: FloatArray, axis: int, value: float) -> FloatArray:
+    """Add a value to one axis in a copy of the table (3,)."""
     new_table = table.copy()
     new_table[axis] += value
     return new_table
 
 
-def _build_stop(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
-    position, far_m = values["position"], 1.0
-    low, high = (-far_m, position) if position > 0.0 else (position, far_m)
+def _build_end_stop(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
+    """Set one end stop, the other end at a distance that no motion reaches (1 m), or two at equal distances."""
+    position_m, distant_stop_m = values["position"], 1.0
+    lower_m, upper_m = (-distant_stop_m, position_m) if position_m > 0.0 else (position_m, distant_stop_m)
     if values["opposite"]:
-        low, high = -abs(position), abs(position)
-    return replace(bench, stop=(axis, low, high, values["stiffness"]))
+        lower_m, upper_m = -abs(position_m), abs(position_m)
+    return replace(bench, stop=(axis, lower_m, upper_m, values["stiffness"]))
 
 
-def _build_mode(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
-    unit = np.roll((1.0, values["tilt_next"], values["tilt_after_next"]), axis)
-    unit /= np.linalg.norm(unit)
-    # An oscillator also moves along the other directions: the mass that it adds to the handle there is subtracted where
-    # possible.
-    subtracted_kg = values["mass"] * (1.0 - unit**2)
-    attached = bench.oscillators.with_oscillator(values["frequency"], values["mass"], values["damping_ratio"], unit)
-    return replace(bench, oscillators=attached, mass_kg=bench.mass_kg - subtracted_kg)
+def _build_extra_mode(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
+    """Attach an oscillator to the handle."""
+    unit_direction = np.roll((1.0, values["tilt_next"], values["tilt_after_next"]), axis)
+    unit_direction /= np.linalg.norm(unit_direction)
+    # In MuJoCo, an oscillator moves with the handle perpendicular to its direction: the mass that it adds there is
+    # subtracted from the diagonal; the off-diagonal elements cannot be.
+    subtracted_kg = values["mass"] * (1.0 - unit_direction**2)
+    extended_oscillators = bench.oscillators.with_oscillator(
+        values["frequency"], values["mass"], values["damping_ratio"], unit_direction
+    )
+    return replace(bench, oscillators=extended_oscillators, mass_kg=bench.mass_kg - subtracted_kg)
 
 
-def _build_hand(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
-    def axis_values(name: str) -> FloatArray:
+def _build_hand_impedance(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
+    """Add mass, damping and stiffness of a hand to all axes; `axis` is not used."""
+
+    def expand_to_axes(name: str) -> FloatArray:
+        """Compute the values (3,) of a parameter: of x, and of y and z, which are stated as factors of it."""
         return values[name] * np.array([1.0, values[f"{name}_y"], values[f"{name}_z"]])
 
     return replace(
         bench,
-        mass_kg=bench.mass_kg + axis_values("mass"),
-        damping=bench.damping + axis_values("damping"),
-        stiffness=bench.stiffness + axis_values("stiffness"),
+        mass_kg=bench.mass_kg + expand_to_axes("mass"),
+        damping=bench.damping + expand_to_axes("damping"),
+        stiffness=bench.stiffness + expand_to_axes("stiffness"),
     )
 
 
-BUILDERS: dict[str, Build] = {
+BUILDERS: dict[str, BuildEffect] = {
     "coulomb_friction": lambda b, axis, v: replace(b, friction_n=_add_on_axis(b.friction_n, axis, v["level"])),
     "viscous_damping": lambda b, axis, v: replace(b, damping=_add_on_axis(b.damping, axis, v["damping"])),
     "added_mass": lambda b, axis, v: replace(b, mass_kg=_add_on_axis(b.mass_kg, axis, v["mass"])),
     "constant_force": lambda b, axis, v: replace(b, force_n=_add_on_axis(b.force_n, axis, v["force"])),
-    "end_stop": _build_stop,
+    "end_stop": _build_end_stop,
     "backlash": lambda b, axis, v: replace(b, play=(axis, v)),
-    "extra_mode": _build_mode,
-    "hand_impedance": _build_hand,
+    "extra_mode": _build_extra_mode,
+    "hand_impedance": _build_hand_impedance,
     "force_gain": lambda b, axis, v: replace(b, gain=_add_on_axis(b.gain, axis, v["gain"] - 1.0)),
     "force_saturation": lambda b, axis, v: replace(b, limit_n=_add_on_axis(b.limit_n, axis, v["limit"])),
     "amplifier_lag": lambda b, axis, v: replace(b, lag_s=v["time_constant"]),
     "transport_delay": lambda b, axis, v: with_delay(b, v["delay"]),
 }
-"""Effects that this engine simulates."""
+"""Effects that MuJoCo simulates, by name."""
 SENSOR_EFFECTS = ("sensor_lag", "sensor_gain")
-"""Effects after the engine, in the same sensor chain."""
+"""Effects of the sensor, which are built into `challenge.sensor` as for other cases."""

@@ -13,7 +13,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TableError, require_rate
 from equalizer.tracking.lqr.tracking_problem import TrackingError
-from equalizer.tracking.realtime.controller_cases import controller_cases
+from equalizer.tracking.realtime.controller_cases import compute_controller_cases
 from equalizer.tracking.realtime.realtime_controller import (
     RealtimeController,
     RealtimeSettings,
@@ -25,7 +25,7 @@ from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.trajectory_file import read_trajectory
-from study.workflows.equalizer.controller.c_text import (
+from study.workflows.equalizer.controller.c_source import (
     CHECK_NAME,
     EXAMPLE_NAME,
     HEADER_NAME,
@@ -85,7 +85,7 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
         _require_force_model(model)
         transient = None if plan.transient is None else _read_transient(plan.transient, model)
         controller = make_realtime_controller(model, transient, plan.settings)
-        cases = controller_cases(controller)
+        cases = compute_controller_cases(controller)
     except (TrackingError, TableError) as problem:
         raise _make_refusal(
             f"{capitalise(str(problem))}.", "Correct what it says, or choose another model."

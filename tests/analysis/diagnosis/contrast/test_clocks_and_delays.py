@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.actuator_faults import SIZE_RANGE, choose_trial_delays_s
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
-from analysis.diagnosis.contrast.bases import bases_of, compute_unexplained_share
+from analysis.diagnosis.contrast.bases import build_bases, compute_unexplained_share
 from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.compared_base import (
     FEWEST_ROWS,
@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.compared_base import (
     compare_base,
     undo_fault_in_rows,
 )
-from analysis.diagnosis.contrast.fault import Rows
+from analysis.diagnosis.contrast.fault import Lags
 from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
 from analysis.diagnosis.contrast.rank_faults import rank_faults
@@ -146,7 +146,7 @@ def test_a_clock_that_begins_anew_with_each_part_is_told_from_one_that_runs_on()
     whole = resample_clock(record_oscillator(2)[0], -0.02, (0, 2500))
     parts = [{"start": 0, "stop": 2500}, {"start": 2500, "stop": 6000}]
     found = suggest_clock_rates(compare_streams([replace(whole, meta={"parts": parts})]))
-    anew = [each for each in found if not each.runs_on]
+    anew = [each for each in found if not each.from_file_start]
     assert min(abs(each.rate + 0.02) for each in anew) < anew[0].step == pytest.approx(0.25 / 3500, rel=0.05)
 
 
@@ -254,7 +254,7 @@ def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
     parts = split_into_parts([record_oscillator(2)[0]])
     compared = compare_base(AutoregressiveBase(0, 24, 1, 1), split_into_parts([record_oscillator(1)[0]]), parts)
     gains = [
-        fault for fault in make_sensor_faults(0, "x", parts, Rows(1, (), 0.0, ())) if fault.effect == "sensor_gain"
+        fault for fault in make_sensor_faults(0, "x", parts, Lags(1, (), 0.0, ())) if fault.effect == "sensor_gain"
     ]
     for variant in gains[0].variants:
         undone = undo_fault_in_rows(compared, compared.faulty, gains[0], variant)
@@ -271,6 +271,6 @@ def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
         for each in (record_oscillator(1)[0], record_oscillator(2)[0])
         for noise in [1e-4 * random.normal(size=6000)]
     ]
-    (base,), _ = next(bases_of(parts[0], parts[1]))
+    (base,), _ = next(build_bases(parts[0], parts[1]))
     assert isinstance(base, AutoregressiveBase) and base.step > 1
     assert compare_base(base, parts[0], parts[1]).faulty.count >= FEWEST_ROWS

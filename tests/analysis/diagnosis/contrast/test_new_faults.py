@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.contrast.actuator_faults import make_actuator_faults
 from analysis.diagnosis.contrast.choose_fault import choose_fault
-from analysis.diagnosis.contrast.fault import Rows
+from analysis.diagnosis.contrast.fault import Lags
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.recording_part import split_into_parts
 from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
@@ -98,7 +98,7 @@ def test_a_drive_that_follows_slowly_is_named(rig):
         given[k] = reached
     part = split_into_parts([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
     (fault,) = [
-        each for each in make_actuator_faults(0, "fx", part, True, Rows(1, (), 0.0, ())) if each.effect == "slew_limit"
+        each for each in make_actuator_faults(0, "fx", part, True, Lags(1, (), 0.0, ())) if each.effect == "slew_limit"
     ]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]

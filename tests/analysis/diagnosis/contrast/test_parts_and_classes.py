@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.contrast.bases import bases_of
+from analysis.diagnosis.contrast.bases import build_bases
 from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, UndoneRows, compare_base
 from analysis.diagnosis.contrast.recording_part import split_into_parts
@@ -14,7 +14,7 @@ from analysis.diagnosis.contrast.recording_part import split_into_parts
 @pytest.fixture(scope="module")
 def compared_base(rig) -> ComparedBase:
     clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
-    return compare_base(next(bases_of(clean, other))[0][0], clean, other)
+    return compare_base(next(build_bases(clean, other))[0][0], clean, other)
 
 
 @pytest.mark.slow
@@ -22,7 +22,7 @@ def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
     clean = split_into_parts([rig.record_rig(1)])
     gap = np.arange(rig.COUNT) == 2500
     with_gap = replace(clean[0], known=clean[0].known & ~gap)
-    (mask,) = compare_base(next(bases_of(clean, ()))[0][0], (with_gap,), clean).clean.masks
+    (mask,) = compare_base(next(build_bases(clean, ()))[0][0], (with_gap,), clean).clean.masks
     assert len(mask) == rig.COUNT
     assert not mask[:REACH].any() and not mask[-REACH:].any()
     assert not mask[2500 - REACH : 2501 + REACH].any()
@@ -37,7 +37,7 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     gone = np.arange(rig.COUNT) % 30 == 0 if lost == "every 30th" else random.random(rig.COUNT) < 0.1
     clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     lossy = replace(other[0], known=other[0].known & ~gone)
-    compared = compare_base(next(bases_of(clean, other))[0][0], clean, (lossy,))
+    compared = compare_base(next(build_bases(clean, other))[0][0], clean, (lossy,))
     assert compared.faulty.count > 0.8 * compared.clean.count
 
 
@@ -46,7 +46,7 @@ def test_a_side_with_too_few_rows_is_not_compared(rig):
     clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
     with pytest.raises(ValueError, match="too few samples"):
-        compare_base(next(bases_of(clean, other))[0][0], clean, (bare,))
+        compare_base(next(build_bases(clean, other))[0][0], clean, (bare,))
 
 
 def test_what_undoing_a_fault_loses_stays_as_it_was(compared_base):

@@ -189,7 +189,7 @@ def test_what_was_chosen_by_other_means_is_fitted_to_all_but_the_held_out_sample
         replace(make_recording(np.zeros((1000, 2))), segments=(make_segment(0, 600), make_segment(600, 1000, "test"))),
         2,
     )
-    whole = observed.fit_to_all()
+    whole = observed.join_fit_and_choose()
     assert (whole.fit == (observed.fit | observed.choose)).all()
     assert whole.fit[:600].all()
     assert (whole.choose == whole.fit).all()

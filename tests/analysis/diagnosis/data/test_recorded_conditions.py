@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, add_mass, has_carried_weight
+from analysis.diagnosis.data.recorded_conditions import add_mass, add_payload, has_payload
 from analysis.diagnosis.errors.choose_measure import make_measure
 from equalizer.effects.simulation.simulator import simulate_mechanism
 
@@ -43,12 +43,12 @@ def test_the_weight_of_one_recording_is_not_that_of_another(recordings, diagnose
     model, told = diagnosed.device(1), replace(heavy, meta={"added_mass_kg": ADDED_KG})
     measure = make_measure([bare, told], model).measure
     assert all(np.sqrt(np.mean(left**2)) < 1.2 for left in measure.residuals(model, ()))
-    assert (has_carried_weight([bare]), has_carried_weight([bare, told])) == (False, True)
+    assert (has_payload([bare]), has_payload([bare, told])) == (False, True)
 
 
 def test_a_recording_that_says_nothing_leaves_the_model_as_it_is(recordings, diagnosed):
     model = diagnosed.device(1)
-    assert add_carried_weight(model, recordings[0]) is model
+    assert add_payload(model, recordings[0]) is model
 
 
 @pytest.mark.parametrize(

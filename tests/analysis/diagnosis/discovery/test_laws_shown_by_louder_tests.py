@@ -16,7 +16,7 @@ from analysis.diagnosis.discovery.validation import (
     is_confirmed_on_held_out,
 )
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
-from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
+from analysis.diagnosis.errors.law_hypothesis import make_law_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.verdict import SearchResult, judge
@@ -153,7 +153,7 @@ def test_a_steep_power_is_a_candidate_only(search_result):
     context, _, found = search_result
 
     def list_objections(exponent: int) -> list[str]:
-        steep = hypothesis_of_law(law(f"p0*x**{exponent}", -1e3), 0, context.measure.records[0].recording)
+        steep = make_law_hypothesis(law(f"p0*x**{exponent}", -1e3), 0, context.measure.records[0].recording)
         deviations = found.explanation.after.fitted.deviations
         after = context.with_test_score(
             context.score_fit(evaluate_fit(context.measure, context.tuning, deviations, steep))

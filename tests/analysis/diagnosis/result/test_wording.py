@@ -242,10 +242,10 @@ def test_the_next_recording_says_what_it_would_tell_apart():
     ],
 )
 def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
-    said = describe_black_box(BlackBox("ARX", 12, test, physics), named=True)
+    said = describe_black_box(BlackBox("ARX", 12, test, physics), is_effect_named=True)
     assert said.startswith("A black box (ARX, 12 parameters), fitted to the same samples, has an error of")
     assert said.endswith(end)
-    assert "the re-tuned model has" in describe_black_box(BlackBox("ARX", 12, test, physics), named=False)
+    assert "the re-tuned model has" in describe_black_box(BlackBox("ARX", 12, test, physics), is_effect_named=False)
 
 
 def test_held_out_data_that_do_not_confirm_are_said_not_to():

@@ -69,7 +69,7 @@ def test_the_milder_part_is_opened_only_where_the_loudest_can_confirm(sweep_reco
 
 def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(sweep_recording):
     record = observe(sweep_recording, 1)
-    opened = record.unseal(record.mask_alternate_parts(2))
+    opened = record.release_test_samples(record.mask_alternate_parts(2))
     both = opened.fit | opened.choose
     assert not (both & opened.test).any()
     assert (both | opened.test).sum() == (record.fit | record.choose | record.test).sum()

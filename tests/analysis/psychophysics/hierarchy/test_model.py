@@ -12,7 +12,7 @@ from analysis.psychophysics.hierarchy.curve import (
     TARGET_PROPORTION,
     Family,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
@@ -35,18 +35,22 @@ def answers():
 @pytest.mark.parametrize("family", list(Family))
 def test_a_curve_passes_through_the_target_and_has_the_stated_slopes(family):
     t = np.linspace(-4.0, 2.0, 41)
-    q, q1, q2 = compute_sensitivity(t, family)
+    q, q1, q2 = differentiate_evidence(t, family)
     np.testing.assert_allclose(norm.cdf(q), 0.5 + SHARES[family](t) / 2, rtol=1e-9)
     np.testing.assert_allclose(
-        q1, (compute_sensitivity(t + 1e-6, family)[0] - compute_sensitivity(t - 1e-6, family)[0]) / 2e-6, 1e-5
+        q1,
+        (differentiate_evidence(t + 1e-6, family)[0] - differentiate_evidence(t - 1e-6, family)[0]) / 2e-6,
+        1e-5,
     )
     np.testing.assert_allclose(
-        q2, (compute_sensitivity(t + 1e-5, family)[1] - compute_sensitivity(t - 1e-5, family)[1]) / 2e-5, 1e-4
+        q2,
+        (differentiate_evidence(t + 1e-5, family)[1] - differentiate_evidence(t - 1e-5, family)[1]) / 2e-5,
+        1e-4,
     )
-    assert norm.cdf(compute_sensitivity(np.array([T_AT_THRESHOLD[family]]), family)[0][0]) == pytest.approx(
+    assert norm.cdf(differentiate_evidence(np.array([T_AT_THRESHOLD[family]]), family)[0][0]) == pytest.approx(
         TARGET_PROPORTION
     )
-    assert all(np.isfinite(part).all() for part in compute_sensitivity(np.array([-700.0, 700.0]), family))
+    assert all(np.isfinite(part).all() for part in differentiate_evidence(np.array([-700.0, 700.0]), family))
 
 
 def test_a_share_runs_from_lapse_to_lapse():
@@ -108,7 +112,7 @@ def test_information_is_what_the_curvature_is_on_average(answers):
     t = T_AT_THRESHOLD[Family.WEIBULL] + np.exp(0.7) * NEPER_PER_DB * (
         answers.level_db - latent[:, :k].ravel()[answers.run]
     )
-    share = lapse + (1 - 2 * lapse) * ndtr(compute_sensitivity(t, Family.WEIBULL)[0] - answers.side * 0.1)
+    share = lapse + (1 - 2 * lapse) * ndtr(differentiate_evidence(t, Family.WEIBULL)[0] - answers.side * 0.1)
     n = answers.right + answers.wrong
     expected = replace(answers, right=n * share, wrong=n * (1 - share))  # the curvature is linear in the counts
     found = TrialLikelihood(expected, Family.WEIBULL).evaluate(latent, lapse)

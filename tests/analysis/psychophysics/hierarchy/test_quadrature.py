@@ -9,7 +9,7 @@ from analysis.psychophysics.hierarchy.curve import (
     T_AT_THRESHOLD,
     Family,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.nodes import FINE_COUNTS, NodeCounts, compute_laplace_moments
@@ -42,7 +42,7 @@ def grid_integral(answers, person, numbers, family=Family.WEIBULL):
             for place, theta in enumerate(thetas):
                 cells = answers.run == 2 * person + place
                 t = T_AT_THRESHOLD[family] + np.exp(b) * NEPER_PER_DB * (answers.level_db[cells] - theta[:, None])
-                p = compute_proportion_correct(compute_sensitivity(t, family)[0] - c * answers.side[cells], lapse)
+                p = compute_proportion_correct(differentiate_evidence(t, family)[0] - c * answers.side[cells], lapse)
                 rows.append(np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells])
             terms = log_prior + rows[0][:, None] + rows[1]
             high = terms.max()

@@ -14,7 +14,7 @@ from analysis.psychophysics.hierarchy.curve import (
     T_AT_THRESHOLD,
     Family,
     compute_proportion_correct,
-    compute_sensitivity,
+    differentiate_evidence,
 )
 from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, _compute_likelihood_on_grid
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
@@ -56,7 +56,7 @@ def test_what_is_not_known_is_averaged_over_as_an_integral_does_it():
 
     def likelihood(u: float) -> float:
         t = np.array([T_AT_THRESHOLD[Family.WEIBULL] - 2.0 * np.exp(u) * NEPER_PER_DB * grid[at]])
-        p = compute_proportion_correct(compute_sensitivity(t, Family.WEIBULL)[0], 0.02)[0]
+        p = compute_proportion_correct(differentiate_evidence(t, Family.WEIBULL)[0], 0.02)[0]
         return p**4 * (1 - p) ** 2 * norm.pdf(u, scale=0.4)
 
     assert np.exp(height[at]) == pytest.approx(quad(likelihood, -3, 3)[0], rel=1e-3)

@@ -14,7 +14,7 @@ from protocols.trial import Phase
 from study.participants.delivered_feeler import MPS2_PER_N, DeliveredFeeler
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus
-from study.session.stimulus.delivered import Delivered
+from study.session.stimulus.delivered import DeliveredMotion
 from tests.analysis.conftest import PUBLISHED
 
 HZ = 25.0
@@ -38,7 +38,7 @@ def reference_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
         level_n, table = 10.0 ** (level_db / 20.0), np.array(delivery.tables[0][direction - 1])
         along, across, harmonics = (np.interp(level_db, table[:, 0], table[:, place]) for place in (1, 2, 3))
         flawless = PER_NEWTON * level_n
-        measured = Delivered(along * flawless, across * flawless, 0.1, harmonics * flawless)
+        measured = DeliveredMotion(along * flawless, across * flawless, 0.1, harmonics * flawless)
         felt = PerceivedStimulus(0, trial, 0, Phase.TEST, HZ, level_n, direction, trial, delivered=measured)
         right = random.random_sample() < observer.compute_proportion_correct(felt)
         found.append((level_db, direction, right))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family, compute_sensitivity
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family, differentiate_evidence
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, simulate_study
 from analysis.psychophysics.power.staircase_kernel import (
     MOST_TRIALS,
@@ -51,7 +51,7 @@ def test_levels_and_reversals_are_those_of_step(rule, threshold_n):
 def test_the_compiled_evidence_is_that_of_the_analysis(family):
     t = np.linspace(-8.0, 3.0, 45)
     compiled = [compute_evidence(x, FAMILIES.index(family)) for x in t]
-    np.testing.assert_allclose(compiled, compute_sensitivity(t, family)[0], atol=1e-7)
+    np.testing.assert_allclose(compiled, differentiate_evidence(t, family)[0], atol=1e-7)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -59,7 +59,7 @@ def test_far_above_threshold_errors_become_as_rare_as_the_family_says(family):
     """Beyond t = 3.2 too, where only a Weibull participant is sure: a logistic one still errs in 2 %."""
     t = np.linspace(0.0, 10.0, 51)
     errors = norm.sf([compute_evidence(x, FAMILIES.index(family)) for x in t])
-    np.testing.assert_allclose(errors, norm.sf(compute_sensitivity(t, family)[0]), rtol=1e-6, atol=1.2e-11)
+    np.testing.assert_allclose(errors, norm.sf(differentiate_evidence(t, family)[0]), rtol=1e-6, atol=1.2e-11)
 
 
 def test_shares_are_those_of_the_model_with_lapses_and_a_criterion():
@@ -73,7 +73,7 @@ def test_shares_are_those_of_the_model_with_lapses_and_a_criterion():
         for index, sign in enumerate((1.0, -1.0)):
             shown = side[:n] == sign
             counts[index] += shown.sum(), right[:n][shown].sum()
-    q = compute_sensitivity(np.array([T_AT_THRESHOLD[Family.WEIBULL]]), Family.WEIBULL)[0][0]
+    q = differentiate_evidence(np.array([T_AT_THRESHOLD[Family.WEIBULL]]), Family.WEIBULL)[0][0]
     expected = 0.05 + 0.9 * norm.cdf([q - 0.4, q + 0.4])
     error = np.sqrt(expected * (1 - expected) / counts[:, 0])
     assert np.all(np.abs(counts[:, 1] / counts[:, 0] - expected) < 4 * error)

@@ -27,7 +27,7 @@ def test_a_device_that_couples_everywhere_has_no_low_band():
 def test_bands_follow_each_other_and_say_why():
     bands = compute_frequency_bands(10.5)
     assert [band.high_hz for band in bands[:-1]] == [band.low_hz for band in bands[1:]]
-    assert all(band.method and band.why.endswith(".") for band in bands)
+    assert all(band.method and band.reason.endswith(".") for band in bands)
 
 
 def test_a_limit_outside_the_range_is_refused():

@@ -76,9 +76,9 @@ def in_time(device):
     """(played by the true device, wanted), rows one to one."""
 
     def play(found, wanted):
-        late = np.zeros_like(found.entering)
-        late[found.rows_of_wanted(len(wanted))] = wanted
-        return device.play(found.entering), late
+        late = np.zeros_like(found.total_forces)
+        late[found.find_reference_rows(len(wanted))] = wanted
+        return device.play(found.total_forces), late
 
     return play
 
@@ -119,7 +119,7 @@ def test_the_split_leaves_the_middle_band_flat_and_without_coupling(device, band
     for axis in range(3):
         wanted = wave[:, None] * np.eye(3)[axis]
         found = equalizer.compute_forces(wanted)
-        middle = device.play(found.entering)[found.rows_of_wanted(len(wanted))][period : 2 * period]
+        middle = device.play(found.total_forces)[found.find_reference_rows(len(wanted))][period : 2 * period]
         delivered[:, :, axis] = np.fft.rfft(middle, axis=0)[lines] / spectrum[lines, None]
     found = measure_quality(delivered)
     assert found.flatness_db <= 0.1
@@ -152,18 +152,18 @@ def test_the_predicted_acceleration_is_that_of_the_device(band_model, low, high,
     found = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0), low, high).compute_forces(impact)
     played, _ = in_time(found, impact)
     assert np.linalg.norm(found.predicted_total - played) < 1e-3 * np.linalg.norm(played)
-    assert np.allclose(sum(found.by_band), found.entering)
+    assert np.allclose(sum(found.by_band), found.total_forces)
 
 
 @pytest.mark.slow
 def test_above_the_cap_is_refused_or_solved_for(band_model, high, impact):
     equalizer = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(None, 36.0), RATE_HZ, 8.0), None, high)
     free = equalizer.compute_forces(impact)
-    peak_n = float(np.linalg.norm(free.entering, axis=1).max())
+    peak_n = float(np.linalg.norm(free.total_forces, axis=1).max())
     with pytest.raises(ForceLimitError, match="nothing was clipped"):
         equalizer.compute_forces(impact, CapPolicy(0.8 * peak_n))
     capped = equalizer.compute_forces(impact, CapPolicy(0.8 * peak_n, constrain=True))
-    assert np.linalg.norm(capped.entering, axis=1).max() <= 0.8 * peak_n
+    assert np.linalg.norm(capped.total_forces, axis=1).max() <= 0.8 * peak_n
     assert capped.loss.error_free < capped.loss.error_capped < capped.loss.error_clipped
     assert equalizer.compute_forces(impact, CapPolicy(1.01 * peak_n)).peaks.is_under_cap
 
@@ -191,13 +191,13 @@ def test_the_rendered_spring_is_left_its_part(band_model, low, high):
     wanted = (np.sin(2 * np.pi * 10 * t) * np.hanning(2000))[:, None] * np.array([1.0, 0, 0])
     split = LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0)
     found = BandedEqualizer(band_model, split, low, high, spring=spring).compute_forces(wanted)
-    by_spring = (found.entering - found.commands)[found.rows_of_wanted(2000)]
+    by_spring = (found.total_forces - found.commands)[found.find_reference_rows(2000)]
     turning = np.exp(-2j * np.pi * 10 * t)
     expected = spring.compute_force_per_acceleration(np.array([10.0]))[0] * (turning @ wanted[:, 0])
     assert abs(turning @ by_spring[:, 0] - expected) < 0.01 * abs(expected)
     bare = BandedEqualizer(band_model, split, low, high).compute_forces(wanted)
-    assert np.array_equal(bare.commands, bare.entering)
-    assert np.allclose(bare.entering, found.entering)
+    assert np.array_equal(bare.commands, bare.total_forces)
+    assert np.allclose(bare.total_forces, found.total_forces)
 
 
 @pytest.mark.parametrize(

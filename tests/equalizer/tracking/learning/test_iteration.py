@@ -177,7 +177,7 @@ def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetitio
 def test_a_correction_that_is_always_wrong_ends_as_diverging(plants, repetition, wanted):
     plant = plants.omega_like()
     wrong = Repetition(wanted, lambda rows: -2 * repetition.invert(rows), RATE_HZ, BAND_HZ, noise_floor=0.01)
-    state = start_iteration(wrong, first=0.5 * repetition.invert(wanted))
+    state = start_iteration(wrong, initial_forces=0.5 * repetition.invert(wanted))
     for play in range(10):
         if state.verdict is not Verdict.CONTINUE:
             break

@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingError
-from equalizer.tracking.realtime.controller_cases import controller_cases
+from equalizer.tracking.realtime.controller_cases import compute_controller_cases
 from equalizer.tracking.realtime.realtime_controller import (
     RealtimeSettings,
     make_default_transient,
@@ -47,14 +47,14 @@ def test_a_stream_is_played_late_by_its_preview_less_a_sample(device_model):
 def test_the_transient_is_the_best_forces_for_the_table_with_room_behind_it(controller, device_model):
     wanted = np.pad(make_default_transient(device_model), ((0, 300), (0, 0)))
     assert len(controller.transient) == len(wanted)
-    cases = controller_cases(controller, seed=5)
+    cases = compute_controller_cases(controller, seed=5)
     best = track(compute_stored_gains(controller.problem, len(wanted)), wanted)
     np.testing.assert_allclose(np.einsum("kmc,c->km", controller.transient.g, np.eye(3).ravel())[0], best.forces[0])
     assert len(cases) > len(wanted)
 
 
 def test_cases_stay_below_the_cap_and_come_near_to_it(controller):
-    cases = controller_cases(controller, seed=5)
+    cases = compute_controller_cases(controller, seed=5)
     for forces in (cases.transient_forces, cases.stream_forces):
         assert 0.8 * controller.cap_n < np.linalg.norm(forces, axis=1).max() < controller.cap_n
     assert np.abs(cases.low).max() > 0.01 and np.abs(cases.high).max() > 0.01
@@ -65,10 +65,10 @@ def test_a_transient_of_nothing_is_refused_and_a_faint_one_is_not(device_model):
     faint = make_realtime_controller(
         device_model, 1e-9 * make_default_transient(device_model), RealtimeSettings(preview_s=0.05)
     )
-    assert np.isfinite(controller_cases(faint).rotations).all()
+    assert np.isfinite(compute_controller_cases(faint).rotations).all()
     silent = make_realtime_controller(device_model, np.zeros((40, 3)), RealtimeSettings(preview_s=0.05))
     with pytest.raises(TrackingError, match="the transient comes to no force"):
-        controller_cases(silent)
+        compute_controller_cases(silent)
 
 
 @pytest.mark.parametrize("wrong", [{"preview_s": -0.1}, {"preview_s": np.nan}, {"cap_n": 0.0}, {"cap_n": np.inf}])

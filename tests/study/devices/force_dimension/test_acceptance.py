@@ -11,7 +11,7 @@ import pytest
 from study.cli.main import main
 from study.devices.clock import RealClock
 from study.devices.force_dimension import force_limit_check, loop_cells, watchdog_check
-from study.devices.force_dimension.acceptance import VALID_FOR, acceptance_file
+from study.devices.force_dimension.acceptance import VALID_FOR, locate_acceptance_file
 from study.devices.governor import cells
 from study.devices.opening import accept_device, examine_device, open_device
 from study.errors import DeviceError
@@ -20,7 +20,7 @@ from study.workflows.checks import examine_setup
 
 @pytest.fixture
 def locked(stub):
-    acceptance_file().unlink()
+    locate_acceptance_file().unlink()
     return stub
 
 
@@ -98,7 +98,7 @@ def test_an_acceptance_expires_and_must_not_be_dated_in_the_future(stub, vendor,
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "hapteq-acceptance"}', "null", "\x00"])
 def test_a_file_that_is_no_acceptance_unlocks_nothing(stub, rigs, text):
-    acceptance_file().write_text(text)
+    locate_acceptance_file().write_text(text)
     assert "is no acceptance" in refused(rigs)
 
 
@@ -120,7 +120,7 @@ def patient(stub, monkeypatch):
 def test_a_device_that_lets_go_under_force_is_accepted_and_then_opens(locked, patient, rigs):
     said = accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert "a force of 0.5 N was gone" in said
-    document = json.loads(acceptance_file().read_text())
+    document = json.loads(locate_acceptance_file().read_text())
     assert (document["operator"], document["device"], document["force_n"]) == ("Ada", "omega.3", 0.5)
     assert 0.25 < document["gone_after_s"] < 2.0
     assert (document["asked_n"], document["most_given_n"]) == (1.0, pytest.approx(0.5))
@@ -160,7 +160,7 @@ def test_a_device_that_gets_more_than_its_cap_is_not_accepted(locked, patient, r
     with pytest.raises(DeviceError, match="was not accepted") as no:
         accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert said in no.value.happened
-    assert not acceptance_file().exists()
+    assert not locate_acceptance_file().exists()
     assert locked.safe and locked.get("peak_n") <= 1.1
 
 
@@ -183,7 +183,7 @@ def test_a_device_whose_force_stays_on_is_not_accepted(locked, patient, rigs, mo
     monkeypatch.setattr(force_limit_check, "check_force_vanishes", broken)
     with pytest.raises(DeviceError, match="was not accepted"):
         accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
-    assert not acceptance_file().exists()
+    assert not locate_acceptance_file().exists()
     assert locked.safe and locked.get("peak_n") < 1.0
 
 
@@ -197,7 +197,7 @@ def test_without_timing_or_after_a_failed_check_no_acceptance_is_written(locked,
         main(["doctor", "--device", "omega3", "--data", str(tmp_path), "--accept", "Ada", "--hands-off", *arguments])
         == 3
     )
-    assert not called and not acceptance_file().exists()
+    assert not called and not locate_acceptance_file().exists()
     assert locked.safe
 
 

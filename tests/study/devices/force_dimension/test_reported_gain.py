@@ -15,7 +15,7 @@ from study.devices.force_dimension.loop_cells import (
     REPORTED_FORCE,
     check_status,
 )
-from study.devices.force_dimension.tick_io import LOOKS_AT, LOOKS_OF
+from study.devices.force_dimension.tick_io import STATUS_CHECK_TICKS, STATUS_CYCLE_TICKS
 
 AMPLITUDES_N = (0.2, 0.25, 0.3, 0.5, 1.0, 1.9, 3.0)
 FREQUENCIES_HZ = (5, 7, 12.5, 20, 25, 30, 35, 40, 45, 50, 80, 1000 / 14, 1000 / 21, 1000 / 22, 1000 / 42)
@@ -30,7 +30,7 @@ def suspected_after(force, told):
     it."""
     cells = np.zeros(CELLS_SIZE)
     for tick in range(force.shape[0]):
-        if tick % LOOKS_OF in LOOKS_AT:
+        if tick % STATUS_CYCLE_TICKS in STATUS_CHECK_TICKS:
             cells[REPORTED_FORCE : REPORTED_FORCE + 3] = told[tick]
             add_to_sums(cells)
             if gain_is_off(cells):
@@ -75,7 +75,7 @@ def status_checks(stepped_stub, axis: int, amplitude_n: float) -> int:
     with contextlib.closing(stepped_stub.rig()) as rig:
         calls, cells = rig.halves.calls, rig.halves.cells
         for tick in range(2500):
-            if tick % LOOKS_OF in LOOKS_AT:
+            if tick % STATUS_CYCLE_TICKS in STATUS_CHECK_TICKS:
                 code: int = check_status(calls, cells)
                 if code:
                     return code

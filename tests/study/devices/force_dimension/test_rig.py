@@ -11,7 +11,7 @@ import pytest
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
 from study.devices.force_dimension.library import LibraryError
-from study.devices.force_dimension.tick_io import SCALED_FOR, STALE_FOR
+from study.devices.force_dimension.tick_io import MAX_SCALED_FORCES, MAX_STALE_READINGS
 from study.devices.rig import ACCELERATION, POSITION, SENSOR_CLIPPED, TRUE_ACCELERATION
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -71,10 +71,10 @@ def test_the_library_knows_the_cap_too(stepped_stub, rig):
 
 def test_a_repeated_reading_is_accepted_and_many_in_a_row_end_the_force(stepped_stub, rig):
     stepped_stub.set("stale_every", 2)
-    for _ in range(4 * STALE_FOR):
+    for _ in range(4 * MAX_STALE_READINGS):
         rig.sense()
     stepped_stub.set("stale_every", 1)
-    for _ in range(STALE_FOR - 2):
+    for _ in range(MAX_STALE_READINGS - 2):
         rig.sense()
     with pytest.raises(DeviceError, match="repeatedly reports the same position"):
         for _ in range(3):
@@ -87,7 +87,7 @@ def test_a_briefly_scaled_force_is_accepted_and_a_long_one_ends_the_force(steppe
     for _ in range(1000):
         rig.write(force(1.0, 0.0, 0.0))
     stepped_stub.set("scaled_every", 1)
-    for _ in range(SCALED_FOR - 1):
+    for _ in range(MAX_SCALED_FORCES - 1):
         rig.write(force(1.0, 0.0, 0.0))
     with pytest.raises(DeviceError, match="cannot give the commanded force"):
         rig.write(force(1.0, 0.0, 0.0))

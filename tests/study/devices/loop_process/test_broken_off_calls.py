@@ -12,7 +12,7 @@ from dataclasses import replace
 import pytest
 
 from study.devices.device import Fault, PlaybackResult
-from study.devices.loop_process import line, remote_device, start
+from study.devices.loop_process import call_pipe, remote_device, start
 from study.errors import DeviceError
 from tests.study.devices.loop_process.awaited import LATEST_S, becomes, runs
 
@@ -68,7 +68,7 @@ def test_a_stop_that_is_not_answered_kills_the_process_without_a_grace(
     behind, served, rigs, hang, monkeypatch, impatient
 ):
     monkeypatch.setattr(behind, "stop", hang.wait)
-    monkeypatch.setattr(line, "GRACE_S", 3600.0)
+    monkeypatch.setattr(call_pipe, "GRACE_S", 3600.0)
     device = served.remote(behind, rigs.SETTINGS)
     device.hold(rigs.push())
     with device._loss_lock:  # as a call that waits for the end of a process that hung up
@@ -137,7 +137,7 @@ def test_an_interruption_while_the_process_starts_leaves_none(rigs, monkeypatch)
     started: list[subprocess.Popen] = []
     really = start._start_process
     monkeypatch.setattr(start, "_start_process", lambda *ends: started.append(really(*ends)) or started[0])
-    monkeypatch.setattr(start, "Line", interrupted)
+    monkeypatch.setattr(start, "CallPipe", interrupted)
     with pytest.raises(KeyboardInterrupt):
         remote_device.open_remotely("omega3", rigs.SETTINGS, 1)
     assert started[0].wait(LATEST_S) == -signal.SIGKILL
@@ -188,7 +188,7 @@ serve.open_device = hang if where == "open" else lambda *arguments, **named: dev
 serve.EXIT_GRACE_S = 0.5
 if where == "exit":
     atexit.register(hang)
-pairs = [Pipe() for _ in serve.LINE_NAMES]
+pairs = [Pipe() for _ in serve.PIPE_NAMES]
 pairs[0][0].send(("open", ("omega3", settings, 1, "")))
 serve.run(0, *[end.fileno() for _, end in pairs])
 """

@@ -7,7 +7,7 @@ import pytest
 
 from study.devices.device import Fault
 from study.devices.loop_process import start
-from study.devices.loop_process.line import VALUE, Line, LoopGoneError
+from study.devices.loop_process.call_pipe import VALUE, CallPipe, LoopGoneError
 from study.devices.loop_process.start import LoopProcess
 from study.errors import DeviceError
 
@@ -16,9 +16,9 @@ from study.errors import DeviceError
 def pipe():
     """A line, and the other end of its pipe."""
     ours, theirs = Pipe()
-    line = Line(ours, "test")
+    line = CallPipe(ours, "test")
     yield line, theirs
-    line.end()
+    line.close_after_calls()
     theirs.close()
 
 
@@ -70,14 +70,14 @@ def test_a_process_that_cannot_be_killed_is_not_said_to_be_gone(monkeypatch):
 def test_a_release_whose_answer_came_with_an_interruption_is_asked_for_again(device, rigs, monkeypatch):
     device.hold(rigs.push())
     device.keep_alive()
-    noted, answered = device._note_health, []
+    noted, answered = device._store_health, []
 
     def interrupted(health) -> None:
         answered.append(health)
-        monkeypatch.setattr(device, "_note_health", noted)
+        monkeypatch.setattr(device, "_store_health", noted)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(device, "_note_health", interrupted)
+    monkeypatch.setattr(device, "_store_health", interrupted)
     with pytest.raises(KeyboardInterrupt):
         device.release()
     assert [device.release().health] == answered
@@ -107,7 +107,7 @@ def test_why_an_answer_cannot_be_read_is_said(pipe):
 def test_a_call_after_the_end_of_its_line_is_refused_at_once(pipe, monkeypatch):
     line, theirs = pipe
     waiting = line.queue_call("ask")
-    line.end()
+    line.close_after_calls()
     queued = line.queue_call("ask")
     theirs.send((VALUE, 7))
     assert waiting.wait_for_answer(20.0) == 7

@@ -270,7 +270,7 @@ import gc, os, pickle, sys, threading
 from multiprocessing import Pipe
 from study.devices.loop_process import serve
 settings = pickle.load(sys.stdin.buffer)
-pairs = [Pipe() for _ in serve.LINE_NAMES]
+pairs = [Pipe() for _ in serve.PIPE_NAMES]
 ours = [end for end, _ in pairs]
 
 def ask() -> None:

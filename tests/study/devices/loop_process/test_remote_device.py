@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from study.devices.device import Fault
-from study.devices.loop_process import line
+from study.devices.loop_process import call_pipe
 from study.devices.loop_process.serve import DeviceServer
 from study.errors import DeviceError, WrongUseError
 from tests.slow_instances import slow_rows
@@ -177,7 +177,7 @@ def test_only_what_a_stop_and_a_sign_of_life_wait_for_goes_before_other_programs
         first.append(threading.current_thread().name)
         yield
 
-    pairs = [Pipe() for _ in line.LINE_NAMES]
+    pairs = [Pipe() for _ in call_pipe.PIPE_NAMES]
     server = DeviceServer(behind, tuple(theirs for _, theirs in pairs), raise_thread_priority=noted)
     server.start()
     for ours, _ in pairs:

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from study.evaluation.bank.ask_engine import MAX_ATTEMPTS, Engine
+from study.evaluation.bank.ask_engine import MAX_ATTEMPTS, DiagnosisProcess
 from study.evaluation.bank.proof_folder import ProofFolder
 
 DYING = "import os, sys, time; sys.stdin.readline(); os.close(1); time.sleep(60)"
@@ -13,7 +13,7 @@ DYING = "import os, sys, time; sys.stdin.readline(); os.close(1); time.sleep(60)
 ANSWERING = "import sys; [print(line, end='', flush=True) for line in sys.stdin]"
 
 
-class Replaced(Engine):
+class Replaced(DiagnosisProcess):
     """Starts these programs, one after another, and the last again and again."""
 
     def __init__(self, folder, programs):

@@ -9,7 +9,7 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from study.cli.main import main
 from study.errors import StudyError
 from study.evaluation.kit.lab_kit import seal_labels
-from study.evaluation.kit.score_kit import score_kit, score_lines
+from study.evaluation.kit.score_kit import format_score_lines, score_kit
 from study.store.formats.diagnosis_file import write_diagnosis
 
 LABELS = (
@@ -52,7 +52,7 @@ def test_what_was_sealed_is_scored(tmp_path: Path) -> None:
     score = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv")
     assert [row.right for row in score.rows] == [True, True, False, False]
     assert score.rows[0].inside is True
-    lines = score_lines(score)
+    lines = format_score_lines(score)
     assert lines[0].startswith("changes named: 1 of 3, 33 %")
     assert lines[1].startswith("nothing changed, nothing named: 1 of 1, 100 %")
     assert "Missed: rec_03, tilted_sensor: explained, named sensor_gain." in lines
@@ -133,7 +133,7 @@ def test_the_hash_that_was_handed_over_needs_no_file_beside_the_table(tmp_path: 
     (tmp_path / "labels.csv.sha256").unlink()
     folder = answered(tmp_path / "d", {"rec_01": diagnosis("added_mass")})
     pasted = f" {digest.upper()}  labels.csv\n"
-    last = score_lines(score_kit(table, folder, tmp_path / "score.csv", pasted))[-1]
+    last = format_score_lines(score_kit(table, folder, tmp_path / "score.csv", pasted))[-1]
     assert last == f"Labels: SHA-256 {digest}, the hash that --seal gives."
 
 
@@ -141,7 +141,7 @@ def test_without_the_hash_it_is_said_that_only_the_file_beside_was_compared(tmp_
     table = labels_in(tmp_path)
     digest = seal_labels(table)
     folder = answered(tmp_path / "d", {"rec_01": diagnosis("added_mass")})
-    last = score_lines(score_kit(table, folder, tmp_path / "score.csv"))[-1]
+    last = format_score_lines(score_kit(table, folder, tmp_path / "score.csv"))[-1]
     assert last.startswith(f"Labels: SHA-256 {digest}, compared only with labels.csv.sha256 in the same folder")
     assert "give --seal the hash" in last
 

@@ -9,9 +9,9 @@ from scipy.signal import cont2discrete, lfilter
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder, diagnose_sent_recording
-from study.evaluation.real.real_summary import real_lines
+from study.evaluation.real.real_summary import format_real_lines
 from study.evaluation.real.write_real import INJECTED_TABLE_NAME, RealResults, write_real_results
-from study.importing.model_library import list_shipped_models, model_for
+from study.importing.model_library import find_model_path, list_shipped_models
 from study.store.disk.folder_contents import read_files, write_files
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.real_answer_file import read_real_answer
@@ -53,7 +53,7 @@ def test_one_recording_is_answered_and_the_others_are_reported(folder: Path, tmp
     assert "It is simulated." in page and "without_map" in page
     assert done.table.read_text().splitlines()[1].startswith(f"axis,run,{axis.verdict},sensor_offset")
     assert (tmp_path / "out" / "figures" / "held-out-axis-run.svg").is_file()
-    assert any("sensor_offset" in line for line in real_lines(done))
+    assert any("sensor_offset" in line for line in format_real_lines(done))
     kept = tmp_path / "out" / "axis" / "run" / "answer.json"
     assert read_real_answer(kept) == axis
     assert validate_file(kept).kind.startswith("answer to the real recording run of axis")
@@ -166,9 +166,9 @@ def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_an_unknown_model_is_refused_with_the_names_of_known_ones(tmp_path: Path) -> None:
     with pytest.raises(StudyError) as refusal:
-        model_for("haptic_padle", tmp_path)
+        find_model_path("haptic_padle", tmp_path)
     assert "haptic_paddle" in refusal.value.happened
-    assert all(model_for(name, tmp_path).is_file() for name in list_shipped_models())
+    assert all(find_model_path(name, tmp_path).is_file() for name in list_shipped_models())
 
 
 @pytest.mark.slow
@@ -182,7 +182,7 @@ def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Pa
     assert len((tmp_path / "out" / "injected" / "labels.sha256").read_text().splitlines()) == 1
     assert not any(each.failed for each in done.results.injected)
     assert "Faults injected into real recordings" in done.page.read_text()
-    assert any(line.startswith("Injected: ") for line in real_lines(done))
+    assert any(line.startswith("Injected: ") for line in format_real_lines(done))
 
 
 def test_a_table_of_faults_of_an_earlier_run_is_removed(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from study.importing.arrays.json_arrays import is_own_document
+from study.importing.arrays.json_arrays import is_hapteq_document
 from study.importing.arrays.read_arrays import read_arrays
 from study.importing.header_map import describe_header_choices, make_header_map
 from study.importing.map_format.import_map import CsvMap
@@ -107,8 +107,8 @@ def test_what_cannot_be_read_is_refused_in_words(tmp_path, content, said):
 def test_a_document_of_ours_is_told_from_a_table(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps(RECORDS))
     (tmp_path / "d.json").write_text(json.dumps({"format": "hapteq-diagnosis", "version": 1}))
-    assert not is_own_document(tmp_path / "a.json")
-    assert is_own_document(tmp_path / "d.json")
+    assert not is_hapteq_document(tmp_path / "a.json")
+    assert is_hapteq_document(tmp_path / "d.json")
 
 
 def test_records_with_keys_of_their_own_are_refused_at_once(tmp_path):

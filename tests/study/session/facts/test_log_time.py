@@ -66,7 +66,7 @@ class Computer:
 
     @property
     def steps_h(self) -> list[float]:
-        return [round(step.by_s / H, 3) for step in self.state.sitting.clock_steps]
+        return [round(step.step_s / H, 3) for step in self.state.sitting.clock_steps]
 
     def limit(self) -> str:
         return find_reached_limit(self.state, self.utc, self.stamp)

@@ -11,7 +11,7 @@ import pytest
 
 from study.errors import ExitCode
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import AlreadyThereError, CannotWriteError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError
 
 REPOSITORY = Path(__file__).parents[4]
 
@@ -58,7 +58,7 @@ def test_a_file_gets_the_usual_rights(tmp_path):
 def test_nothing_existing_is_overwritten_unless_asked_for(tmp_path):
     path = tmp_path / "a.txt"
     write_atomically(path, b"one")
-    with pytest.raises(AlreadyThereError, match=r"a\.txt already exists. Nothing that exists is overwritten"):
+    with pytest.raises(AlreadyExistsError, match=r"a\.txt already exists. Nothing that exists is overwritten"):
         write_atomically(path, b"two")
     assert path.read_bytes() == b"one"
     write_atomically(path, b"two", overwrite=True)

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
+from study.store.disk.file_errors import AlreadyExistsError, UnusableFileError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import gather_provenance
 
@@ -25,7 +25,7 @@ def test_a_document_keeps_its_provenance(path):
 
 def test_nothing_existing_is_overwritten_unless_asked_for(path):
     write_json(path, "hapteq-anova", 1, {"f": 1})
-    with pytest.raises(AlreadyThereError):
+    with pytest.raises(AlreadyExistsError):
         write_json(path, "hapteq-anova", 1, {"f": 2})
     write_json(path, "hapteq-anova", 1, {"f": 2}, overwrite=True)
     assert read_json(path, "hapteq-anova", 1) == {"f": 2}

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from study.cli.main import app
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.requests import NoteAsked
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.privacy import close_to_others, format_data_folder_warning, is_open_to_others, make_folder
@@ -23,7 +23,7 @@ from study.workflows.session.plan_sitting import plan_sitting
 pytestmark = pytest.mark.usefixtures("validated_here")
 
 CORPUS = Path(__file__).resolve().parents[3] / "frozen" / "v0_1"
-LIVE = Live(
+LIVE = LiveState(
     utc="2026-05-04T09:30:00.000+00:00", activity="idle", since_utc="2026-05-04T09:30:00.000+00:00", fault="",
     offset_mm=0.0, handle_ready=True, acceleration_mps2=None, sensor_clipped=False, missed_ticks=0,
 )  # fmt: skip

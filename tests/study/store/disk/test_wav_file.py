@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from study.store.disk.file_errors import AlreadyThereError
+from study.store.disk.file_errors import AlreadyExistsError
 from study.store.disk.wav_file import write_wav
 
 SAMPLES = np.array([0, 1, -1, 32767, -32768], dtype=np.int16)
@@ -17,6 +17,6 @@ def test_another_reader_finds_the_same_samples(tmp_path):
 
 def test_a_sound_that_is_there_stays(tmp_path):
     (tmp_path / "a.wav").write_bytes(b"mine")
-    with pytest.raises(AlreadyThereError):
+    with pytest.raises(AlreadyExistsError):
         write_wav(tmp_path / "a.wav", SAMPLES, 44_100)
     assert (tmp_path / "a.wav").read_bytes() == b"mine"

@@ -6,7 +6,7 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality
-from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
+from study.store.disk.file_errors import AlreadyExistsError, UnusableFileError
 from study.store.formats.identified_model_file import LAYOUT, read_identified_model, write_identified_model
 
 MATRICES = ("A", "B", "C", "D", "covariance", "samples")
@@ -77,7 +77,7 @@ def test_figures_of_quality_that_cannot_be_are_named(written):
 
 
 def test_nothing_existing_is_overwritten_unless_asked_for(written, model):
-    with pytest.raises(AlreadyThereError):
+    with pytest.raises(AlreadyExistsError):
         write_identified_model(written, model)
     write_identified_model(written, replace(model, delay_samples=2.0), overwrite=True)
     assert read_identified_model(written).delay_samples == 2.0

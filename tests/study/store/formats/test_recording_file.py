@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Hold, Recording, Segment
 from equalizer.signals.recording_checks import collect_signals
 from equalizer.signals.signal import Signal
-from study.store.disk.file_errors import AlreadyThereError
+from study.store.disk.file_errors import AlreadyExistsError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.recording_layout import LAYOUT, SEGMENT_FIELDS, SIGNAL_ATTRIBUTES
 
@@ -105,7 +105,7 @@ def test_a_large_note_fits_into_meta(tmp_path, recording):
 
 def test_nothing_existing_is_overwritten_unless_asked_for(written, recording):
     before = written.read_bytes()
-    with pytest.raises(AlreadyThereError, match=r"a\.h5 already exists. Nothing that exists is overwritten"):
+    with pytest.raises(AlreadyExistsError, match=r"a\.h5 already exists. Nothing that exists is overwritten"):
         write_recording(written, recording)
     assert written.read_bytes() == before
     write_recording(written, replace(recording, device="other"), overwrite=True)

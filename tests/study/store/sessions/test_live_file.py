@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.store.sessions.live_file import LIVE_NAME, read_live, remove_live, write_live
 
-LIVE = Live(
+LIVE = LiveState(
     utc="2026-11-22T10:00:00.000+00:00",
     activity="trial",
     since_utc="2026-11-22T09:59:58.000+00:00",

@@ -25,12 +25,12 @@ from study.tui.engine.from_engine import (
     Withdrawn,
 )
 from study.tui.engine.to_engine import (
-    AskOtherSession,
     BeginSession,
-    LetGo,
-    Relay,
+    ForwardRequest,
+    Interrupt,
     Reply,
     Resume,
+    SendRequest,
     SessionOrder,
     ShowHome,
     ShowSession,
@@ -88,7 +88,7 @@ def test_a_session_runs_to_its_report_and_is_listed(begun, order, session):
 def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session):
     trial = third_trial(begun)
     began_s = time.monotonic()
-    begun.send(LetGo())
+    begun.send(Interrupt())
     failure = begun.next()
     assert time.monotonic() - began_s < 0.5
     assert isinstance(failure, Failed)
@@ -105,7 +105,7 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
 @pytest.mark.slow
 def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, session):
     screen.send(BeginSession(order))
-    screen.send(LetGo())
+    screen.send(Interrupt())
     failure = screen.next()
     assert isinstance(failure, Failed)
     assert (failure.error.title, failure.path) == ("Interrupted", "")
@@ -155,8 +155,8 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, ses
 )
 def test_requests_from_the_screen_reach_the_session(begun, session, request_, call):
     third_trial(begun)
-    begun.send(Relay(NoteAsked("experimenter", "coughed")))
-    begun.send(Relay(request_))
+    begun.send(ForwardRequest(NoteAsked("experimenter", "coughed")))
+    begun.send(ForwardRequest(request_))
     if call is not None:
         begun.reply(begun.wait_for(asks(call)))
         begun.wait_for(asks(DisplayCall.ASK))
@@ -172,7 +172,7 @@ def test_what_cannot_be_begun_is_reported_and_the_engine_continues(screen, order
     assert isinstance(failure, Failed)
     assert "no_such_protocol" in failure.error.happened
     assert failure.path == ""
-    screen.send(AskOtherSession(order.data, PauseAsked("experimenter")))
+    screen.send(SendRequest(order.data, PauseAsked("experimenter")))
     assert isinstance(screen.next(), Failed)
     screen.send(ShowHome(order.data))
     assert isinstance(screen.next(), HomeContent)

@@ -135,7 +135,7 @@ def test_while_the_device_is_prepared_it_says_what_and_for_how_long(on_screen, m
         assert "0 s so far" in sight.text
         now[0] += 75.0
         await sight.until(lambda: "1 min 15 s so far" in sight.text)
-        sight.app.screen.say("Opening the log.")
+        sight.app.screen.show_step("Opening the log.")
         await sight.pilot.pause()
         assert "Opening the log." in sight.text
         assert "1 min 15 s so far" in sight.text
@@ -151,7 +151,7 @@ def test_before_the_language_is_known_nothing_is_said(on_screen):
         sight.app.screen.set_language(german)
         await sight.pilot.pause()
         assert re.findall(r"[A-Za-z]{2,}", sight.text) == []
-        sight.app.screen.say("Das Gerät wird vorbereitet.")
+        sight.app.screen.show_step("Das Gerät wird vorbereitet.")
         await sight.until(lambda: "bisher 0 s" in sight.text)
         assert "Einen Moment" in sight.text
         assert "Hilfe" in sight.text

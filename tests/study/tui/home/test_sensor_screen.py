@@ -52,7 +52,7 @@ def test_a_person_is_led_through_six_positions(on_screen):
         ("CalibrateSensor", "COM3", 2_000_000),
         ("Reply", 1, True),
         ("Reply", 2, True),
-        ("KeepSensor", '[accelerometer]\nport = "COM3"'),
+        ("StoreCalibration", '[accelerometer]\nport = "COM3"'),
     ]
 
 
@@ -71,7 +71,7 @@ def test_esc_stops_it_and_goes_back(on_screen, home):
     story, seen = story_of(("f7",), (*PORT, "enter"), PlacementRequest(1, "+x up", None), ("escape",))
     app = on_screen(HomeScreen(home), story, (132, 40))
     assert "1 of 6" in seen[2] and "Sessions" in seen[3]
-    assert [name for name, *_ in messages_of(app)] == ["CalibrateSensor", "LetGo"]
+    assert [name for name, *_ in messages_of(app)] == ["CalibrateSensor", "Interrupt"]
 
 
 def test_after_an_error_it_begins_again(on_screen):

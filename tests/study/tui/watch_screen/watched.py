@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.watch_view import (
     Alarm,
     ClosedTrial,
@@ -17,7 +17,7 @@ from study.session.watching.watch_view import (
 )
 
 UTC = "2026-11-22T10:17:00.000+00:00"
-LIVE = Live(UTC, "trial", UTC, "", 1.2, True, 3.3, False, 0)
+LIVE = LiveState(UTC, "trial", UTC, "", 1.2, True, 3.3, False, 0)
 LEVELS = (1.0, 1.0, 1.0, 0.631, 1.0, 1.0, 1.0, 0.631, 0.631, 0.631, 0.398, 0.631, 0.631)
 CORRECT = (True, True, True, False, True, True, True, True, True, True, False, True, True)
 TURNS = {3: True, 6: True, 10: True}

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.device_change.compare_devices import Change
 from study.cli.main import main
-from study.devices.force_dimension.acceptance import Acceptance, acceptance_file, write_acceptance
+from study.devices.force_dimension.acceptance import Acceptance, locate_acceptance_file, write_acceptance
 from study.devices.opening import get_device_folder
 from study.errors import DeviceError, UserInterruptError
 from study.session.views.participant_views import DeviceFinding, DeviceReport
@@ -121,7 +121,7 @@ def test_another_baseline_than_the_accepted_one_is_refused_before_anything_moves
 def test_without_an_acceptance_or_its_recording_there_is_nothing_to_compare_with(device_like, stepped_stub):
     with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="accepted without a recording"):
         check_on_device(device, plan, QUIET)
-    acceptance_file().unlink()
+    locate_acceptance_file().unlink()
     with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="There is no acceptance of it"):
         check_on_device(device, plan, QUIET)
     assert stepped_stub.get("peak_n") == 0

@@ -18,7 +18,7 @@ from study.errors import StudyError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnosis_input import read_given_model, read_input
-from study.workflows.diagnosis.fit_first_model import FirstModel, FirstModelPlan, fit_first_model
+from study.workflows.diagnosis.fit_first_model import FirstModelPlan, FittedFirstModel, fit_first_model
 
 RATE_HZ, SECONDS = 1000.0, 30.0
 
@@ -66,12 +66,12 @@ def untimed(recording: Recording) -> Recording:
     )  # fmt: skip
 
 
-def fitted(folder: Path, recording: Recording, structure: str = "auto") -> FirstModel:
+def fitted(folder: Path, recording: Recording, structure: str = "auto") -> FittedFirstModel:
     write_recording(folder / "rec.h5", recording, precision="float64")
     return fit_first_model(FirstModelPlan((folder / "rec.h5",), folder / "model.toml", structure), lambda share: None)
 
 
-def inside(done: FirstModel, name: str, truth: float) -> bool:
+def inside(done: FittedFirstModel, name: str, truth: float) -> bool:
     (number,) = [each for each in done.choice.fit.parameters if each.name == name]
     return number.half_width is not None and abs(number.value - truth) <= number.half_width
 

@@ -18,7 +18,7 @@ from study.workflows.equalizer import play_contact as play_contact_module
 from study.workflows.equalizer import repeat_playback as repeat_playback_module
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.play_contact import ContactPlan, format_contact, play_contact
-from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_trajectory
+from study.workflows.equalizer.repeat_trajectory import RepeatOptions, repeat_trajectory
 
 NORMAL = (1.0, 2.0, -2.0)
 
@@ -152,7 +152,7 @@ def test_repeats_on_a_real_device_are_announced_first(folder, tmp_path):
     padded = replace(signal, samples=0.3 * np.pad(signal.samples, ((500, 500), (0, 0))))
     write_trajectory(tmp_path / "wanted.csv", Trajectory(padded))
     plan = EqualizePlan((folder / "model.h5",), tmp_path / "wanted.csv", tmp_path / "forces.csv")
-    order, said = RepeatOrder(repeats=1, device="omega3"), []
+    order, said = RepeatOptions(repeats=1, device="omega3"), []
     with pytest.raises(StudyError, match="without a warning"):
         repeat_trajectory(plan, order, lambda *_: None)
     with pytest.raises(UserInterruptError) as left:

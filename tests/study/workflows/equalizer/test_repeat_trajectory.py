@@ -17,14 +17,14 @@ from study.store.formats.repeats_file import get_repeats_path, read_repeats
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.repeat_trajectory import (
-    RepeatOrder,
+    RepeatOptions,
     format_repeat_lines,
     repeat_trajectory,
     summarise_repeats,
 )
 
 BAND_HZ = (5.0, 35.0)
-ORDER = RepeatOrder(repeats=4, device="simulated")
+ORDER = RepeatOptions(repeats=4, device="simulated")
 
 
 def unheard(play: int, share: float) -> None:

@@ -13,7 +13,7 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.time_budget import CountedBudget, OutOfTimeError, limit_map
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.discovered_law import make_law_effect
-from equalizer.effects.effect import effects_by_address
+from equalizer.effects.effect import list_effects_by_address
 from equalizer.laws.law import parse_law
 from study.workflows import forked_map as module
 from study.workflows.forked_map import map_forked, measure_processor_s
@@ -54,10 +54,10 @@ def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_f
 def test_an_effect_without_references_is_not_kept_alive():
     law = make_law_effect(parse_law("2*vx", "force", "x"))
     address = id(law)
-    assert effects_by_address()[address] is law
+    assert list_effects_by_address()[address] is law
     del law
     gc.collect()
-    assert address not in effects_by_address()
+    assert address not in list_effects_by_address()
 
 
 def test_what_cannot_be_sent_is_done_here_and_not_tried_elsewhere_again():

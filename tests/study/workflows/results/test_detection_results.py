@@ -8,7 +8,7 @@ import pytest
 from protocols.document.loading import load_protocol
 from study.store.formats.thresholds_file import read_thresholds
 from study.workflows.files.validate import validate_file
-from study.workflows.results.analysis_files import analysis_outputs
+from study.workflows.results.analysis_files import list_analysis_outputs
 from study.workflows.results.analyze_data import analyze_data
 from study.workflows.results.write_results import write_results
 
@@ -92,4 +92,4 @@ def test_a_detection_table_of_an_earlier_analysis_does_not_stay(sitter, tmp_path
 
 
 def test_a_withdrawal_takes_the_detection_table_of_an_analysis_too(session):
-    assert session / "analysis" / "detection.csv" in analysis_outputs(session / "analysis")
+    assert session / "analysis" / "detection.csv" in list_analysis_outputs(session / "analysis")

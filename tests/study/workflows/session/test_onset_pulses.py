@@ -25,7 +25,7 @@ def pulses(monkeypatch):
         given.append(Pulse(LINE, None, "it is gone") if lost else Pulse(LINE, 12.5))
         return given[-1]
 
-    monkeypatch.setattr(conduct_session, "_pulses", lambda clock: contextlib.nullcontext(pulse))
+    monkeypatch.setattr(conduct_session, "_open_pulse_line", lambda clock: contextlib.nullcontext(pulse))
     return given
 
 
@@ -49,7 +49,7 @@ def test_each_trial_has_its_pulse_and_a_lost_one_costs_no_trial(sitter, pulses):
 def test_the_session_is_the_same_without_a_line(sitter, pulses, tmp_path, monkeypatch):
     with_line = sitter.whole("P01").state
     sitter.data = tmp_path / "other"
-    monkeypatch.setattr(conduct_session, "_pulses", lambda clock: contextlib.nullcontext(lambda: None))
+    monkeypatch.setattr(conduct_session, "_open_pulse_line", lambda clock: contextlib.nullcontext(lambda: None))
     without = sitter.whole("P01").state
     assert [trial.answer for trial in with_line.trials] == [trial.answer for trial in without.trials]
 
@@ -60,7 +60,7 @@ def test_the_time_of_a_lost_pulse_is_part_of_the_response_time(sitter, tmp_path,
         def pulses(clock):
             return contextlib.nullcontext(lambda: clock.sleep(lost_for_s) or Pulse(LINE, None, "it is gone"))
 
-        monkeypatch.setattr(conduct_session, "_pulses", pulses)
+        monkeypatch.setattr(conduct_session, "_open_pulse_line", pulses)
         sitter.data = tmp_path / f"{lost_for_s}"
         return [trial.response_time_s for trial in sitter.whole("P01").state.trials]
 

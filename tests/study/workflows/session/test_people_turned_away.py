@@ -166,7 +166,7 @@ def test_a_watcher_sees_the_outcome_without_an_alarm(visit, form, outcome):
     watched = begin_watching(opened, end.state.protocol)
     for event in rest:
         watched = apply_followed_event(watched, event)
-    view = make_watch_view(watched, LiveInfo(writer=False), UTC)
+    view = make_watch_view(watched, LiveInfo(has_writer=False), UTC)
     assert (view.standing, view.alarms) == (outcome, ())
     assert INELIGIBILITY_REASONS[outcome] in view.reason
 

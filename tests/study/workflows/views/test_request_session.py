@@ -10,7 +10,7 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.errors import StudyError
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log
@@ -42,7 +42,7 @@ def test_a_fresh_live_state_saves_the_look_at_the_lock(sitter):
     folder = sitter.interrupted(after=3).folder
     lines = folder.log.read_bytes().splitlines(keepends=True)
     folder.log.write_bytes(b"".join(lines[:-1]))
-    live = Live("2999-01-01T00:00:00.000+00:00", "trial", now(), "", 0.5, True, 1.0, False, 0)
+    live = LiveState("2999-01-01T00:00:00.000+00:00", "trial", now(), "", 0.5, True, 1.0, False, 0)
     write_live(folder.path, live)
     view = follow(folder.path).look(now())
     assert (view.standing, view.live) == ("running", live)

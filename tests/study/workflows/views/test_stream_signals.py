@@ -13,14 +13,14 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.devices.telemetry import Ring
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.store.sessions.live_file import write_live
 from study.workflows.views.lsl_outlets import MarkerOutlet, make_source_id
 from study.workflows.views.stream_session import measure_offset_s
 from study.workflows.views.stream_signals import CALLS_PER_RING_CHECK, STREAMS, SignalStreams
 
 UTC = "2026-01-01T00:00:00+00:00"
-LIVE = Live(UTC, "trial", UTC, "", 0.5, True, 1.0, False, 0)
+LIVE = LiveState(UTC, "trial", UTC, "", 0.5, True, 1.0, False, 0)
 OFFSET_S = 1000.25
 
 

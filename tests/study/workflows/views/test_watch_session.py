@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import pytest
 
 from study.errors import StudyError
-from study.session.watching.live_state import Live
+from study.session.watching.live_state import LiveState
 from study.session.watching.requests import StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME, EventLog
@@ -167,7 +167,7 @@ def test_whether_a_missing_log_is_being_written_is_unknown(tmp_path):
 
 
 def test_live_state_and_requests_do_not_disturb_what_is_validated(whole):
-    write_live(whole.path, Live(now(), "idle", now(), "", None, True, None, False, 0))
+    write_live(whole.path, LiveState(now(), "idle", now(), "", None, True, None, False, 0))
     RequestInbox(whole.path).send(StopAsked("experimenter"))
     assert validate_file(whole.path).problems == ()
     assert validate_file(whole.path / "live.json").kind == "live state of a session"

@@ -7,14 +7,14 @@ from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.curves.signature_bins import compute_law_bin_means
-from analysis.diagnosis.result.curves.signature_curves import Names, compute_signature
+from analysis.diagnosis.result.curves.signature_curves import CurveNames, compute_signature
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.signals.recording import Hold
 
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
-NAMES = Names(("x",), ("ax",), "m/s^2")
+NAMES = CurveNames(("x",), ("ax",), "m/s^2")
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def make_signature(diagnosed):
         noise = np.repeat(diagnosed.NOISE, axes)
         measure, tuning = FreeSimulation((seen,), noise, noise), make_tuning(model, recording.command.channels)
         without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
-        names = Names(tuple("xyz"[:axes]), recording.response.channels, "m/s^2")
+        names = CurveNames(tuple("xyz"[:axes]), recording.response.channels, "m/s^2")
         complete = simulate_response(
             model, recording.command.samples, recording.sample_rate_hz, (placed,), recording.hold
         ).response

@@ -7,7 +7,7 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.law_kernel import compute_law_force
 from study.evaluation.challenge.laws.build_law import build_law
 from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, PeakValues
-from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, generate_law_case
+from study.evaluation.challenge.laws.draw_law import CASES_PER_TURN, TURN_KINDS, draw_law, generate_law_case
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 SEED = 7
@@ -17,7 +17,7 @@ PEAKS = PeakValues(0.01, 0.2, 20.0)
 @pytest.fixture(scope="module")
 def found():
     """The first device of one axis with a force of its own."""
-    number = next(n for n in range(len(TURN)) if _simple(draw_law(SEED, n, brief=True)))
+    number = next(n for n in range(len(TURN_KINDS)) if _simple(draw_law(SEED, n, brief=True)))
     return number, generate_law_case(draw_law(SEED, number, brief=True), "first")
 
 
@@ -35,12 +35,12 @@ def test_the_same_number_is_the_same_device(found):
 
 
 def test_a_turn_holds_what_it_says():
-    kinds = [draw_law(SEED, number).kind for number in range(len(TURN))]
-    assert {kind: kinds.count(kind) for kind in COUNTS} == COUNTS
+    kinds = [draw_law(SEED, number).kind for number in range(len(TURN_KINDS))]
+    assert {kind: kinds.count(kind) for kind in CASES_PER_TURN} == CASES_PER_TURN
 
 
 def test_every_law_takes_its_turn():
-    laws = [draw_law(SEED, number).concealed for number in range(3 * len(TURN))]
+    laws = [draw_law(SEED, number).concealed for number in range(3 * len(TURN_KINDS))]
     assert {kind.name for kind in LAW_KINDS} <= set(laws)
 
 
@@ -48,7 +48,7 @@ def test_every_law_takes_its_turn():
 def test_the_law_shows_and_fresh_motion_carries_its_force(found):
     _, case = found
     assert case.case.detectability > 1
-    quiet, loud = (float(np.sqrt(np.mean(each.lawful**2))) for each in case.fresh_motions)
+    quiet, loud = (float(np.sqrt(np.mean(each.law_force**2))) for each in case.fresh_motions)
     assert 0 < quiet < loud
 
 

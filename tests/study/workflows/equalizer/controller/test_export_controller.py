@@ -12,7 +12,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.lqr.changing_direction import play
-from equalizer.tracking.realtime.controller_cases import TICKS_AFTER, controller_cases
+from equalizer.tracking.realtime.controller_cases import TICKS_AFTER, compute_controller_cases
 from equalizer.tracking.realtime.realtime_controller import RealtimeSettings
 from study.cli.main import main
 from study.store.formats.identified_model_file import write_identified_model
@@ -49,7 +49,7 @@ def test_the_longest_preview_that_is_accepted_is_compared_too(vendor, tmp_path):
     assert late == 1999
     done = run(build(vendor, out, "check_controller.c"))
     assert done.returncode == 0, done.stdout
-    forces = controller_cases(exported.controller).stream_forces
+    forces = compute_controller_cases(exported.controller).stream_forces
     assert np.count_nonzero(np.abs(forces[late:]).max(axis=1) > 0.01) >= TICKS_AFTER
 
 

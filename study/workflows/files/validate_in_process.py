@@ -1,5 +1,7 @@
-"""Validate files in a separate process, for `hapteq validate`: a damaged HDF5 file can crash or hang the library that
-reads it."""
+"""Validate files in a separate process, because a damaged HDF5 file can crash or hang the library that reads it.
+
+Called by `hapteq validate` (`study.cli.validate`).
+"""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -11,9 +13,10 @@ from study.errors import StudyError
 from study.workflows.files.validate import Validation, validate_file
 
 FILE_TIMEOUT_S = 60.0
-"""Longest wait for one file (s); a recording of an hour takes seconds."""
+"""Longest wait for one file (s). Chosen: a recording of an hour takes seconds."""
 START_TIMEOUT_S = 300.0
-"""Longest wait for the start and imports of the worker process (s); a computer that swaps memory takes a minute."""
+"""Longest wait for the start and imports of the worker process (s). Chosen: a computer that swaps memory takes a
+minute."""
 
 
 def validate_files(paths: Sequence[Path], timeout_s: float = FILE_TIMEOUT_S) -> Iterator[Validation]:
@@ -63,7 +66,7 @@ def _start_worker() -> ProcessPoolExecutor:
 
 
 def _confirm_start() -> None:
-    """Empty first task: its result shows that the worker's imports are done."""
+    """Do nothing, as the first task of a worker: its result shows that the worker's imports are done."""
 
 
 def _kill_worker(worker: ProcessPoolExecutor) -> None:
@@ -74,5 +77,5 @@ def _kill_worker(worker: ProcessPoolExecutor) -> None:
 
 
 def _make_damage_report(path: Path, failure: str) -> Validation:
-    """Validation of a file on which the worker crashed or did not end. failure: what happened, as a clause."""
+    """Make the report on a file on which the worker crashed or did not end. failure: what happened, as a clause."""
     return Validation(path, "damaged file", (f"The file is damaged: {failure}. Restore it from a copy.",))

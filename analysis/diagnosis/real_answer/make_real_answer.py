@@ -1,4 +1,7 @@
-"""Converts the findings on one real recording to the document `RealAnswer`; called by `diagnose_real`."""
+"""Convert the findings on one real recording to the document `RealAnswer`.
+
+Called by `study.evaluation.real.diagnose_real`.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -33,9 +36,9 @@ def make_real_answer(
     nominal: Mapping[str, float],
 ) -> RealAnswer:
     """Make the document of a real recording from the findings of its diagnosis. names: folder, recording, title.
-    nominal: parameters known by other means, in SI (see `list_own_parameters`). What only the caller knows (further
-    tests, a pair, objections, the time it took) is left empty."""
-    diagnosis, box = findings.diagnosis, findings.black_box
+    nominal: parameters known by other means, in SI (see `list_own_parameters`). Fields that only the caller can
+    fill (further tests, a pair, objections, duration) are left empty."""
+    diagnosis, black_box = findings.diagnosis, findings.black_box
     folder, recording_name, title = names
     return RealAnswer(
         folder=folder,
@@ -48,7 +51,7 @@ def make_real_answer(
         error=diagnosis.error,
         fitted=diagnosis.fit.fit,
         held_out=diagnosis.fit.test,
-        black_box=None if box is None or not np.isfinite(box.test_error) else box.test_error,
+        black_box=None if black_box is None or not np.isfinite(black_box.test_error) else black_box.test_error,
         where=write_localisation_sentences(findings.localisation) if findings.maps else (),
         named=describe_named_effects(findings),
         effects=tuple(effect.effect for effect in diagnosis.effects),
@@ -88,10 +91,10 @@ def describe_model(findings: Findings) -> str:
     """Describe the given model in a sentence: its name, numbers of coordinates, commands and responses, and
     quantity."""
     model = findings.given
-    bodies = "one body" if model.coordinates == 1 else f"{model.coordinates} bodies or modes"
-    commands = "one command" if model.inputs == 1 else f"{model.inputs} commands"
-    responses = "one response" if model.outputs == 1 else f"{model.outputs} responses"
-    return f"{capitalise(model.name)}: linear, {bodies}, {commands}, {responses} ({model.quantity})."
+    bodies_text = "one body" if model.coordinates == 1 else f"{model.coordinates} bodies or modes"
+    commands_text = "one command" if model.inputs == 1 else f"{model.inputs} commands"
+    responses_text = "one response" if model.outputs == 1 else f"{model.outputs} responses"
+    return f"{capitalise(model.name)}: linear, {bodies_text}, {commands_text}, {responses_text} ({model.quantity})."
 
 
 def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
@@ -123,7 +126,7 @@ def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutS
 
 
 EXCERPT_SAMPLES = 900
-"""Samples of an excerpt, around where re-tuned and final prediction differ most."""
+"""Largest number of samples of an excerpt, around where re-tuned and final prediction differ most. Chosen by hand."""
 
 
 def select_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
@@ -157,10 +160,10 @@ def select_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
 
 
 def _compute_relative_change(series: TimeSeries, start: int, stop: int) -> FloatArray:
-    """(samples, c): change of the prediction by the named effects, relative to the channel's standard deviation; 0
-    where not finite. start, stop: samples."""
-    channel_rms = np.maximum(np.nanstd(series.measured, axis=0), np.finfo(float).tiny)
-    return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / channel_rms))
+    """Compute (samples, c): change of the prediction by the named effects, relative to the channel's standard
+    deviation; 0 where not finite. start, stop: samples."""
+    channel_std = np.maximum(np.nanstd(series.measured, axis=0), np.finfo(float).tiny)
+    return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / channel_std))
 
 
 def list_own_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
@@ -201,7 +204,8 @@ def _compare_parameters(
 
 
 def _compare_parameter(name: str, unit: str, value: float, error: float, nominal: Mapping[str, float]) -> OwnParameter:
-    """Return a parameter with its 95 % interval, None where the standard error is not finite, and its nominal value."""
+    """Return a parameter with its 95 % interval (bounds None where the standard error is not finite) and its nominal
+    value (None where unknown)."""
     half_width = _HALF_WIDTH_95 * error
     has_interval = bool(np.isfinite(half_width))
     return OwnParameter(

@@ -1,5 +1,5 @@
 """Caller's end of the pipes to the process of the device loop: remote calls with progress, timeout and cancellation.
-Used by `remote_device` and `start`; the process's end is `serve`.
+`start` makes the pipes, `remote_device` calls through them; the process's end is `serve`.
 
 Each pipe has a thread that writes and reads, so that an interrupted caller leaves no incomplete message in the pipe and
 waits no longer than its timeout for a process that hangs. Messages are pickled: (name, arguments) as request; (kind,
@@ -23,7 +23,7 @@ else:
 
     PipeEnd = Connection
 
-LINE_NAMES = ("work", "signs", "look", "stop", "close")
+PIPE_NAMES = ("work", "signs", "look", "stop", "close")
 """Names of the pipes, one per group of methods: neither a long `release`, `play` or `close` nor a reading that hangs
 delays a sign of life or a stop."""
 
@@ -33,10 +33,11 @@ PROGRESS the process waits for a bool: whether to continue."""
 
 
 GRACE_S = 0.5
-"""Additional wait (s) after a timeout: if this process was suspended, the other only seems late."""
+"""Additional wait (s) after a timeout: after a suspension of this process an answer is late without a fault. Chosen."""
 
 CLOSE_TIMEOUT_S = 6.0
-"""Time (s) beyond the fade in which the process may end in an orderly way; a driver that hangs is abandoned sooner."""
+"""Time (s) beyond the fade in which the process may end in an orderly way; a driver that hangs is abandoned sooner.
+Chosen."""
 
 
 class LoopGoneError(Exception):
@@ -66,7 +67,8 @@ class Call:
         return self._final_message is not None
 
     def receive(self, message: tuple[int, Any]) -> None:
-        """Take a message of the process: progress, or the answer that ends the call. Called by the line's thread."""
+        """Take a message of the process: progress, or the answer that ends the call. Called by the thread of the
+        pipe."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
         else:
@@ -75,17 +77,17 @@ class Call:
 
     def wait_for_answer(
         self,
-        patience_s: float,
+        timeout_s: float,
         on_progress: Callable[[float], None] | None = None,
         grace_s: float | None = None,
         sending_s: float = 0.0,
     ) -> Any:
-        """Wait for the answer and return it. patience_s: timeout (s) for each message. grace_s: additional wait (s),
+        """Wait for the answer and return it. timeout_s: timeout (s) for each message. grace_s: additional wait (s),
         None = `GRACE_S`. on_progress(share): called for each progress, 0 to 1. sending_s: time (s) added to the timeout
         before the first progress and after a progress of 1, when a request or a recording is sent. Raises what the
         method raised, `LoopGoneError`, and what `on_progress` raises. May be called again after an interruption."""
         share: float | None = 1.0
-        while (share := self._wait_for_progress(patience_s + sending_s * (share == 1.0), grace_s)) is not None:
+        while (share := self._wait_for_progress(timeout_s + sending_s * (share == 1.0), grace_s)) is not None:
             if on_progress is not None:
                 on_progress(share)
             self.continue_decisions.put(True)
@@ -119,7 +121,7 @@ class Call:
         return None
 
 
-class Line:
+class CallPipe:
     """A pipe to the loop's process, with a thread that sends its calls in order. A broken pipe ends every open call
     with `LoopGoneError`."""
 
@@ -130,7 +132,7 @@ class Line:
         threading.Thread(target=self._run_thread, name=f"line {name}", daemon=True).start()
 
     def queue_call(self, name: str, *arguments: Any) -> Call:
-        """Queue a call and return at once. It is sent when all earlier calls of this line are over. Raises as `Call`
+        """Queue a call and return at once. It is sent when all earlier calls of this pipe are over. Raises as `Call`
         does."""
         call = Call(name, arguments)
         self._calls.put(call)
@@ -138,12 +140,12 @@ class Line:
             self._fail_queued_calls()
         return call
 
-    def end(self) -> None:
+    def close_after_calls(self) -> None:
         """Close the pipe after the calls that were queued before."""
         self._calls.put(None)
 
     def _run_thread(self) -> None:
-        """Send the queued calls one by one, until `end` is called."""
+        """Send the queued calls one by one, until `close_after_calls` is called."""
         try:
             with self._connection:
                 while (call := self._calls.get()) is not None:
@@ -169,14 +171,14 @@ class Line:
         message = connection.recv()
         while message[0] == PROGRESS:
             call.receive(message)
-            # No timeout: where the caller hangs, its signs of life stop and the device fades the force.
+            # No timeout: where the caller hangs, its keep-alives stop and the device fades the force.
             connection.send(call.continue_decisions.get())
             message = connection.recv()
         call.receive(message)
 
 
 def _make_loop_gone_error(error: Exception) -> LoopGoneError:
-    """The error of a call whose pipe broke or whose answer cannot be unpickled."""
+    """Make the error of a call whose pipe broke or whose answer cannot be unpickled."""
     if isinstance(error, EOFError | OSError):
         return LoopGoneError("it ended", hangs=False)
     return LoopGoneError(f"its answer cannot be read ({type(error).__name__}: {error})", hangs=False)

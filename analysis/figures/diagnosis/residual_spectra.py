@@ -19,32 +19,34 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, create_figure, draw_no_data_note, format_power_of_ten, style_axes
 
 _MAX_COLUMNS = 3
-"""Largest number of panels in a row."""
+"""Largest number of panels in a row. Chosen by hand."""
 _SIGNAL_HANDLE = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
+"""Legend entry of the signal."""
 _NOISE_HANDLE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
+"""Legend entry of the noise."""
 
 
-def make_remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
+def make_residual_spectra_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
     """Make the picture of the residual spectra, with its caption and its text for screen readers."""
     return Picture(
         name="remainder",
         title="Residual on held-out data",
         caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, the "
         "residual is noise; where it lies above, a mismatch remains.",
-        figure=draw_remainder(spectra),
+        figure=draw_residual_spectra(spectra),
         alternative=" ".join(_write_alternative_text(spectrum) for spectrum in spectra),
     )
 
 
-def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
-    """Figure with a panel per channel: densities of the signal, of the residuals of the re-tuned and the completed
+def draw_residual_spectra(spectra: Sequence[RemainderSpectrum]) -> Figure:
+    """Draw a panel per channel: densities of the signal, of the residuals of the re-tuned and the completed
     model, and of the noise; a note where there are no spectra."""
     if not spectra:
         return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
-    columns = min(_MAX_COLUMNS, len(spectra))
-    rows = -(-len(spectra) // columns)
-    figure = create_figure(8.8, 0.9 + (2.1 if columns > 1 else 2.6) * rows)
-    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    column_count = min(_MAX_COLUMNS, len(spectra))
+    row_count = -(-len(spectra) // column_count)
+    figure = create_figure(8.8, 0.9 + (2.1 if column_count > 1 else 2.6) * row_count)
+    grid = figure.subplots(row_count, column_count, sharex=True, squeeze=False)
     for axes in grid.ravel()[len(spectra) :]:
         axes.set_visible(False)
     for axes, spectrum in zip(grid.ravel(), spectra, strict=False):
@@ -56,7 +58,7 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
 
 
 def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
-    """The densities of one channel on logarithmic axes."""
+    """Draw the densities of one channel on logarithmic axes."""
     style_axes(axes)
     axes.loglog(spectrum.frequency_hz, spectrum.measured, color=GREY, linewidth=0.9)
     if np.isfinite(spectrum.noise).any():

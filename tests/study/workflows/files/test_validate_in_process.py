@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from study.errors import StudyError
-from study.workflows.files import validate_apart
+from study.workflows.files import validate_in_process
 from study.workflows.files.validate import Validation, validate_file
-from study.workflows.files.validate_apart import validate_files
+from study.workflows.files.validate_in_process import validate_files
 
 pytestmark = pytest.mark.real_time
 
@@ -25,7 +25,7 @@ def crash_or_hang(path: Path) -> Validation:
 
 @pytest.mark.timeout(120)
 def test_a_crash_and_a_hang_are_problems_of_their_files_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(validate_apart, "_validate_safely", crash_or_hang)
+    monkeypatch.setattr(validate_in_process, "_validate_safely", crash_or_hang)
     names = ("sound.toml", "crash.h5", "hang.h5", "last.toml")
     paths = [tmp_path / name for name in names]
     for path in paths:
@@ -51,8 +51,8 @@ def hang_at_the_start() -> None:
 def test_a_worker_that_does_not_start_is_no_fault_of_a_file(tmp_path, monkeypatch, start):
     path = tmp_path / "sound.toml"
     path.write_text("x = 1\n")
-    monkeypatch.setattr(validate_apart, "_confirm_start", start)
-    monkeypatch.setattr(validate_apart, "START_TIMEOUT_S", 2.0)
+    monkeypatch.setattr(validate_in_process, "_confirm_start", start)
+    monkeypatch.setattr(validate_in_process, "START_TIMEOUT_S", 2.0)
     with pytest.raises(StudyError) as refused:
         list(validate_files([path]))
     assert refused.value.title == "Files cannot be validated"

@@ -1,8 +1,8 @@
 """Maximum of the penalized marginal likelihood by quadrature, from the maximum by Laplace's method.
 
 Newton's method with the Hessian of `quadrature`: first with coarse nodes, then with fine ones. Nodes are placed anew
-after each step by the posterior moments of the last evaluation; a search that does not settle is repeated with nodes
-that keep their places. The same search, with a parameter fixed, gives profile likelihoods for `inference`; `fit` calls
+after each step by the posterior moments of the last evaluation; a search that does not converge is repeated with nodes
+at fixed positions. The same search, with a parameter fixed, gives profile likelihoods for `inference`; `fit` calls
 it for the maximum."""
 
 from dataclasses import dataclass, replace
@@ -22,18 +22,20 @@ from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from equalizer.signals.signal import FloatArray
 
 MOST_NEWTON_STEPS = 10
-"""Largest number of Newton steps of one search. Chosen by hand."""
+"""Largest number of Newton steps of one search. Chosen."""
 LARGEST_DECREMENT = {COARSE_COUNTS: 0.1, FINE_COUNTS: 1e-3, FIXED_COUNTS: 1e-3}
 """Newton decrement (twice the gain in log-likelihood expected from the next step) below which a search ends, by kind of
 nodes: 0.001 is a step of a thirtieth of a standard error."""
 LONGEST_STEPS = 2.0, 0.5
-"""Longest Newton step, in a mean (dB) and in all logarithms."""
+"""Longest Newton step, in a mean (dB), and in every other parameter (logarithms, logits). Chosen."""
 LEAST_CURVATURE = 1e-3
-"""Least curvature for a Newton step: below it the step's length is undetermined."""
+"""Least magnitude of an eigenvalue of the Hessian in a Newton step: limits the step where the cost is nearly flat.
+Chosen."""
 ACCEPTED_COST_RISE = 0.03
-"""Rise of the cost up to which a step is accepted: the nodes move from step to step, and the value with them."""
+"""Rise of the cost up to which a step is accepted: the nodes move from step to step, which changes the value.
+Chosen."""
 STEP_ATTEMPTS = 3
-"""Number of attempts per step, each a quarter as long as the one before."""
+"""Number of attempts per step, each a quarter as long as the previous one. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,21 +43,24 @@ class QuadratureEvaluation:
     """The penalized marginal likelihood by quadrature at given parameters, with gradients and Hessian."""
 
     parameters: FloatArray
+    """(size,): the population's parameters (`ParameterLayout`)."""
     cost: float
     """Minus the penalized log marginal likelihood."""
     log_likelihood: float
     scores: FloatArray
     """(n, size): gradient of each person's log marginal likelihood."""
-    curvature: FloatArray
+    hessian: FloatArray
     """(size, size): Hessian of the cost."""
-    slope: FloatArray
+    gradient: FloatArray
     """(size,): gradient of the cost."""
     moments: Moments
+    """Posterior moments of each person; those that place the next nodes."""
     converged: bool
+    """False where a search ended at its largest number of steps."""
 
 
 class QuadratureSearch:
-    """Searches for the maximum of one objective by quadrature."""
+    """Newton search for the maximum of one objective by quadrature."""
 
     def __init__(self, objective: Objective) -> None:
         self.objective, self._quadrature = objective, Quadrature(objective.answers, objective.family)
@@ -64,17 +69,21 @@ class QuadratureSearch:
             for lower, upper in objective.bounds
         ]
         self._lower, self._upper = np.array(bounds).T
-        self._longest = np.full(len(bounds), LONGEST_STEPS[1])
-        self._longest[: objective.layout.k] = LONGEST_STEPS[0]
+        self._longest_steps = np.full(len(bounds), LONGEST_STEPS[1])
+        self._longest_steps[: objective.layout.k] = LONGEST_STEPS[0]
 
     def find_maximum(self, parameters: FloatArray) -> QuadratureEvaluation:
-        """Find the maximum by fine nodes; `converged` is False where no search settled. parameters: maximum by
+        """Find the maximum by fine nodes; `converged` is False where no search converged. parameters: maximum by
         Laplace's method."""
-        coarse = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS)
-        fine = self._search_minimum(self._evaluate(coarse.parameters, coarse.moments, FINE_COUNTS), FINE_COUNTS)
-        if fine.converged:
-            return fine
-        return self._search_minimum(self._evaluate(fine.parameters, fine.moments, FIXED_COUNTS), FIXED_COUNTS)
+        coarse_minimum = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS)
+        fine_minimum = self._search_minimum(
+            self._evaluate(coarse_minimum.parameters, coarse_minimum.moments, FINE_COUNTS), FINE_COUNTS
+        )
+        if fine_minimum.converged:
+            return fine_minimum
+        return self._search_minimum(
+            self._evaluate(fine_minimum.parameters, fine_minimum.moments, FIXED_COUNTS), FIXED_COUNTS
+        )
 
     def find_lowest_cost(self, parameters: FloatArray, fixed_index: int | None = None) -> float:
         """Find the lowest cost near these parameters, by coarse nodes. fixed_index: index of a parameter that keeps its
@@ -86,7 +95,7 @@ class QuadratureSearch:
                 self._evaluate_start(laplace_parameters, COARSE_COUNTS), COARSE_COUNTS, fixed_index
             )
         # The quadratic approximation gives the rest of the way to the minimum: half the Newton decrement.
-        return minimum.cost + 0.5 * float(minimum.slope @ self._compute_newton_step(minimum, fixed_index))
+        return minimum.cost + 0.5 * float(minimum.gradient @ self._compute_newton_step(minimum, fixed_index))
 
     def _evaluate_start(self, parameters: FloatArray, counts: NodeCounts) -> QuadratureEvaluation:
         """Evaluate the cost at the parameters, clipped to their bounds, with nodes placed by Laplace's method."""
@@ -101,9 +110,9 @@ class QuadratureSearch:
         `converged` is False where it is not."""
         for _ in range(MOST_NEWTON_STEPS):
             step = self._compute_newton_step(current, fixed_index)
-            if -float(current.slope @ step) < LARGEST_DECREMENT[counts]:
+            if -float(current.gradient @ step) < LARGEST_DECREMENT[counts]:
                 return current
-            step_fraction = 1.0 / max(1.0, float(np.abs(step / self._longest).max()))
+            step_fraction = 1.0 / max(1.0, float(np.abs(step / self._longest_steps).max()))
             for _ in range(STEP_ATTEMPTS):
                 candidate = self._evaluate(
                     np.clip(current.parameters + step_fraction * step, self._lower, self._upper),
@@ -123,15 +132,15 @@ class QuadratureSearch:
     def _compute_newton_step(self, current: QuadratureEvaluation, fixed_index: int | None) -> FloatArray:
         """Compute the Newton step (size,); 0 for the fixed parameter, and for parameters at a bound that the step would
         cross."""
-        is_at_bound = ((current.parameters <= self._lower) & (current.slope > 0)) | (
-            (current.parameters >= self._upper) & (current.slope < 0)
+        is_at_bound = ((current.parameters <= self._lower) & (current.gradient > 0)) | (
+            (current.parameters >= self._upper) & (current.gradient < 0)
         )
         is_free = (np.arange(len(current.parameters)) != fixed_index) & ~is_at_bound
-        eigenvalues, eigenvectors = np.linalg.eigh(current.curvature[np.ix_(is_free, is_free)])
+        eigenvalues, eigenvectors = np.linalg.eigh(current.hessian[np.ix_(is_free, is_free)])
         step = np.zeros(len(current.parameters))
         # Eigenvalues by magnitude: the step lowers the cost also where the curvature is negative.
         step[is_free] = -eigenvectors @ (
-            (eigenvectors.T @ current.slope[is_free]) / np.maximum(np.abs(eigenvalues), LEAST_CURVATURE)
+            (eigenvectors.T @ current.gradient[is_free]) / np.maximum(np.abs(eigenvalues), LEAST_CURVATURE)
         )
         return step
 
@@ -145,8 +154,8 @@ class QuadratureSearch:
             cost=-log_likelihood - log_prior,
             log_likelihood=log_likelihood,
             scores=integrals.scores,
-            curvature=-integrals.hessian - self.objective.compute_log_prior_hessian(parameters),
-            slope=-integrals.scores.sum(axis=0) - prior_gradient,
+            hessian=-integrals.hessian - self.objective.compute_log_prior_hessian(parameters),
+            gradient=-integrals.scores.sum(axis=0) - prior_gradient,
             moments=integrals.moments,
             converged=True,
         )

@@ -1,4 +1,4 @@
-"""Connection of the application to the engine process.
+"""Connection of the application (`app`) to the engine process.
 
 It sends commands and a regular heartbeat, and delivers the engine's messages as events of Textual, so that they are
 handled by the event loop. Without a heartbeat the engine ends a running trial (`remote_display`).
@@ -15,8 +15,9 @@ from study.tui.engine.client import EngineClient
 from study.tui.engine.from_engine import Failed, Finished, FromEngine
 from study.tui.engine.to_engine import BeginSession, Heartbeat, Resume, ToEngine
 
-HEARTBEAT_S = 0.1
-"""Interval of the heartbeat (s)."""
+HEARTBEAT_INTERVAL_S = 0.1
+"""Interval of the heartbeat (s). Chosen: well below the silence after which the engine ends a trial
+(`remote_display.HEARTBEAT_TIMEOUT_S`)."""
 
 
 class EngineMessage(Message):
@@ -46,7 +47,7 @@ class EngineConnection:
         """Start the engine and the heartbeat, and return at once. The event loop sends the heartbeat, which therefore
         stops when the loop hangs or the application is suspended."""
         self._engine.start()
-        self._app.set_interval(HEARTBEAT_S, self._beat)
+        self._app.set_interval(HEARTBEAT_INTERVAL_S, self._send_heartbeat)
 
     def send(self, message: ToEngine) -> None:
         """Send a message and return at once. Starts a new engine first if the present engine has died."""
@@ -61,12 +62,14 @@ class EngineConnection:
         """Close the pipe and wait until the engine has released the force and ended."""
         self._engine.close()
 
-    def _beat(self) -> None:
+    def _send_heartbeat(self) -> None:
+        """Send a heartbeat, unless the engine has failed."""
         if not self._engine.has_failed:
             self._engine.send(Heartbeat())
 
     def _deliver(self, message: FromEngine) -> None:
-        """Called from a thread of the client; `post_message` may be called from any thread."""
+        """Post a message of the engine to the application. Called in a thread of the client, in which `post_message` is
+        permitted."""
         if isinstance(message, Finished | Failed):
             self.last_end = message
         self._app.post_message(EngineMessage(message))

@@ -1,7 +1,7 @@
-"""Validation of files against each other: the effects of mechanical models against the channels of recordings.
+"""Check mechanical models against recordings: the effects of a model against the channels of each recording.
 
 An effect may name the axes and channels on which it acts; a recording without these contradicts the model. Called by
-`hapteq validate` after the files were validated one by one.
+`hapteq validate` (`study.cli.validate`) after the files were validated one by one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,15 +37,15 @@ def check_model_channels(validations: Sequence[Validation]) -> tuple[Validation,
 
 
 def _select_valid(validations: Sequence[Validation], kind_prefix: str) -> Iterator[Validation]:
-    """Validations without problems whose kind begins with `kind_prefix`."""
+    """Select the validations without problems whose kind begins with `kind_prefix`."""
     return (
         validation for validation in validations if validation.kind.startswith(kind_prefix) and not validation.problems
     )
 
 
 def _find_problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
-    """Sentences on effects that cannot be placed on the axes and channels of a recording: the first such effect per
-    recording."""
+    """Find effects that cannot be placed on the axes and channels of a recording; yields a sentence on the first such
+    effect of each recording. Recordings with another number of commands or responses are not compared."""
     # Imported here: loading the catalogue of effects takes longer than checking most files.
     from equalizer.effects.placing import PlacingError, place_recorded_effects
 

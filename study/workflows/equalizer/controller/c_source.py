@@ -14,16 +14,17 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.realtime.controller_cases import ControllerCases
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
-# File names of an export: the controller, a loop that uses it, and a program that checks it.
 HEADER_NAME, EXAMPLE_NAME, CHECK_NAME = "hapteq_controller.h", "example_loop.c", "check_controller.c"
+"""File names of an export: the controller, a loop that uses it, and a program that checks it."""
 NUMBERS_PER_LINE = 6
-"""Numbers per line of a table."""
+"""Numbers per line of a table (chosen, for readable lines)."""
 BLOCK_SIZE = 4
-"""Number of rows or columns that a loop of the C code processes together; matrices are padded to multiples of it."""
+"""Number of rows or columns that a loop of the C code processes together; matrices are padded to multiples of it. The
+template `controller.h` uses the same number."""
 
 
 def format_header(controller: RealtimeController, description_lines: tuple[str, ...]) -> str:
-    """Text of the C header with the controller. description_lines: lines that describe the model; they become a
+    """Format the C header with the controller. description_lines: lines that describe the model; they become a
     comment."""
     comment = "\n".join(f"/* {line.replace('*/', '* /')} */" for line in description_lines)
     return _read_template("controller.h").replace(
@@ -32,17 +33,17 @@ def format_header(controller: RealtimeController, description_lines: tuple[str, 
 
 
 def read_example() -> str:
-    """C source of an example of a real-time loop that calls the controller."""
+    """Read the C source of an example of a real-time loop that calls the controller."""
     return _read_template(EXAMPLE_NAME)
 
 
 def format_check_program(cases: ControllerCases) -> str:
-    """C source of a program that checks the compiled controller against test cases, inserted as tables of inputs and of
-    the forces (N) that the Python controller computed from them."""
+    """Format the C source of a program that checks the compiled controller against test cases, inserted as tables of
+    inputs and of the forces (N) that the Python controller computed from them."""
     definitions = (
         format_c_table("case_rotation", cases.rotations.reshape(len(cases), -1)),
         format_c_table("case_transient_force", cases.transient_forces),
-        format_c_table("case_wanted", cases.wanted),
+        format_c_table("case_wanted", cases.reference),
         format_c_table("case_low", cases.low),
         format_c_table("case_high", cases.high),
         format_c_table("case_stream_force", cases.stream_forces),
@@ -51,7 +52,7 @@ def format_check_program(cases: ControllerCases) -> str:
 
 
 def format_c_table(name: str, values: npt.ArrayLike) -> str:
-    """C definition of a constant array of double with this name and with the shape of `values`."""
+    """Format the C definition of a constant array of double with this name and with the shape of `values`."""
     numbers = np.asarray(values, dtype=np.float64)
     return (
         f"static const double {name}{''.join(f'[{length}]' for length in numbers.shape)} = "
@@ -60,16 +61,19 @@ def format_c_table(name: str, values: npt.ArrayLike) -> str:
 
 
 def _format_c_initializer(numbers: FloatArray) -> str:
-    """C initializer of an array, in braces that are nested by dimension."""
+    """Format the C initializer of an array, in braces that are nested by dimension."""
     if numbers.ndim > 1:
         return "{" + ",\n".join(_format_c_initializer(row) for row in numbers) + "}"
-    texts = [repr(value) for value in numbers.tolist()]
-    lines = [", ".join(texts[start : start + NUMBERS_PER_LINE]) for start in range(0, len(texts), NUMBERS_PER_LINE)]
+    number_texts = [repr(value) for value in numbers.tolist()]
+    lines = [
+        ", ".join(number_texts[start : start + NUMBERS_PER_LINE])
+        for start in range(0, len(number_texts), NUMBERS_PER_LINE)
+    ]
     return "{" + ",\n".join(lines) + "}"
 
 
 def _format_macros(controller: RealtimeController) -> str:
-    """Preprocessor definitions of the sample rate (Hz), the force cap (N) and the array sizes."""
+    """Format the preprocessor definitions of the sample rate (Hz), the force cap (N) and the array sizes."""
     problem, split, tracker = controller.problem, controller.split, controller.tracker
     has_low, has_high = split.edges.low_hz is not None, split.edges.high_hz is not None
     macros: dict[str, str] = {
@@ -93,8 +97,8 @@ def _format_macros(controller: RealtimeController) -> str:
 
 
 def _format_tables(controller: RealtimeController) -> str:
-    """C definitions of all tables: the matrices of model and controller, and the filters that split the band. The
-    weights of the split are binomial coefficients, as in `CausalSplit`."""
+    """Format the C definitions of all tables: the matrices of model and controller, and the filters that split the
+    band. The weights of the split are binomial coefficients, as in `CausalSplit`."""
     problem, split, tracker = controller.problem, controller.split, controller.tracker
     powers = range((split.order + 1) // 2, split.order + 1)
     definitions = [
@@ -113,10 +117,10 @@ def _format_tables(controller: RealtimeController) -> str:
 
 
 def _pad_to_blocks(matrix: FloatArray) -> FloatArray:
-    """The matrix, padded with zero rows and columns to multiples of `BLOCK_SIZE`."""
+    """Pad a matrix with zero rows and columns to multiples of `BLOCK_SIZE`."""
     return np.pad(matrix, [(0, -length % BLOCK_SIZE) for length in matrix.shape])
 
 
 def _read_template(name: str) -> str:
-    """Text of the template file of this name, which lies in this package."""
+    """Read the template file of this name, which is in this package."""
     return (files("study.workflows.equalizer.controller") / name).read_text("utf-8")

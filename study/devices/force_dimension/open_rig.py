@@ -27,8 +27,8 @@ RATE_HZ = 1000.0
 
 def open_force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
     """Open a device of the vendor by the name of its model (`MODELS`), with watchdog and gravity compensation, and its
-    accelerometer where one is configured and `settings.with_sensor`. Raises `DeviceError` with the reason; device and
-    accelerometer are then stopped and closed."""
+    accelerometer where one is configured and `settings.with_sensor` is true. Raises `DeviceError` with the reason;
+    device and accelerometer are then stopped and closed."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
@@ -56,7 +56,7 @@ def _make_rig(
             check_accepted(info, datetime.now(UTC).date())
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
         drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
-        # drops_after_s: time (s) after which the device's watchdog drops the force; 0 without a watchdog.
+        # drops_after_s is the timeout (s) of the device's watchdog, and 0 without a watchdog.
         if drops_after_s > 0:
             check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
@@ -69,14 +69,14 @@ def _make_rig(
 
 
 def read_info(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Properties of an open device, with `has_sensor` at its default. effective_mass_kg: from the laboratory's
+    """Read the properties of an open device, with `has_sensor` at its default. effective_mass_kg: from the laboratory's
     settings; None for the model's. Raises `LibraryError`, and `DeviceError` without a firmware or serial number: an
     acceptance holds for one device only, and could not be assigned."""
     firmware, serial = handle.read_firmware_version(), handle.read_serial_number()
     if not 0 < firmware < math.inf:
-        raise _make_unknown_fact_error(model, "firmware", f"gives {firmware:g} as the version")
+        raise _make_unknown_property_error(model, "firmware", f"gives {firmware:g} as the version")
     if serial == UNKNOWN_SERIAL:
-        raise _make_unknown_fact_error(model, "serial number", "answers and gives none")
+        raise _make_unknown_property_error(model, "serial number", "answers and gives none")
     return DeviceInfo(
         name=model.name,
         simulated=False,
@@ -87,11 +87,12 @@ def read_info(handle: Handle, library: Library, model: DeviceModel, effective_ma
     )
 
 
-def _make_unknown_fact_error(model: DeviceModel, fact: str, library_answer: str) -> DeviceError:
-    """Error for a fact that the device does not report. fact: its name; library_answer: what the library returned
+def _make_unknown_property_error(model: DeviceModel, property_name: str, library_answer: str) -> DeviceError:
+    """Make the error for a property that the device does not report. property_name: such as "firmware";
+    library_answer: what the library returned
     instead, as a predicate."""
     return DeviceError(
-        f"The {model.name} does not report its {fact}",
+        f"The {model.name} does not report its {property_name}",
         f"Its library {library_answer}, so no acceptance can be known to hold for it. Nothing has moved.",
         "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
     )
