@@ -37,6 +37,7 @@ CENSORING_NOTE = (
     "On a stronger device the value would be higher; it is not a bound, because the true threshold may lie to either "
     "side."
 )
+"""Sentence on what a threshold that the cap cut means."""
 REVERSAL_WORDS = ThresholdWords(
     noun="reversal means",
     cut_clause="which cut off peaks of the staircase",
@@ -50,6 +51,7 @@ REVERSAL_WORDS = ThresholdWords(
     "into the threshold (solid line).",
     d_prime_note="A staircase keeps d' of the answers near 1.6 for any cue.",
 )
+"""Words for staircases."""
 
 
 def _make_psi_words(rule: StaircaseRule) -> ThresholdWords:

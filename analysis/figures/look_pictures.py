@@ -245,16 +245,16 @@ def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
     """Draw a recorded channel, and central differences of the channel whose derivative it should be."""
     rate_hz = overview.recording.sample_rate_hz
     by_label = {channel.label: channel for channel in overview.channels}
-    recorded = by_label[pair.higher_label]
+    recorded = by_label[pair.derivative]
     start, stop = _find_most_varying_part(recorded, overview.stretches)
     times_s = np.arange(start, stop) / rate_hz
     # Differences within this stretch only: positions jump where two parts of a recording meet.
-    differences = differentiate(by_label[pair.lower_label].samples[start:stop], pair.order, rate_hz)
+    differences = differentiate(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
     style_axes(panel)
     panel.plot(times_s, recorded.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
     panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
     panel.set_title(
-        f"{pair.higher_label} ({_format_unit(recorded.unit)}) and {pair.lower_label}", fontsize=9, loc="left", pad=3
+        f"{pair.derivative} ({_format_unit(recorded.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3
     )
     panel.set_xlim(float(times_s[0]), float(times_s[-1]))
 

@@ -32,6 +32,7 @@ _AXIS_LABELS: dict[Quantity, str] = {
     "threshold_mm": "Displacement (mm)",
     "above_detection_db": "Above detection (dB)",
 }
+"""Label of the vertical axis, by quantity."""
 _MARKER_SPREAD_TICKS = 0.4
 """Width over which the participants' markers are spread at each frequency, in distances between ticks."""
 _MEDIAN_HALF_LENGTH = 0.32

@@ -24,8 +24,11 @@ class Channel:
     role: str
     """command, response, position, excitation or condition."""
     name: str
+    """Name in the recording, such as ax."""
     quantity: str
+    """Physical quantity, such as acceleration."""
     unit: str
+    """Unit of the samples, such as m/s^2; "1" for a number without a unit."""
     samples: FloatArray
     """(n,), in the channel's unit; NaN where a sample is missing."""
 

@@ -24,6 +24,7 @@ KINEMATICS, LAGS = "derivatives", "lag between channels"
 _DERIVATIVE_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^2": 2}
 """Order of the time derivative of position or angle, by unit."""
 _DERIVATIVE_NAMES = {1: "the derivative", 2: "the second derivative"}
+"""Name of the derivative in a finding, by order."""
 LEAST_COHERENT_SHARE = 0.3
 """Least coherent share of a channel's power; below it, the channel measures a different motion and is not compared.
 Chosen, as are the limits below."""
@@ -38,6 +39,7 @@ _FILTER_ADVICE = (
     "It is delayed as well as smaller, as by a sensor's filter or a flexible part between both: model this, or "
     "compare the channels only below its corner frequency. A wrong unit or factor would cause no delay."
 )
+"""Advice where a gain below 1 comes with a lag."""
 _UNIT_ERROR_FACTORS = (
     (1000.0, "mm taken for m, or ms for s"), (180 / np.pi, "degrees taken for radians"), (9.80665, "g for m/s^2"),
     (2 * np.pi, "turns taken for radians, or Hz for rad/s"), (60.0, "per minute taken for per second"),
@@ -49,11 +51,12 @@ _UNIT_ERROR_FACTORS = (
 
 @dataclass(frozen=True, slots=True)
 class KinematicPair:
-    """Two channels of which the second should be the derivative of the first, and how far they agree."""
+    """Two channels of which the second should be the derivative of the first, and how far they agree. The names of the
+    fields are keys of the JSON file of `look_at_recordings`."""
 
-    lower_label: str
+    place: str
     """Label of the channel that is differentiated."""
-    higher_label: str
+    derivative: str
     """Label of the channel that it is compared with."""
     order: int
     """1: first derivative, 2: second."""
@@ -142,8 +145,8 @@ def _check_pair(pair: KinematicPair, rate_hz: float) -> Check:
     agreement = pair.agreement
     lag_text = _format_lag(agreement.lag_samples, rate_hz)
     text = (
-        f"{pair.higher_label} is {typeset(f'{agreement.gain:.4g}')} times {_DERIVATIVE_NAMES[pair.order]} of "
-        f"{pair.lower_label}{lag_text} "
+        f"{pair.derivative} is {typeset(f'{agreement.gain:.4g}')} times {_DERIVATIVE_NAMES[pair.order]} of "
+        f"{pair.place}{lag_text} "
         f"(lines with {agreement.coherent_share:.0%} of its power)."
     )
     gain_error = abs(abs(agreement.gain) - 1)

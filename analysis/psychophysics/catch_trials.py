@@ -21,6 +21,7 @@ class CatchTally:
     """Catch trials of a participant at a frequency, and the lapse rate with its 95 % interval."""
 
     subject: str
+    """Code of the participant."""
     frequency_hz: float
     given: int
     """Number of answered catch trials that count; always above 0."""

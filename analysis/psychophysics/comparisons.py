@@ -28,10 +28,12 @@ class PairDifference:
 
     first: str
     second: str
+    """Names of the two groups."""
     difference: float
     """Mean of the second group minus mean of the first."""
     lower: float
     upper: float
+    """Limits of the simultaneous confidence interval of the difference."""
     p: float
     """Tukey-Kramer p-value, corrected for all pairs."""
 
@@ -41,9 +43,11 @@ class ComparisonInterval:
     """A group's mean and its comparison interval, which is not a confidence interval."""
 
     name: str
+    """Name of the group."""
     mean: float
     lower: float
     upper: float
+    """Limits of the comparison interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +59,9 @@ class Comparisons:
     critical_range: float | None
     """Quantile of the studentized range; None where nothing can be compared."""
     pairs: tuple[PairDifference, ...]
+    """Every pair of groups, in the order of the groups; empty where nothing can be compared."""
     intervals: tuple[ComparisonInterval, ...]
+    """One per group; empty where nothing can be compared."""
     notes: tuple[str, ...]
     """Reason, in words, where nothing can be compared."""
 

@@ -171,31 +171,36 @@ class _PairedDifferences:
     differences, second minus first. answered_both: (n,), `has_answers` of `compute_mean_errors`."""
 
     def __init__(self, paired_db: FloatArray, answered_both: NDArray[np.bool_]) -> None:
-        self.paired_db, self.differences = paired_db, paired_db[:, 1] - paired_db[:, 0]
-        errors = compute_mean_errors(self.differences[:, None], answered_both[:, None])
+        """Compute the differences and their statistics; at least two participants must have answered at both."""
+        self.paired_db, self.differences_db = paired_db, paired_db[:, 1] - paired_db[:, 0]
+        errors = compute_mean_errors(self.differences_db[:, None], answered_both[:, None])
         self.people, self.all_answered = int(errors.people[0]), bool(answered_both.all())
-        self.mean, self.error, self.df = float(self.differences.mean()), float(errors.error[0]), float(errors.df[0])
-        self.p = float(2.0 * student.sf(abs(self.mean) / self.error, self.df))
+        self.mean_db, self.error_db, self.df = (
+            float(self.differences_db.mean()),
+            float(errors.error[0]),
+            float(errors.df[0]),
+        )
+        self.p = float(2.0 * student.sf(abs(self.mean_db) / self.error_db, self.df))
 
 
 def _compute_contrast(
     frequency_hz: float, against_hz: float, pair: _PairedDifferences, p_holm: float, confidence: float
 ) -> Contrast:
     """Compute the contrast of a pair, with its interval at this confidence and its further tests."""
-    half_width = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error
-    p_equivalence = _compute_equivalence_p(pair.mean, pair.error, pair.df)
+    half_width_db = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error_db
+    p_equivalence = _compute_equivalence_p(pair.mean_db, pair.error_db, pair.df)
     return Contrast(
         frequency_hz=frequency_hz,
         against_hz=against_hz,
         participants=pair.people,
-        difference_db=pair.mean,
-        lower_db=pair.mean - half_width,
-        upper_db=pair.mean + half_width,
+        difference_db=pair.mean_db,
+        lower_db=pair.mean_db - half_width_db,
+        upper_db=pair.mean_db + half_width_db,
         p=pair.p,
         p_holm=p_holm,
-        effect_size=pair.mean / float(pair.differences.std(ddof=1)) if pair.all_answered else None,
+        effect_size=pair.mean_db / float(pair.differences_db.std(ddof=1)) if pair.all_answered else None,
         p_equivalence=p_equivalence if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
-        p_spread=float(pearsonr(pair.paired_db.sum(axis=1), pair.differences).pvalue)
+        p_spread=float(pearsonr(pair.paired_db.sum(axis=1), pair.differences_db).pvalue)
         if pair.all_answered and pair.people > 2
         else None,
     )

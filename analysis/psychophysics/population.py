@@ -15,7 +15,9 @@ class Population(Enum):
     """Who answered a trial, and whether a stimulus could be felt."""
 
     PEOPLE = "people"
+    """A person answered, and the device moved."""
     SIMULATED = "simulated participants"
+    """The program answered."""
     NOT_FELT = "people who felt nothing"
     """A person answered while the device was simulated, so that nothing moved: a rehearsal, not a measurement."""
 

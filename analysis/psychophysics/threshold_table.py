@@ -21,7 +21,9 @@ class ThresholdTable:
     quantity: Quantity
     """Quantity of `values`, which determines their unit."""
     subjects: tuple[str, ...]
+    """Codes of the participants: the rows."""
     frequencies_hz: tuple[float, ...]
+    """Ascending: the columns."""
     values: tuple[tuple[float | None, ...], ...]
     """values[subject][frequency]; None where there is no completed run."""
     censored: tuple[tuple[bool, ...], ...]

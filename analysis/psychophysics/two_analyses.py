@@ -29,21 +29,25 @@ NOTHING_DECLARED_NOTE = (
     "first because the cap distorts it least; a choice made after the data were seen is not a "
     "declaration."
 )
+"""Sentence where the protocol declares nothing."""
 NEAR_CAP_WARNING = (
     "Near the cap the published intervals do not have their stated coverage, and the published 'not significant' is "
     "weak evidence."
 )
+"""Sentence where the cap cut thresholds."""
 
 
 _ANALYSIS_NOUNS = {
     "hierarchical": "the hierarchical model of all answers",
     "published": "the published one-way analysis",
 }
+"""Name of each analysis that a protocol can declare as primary."""
 _INTERVAL_DESCRIPTIONS = {
     "hierarchical": "95 %, over people's pseudo-thresholds in dB, paired, t with n − 1 "
     "degrees of freedom; a single test, so uncorrected.",
     "published": "95 %, Tukey's of means of runs in newtons, which holds for all pairs together.",
 }
+"""Description of the interval of each such analysis."""
 
 
 def describe_declaration(declared: AnalysisSettings) -> str:

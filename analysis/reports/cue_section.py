@@ -24,6 +24,7 @@ _INTRODUCTION = (
     "direction (coupling). Each is in dB; harmonics and motion across count by the most that they can add to the "
     "amplitude."
 )
+"""First paragraph of the section."""
 
 
 def make_cue_sections(findings: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:

@@ -13,12 +13,14 @@ from analysis.reports.page import Section, Table
 from analysis.wording import MISSING, conjoin
 
 _KINDS_IN_ORDER: tuple[Kind, ...] = ("odd", "even", "either", "varying")
+"""Order of the columns of the table."""
 _KIND_NAMES: Mapping[Kind, str] = {
     "odd": "Odd",
     "even": "Even",
     "either": "Odd or even",
     "varying": "Varying between periods",
 }
+"""Name of each kind of distortion, as a heading and as the beginning of a sentence."""
 _TREND_DESCRIPTIONS = {
     "falls": "falls as the level rises",
     "rises": "rises with the level",
@@ -26,6 +28,7 @@ _TREND_DESCRIPTIONS = {
     "stays": "has the same share at all levels",
     "": "is present, at too few levels to determine how it grows",
 }
+"""Predicate of a sentence for each value of `LevelTrend.level_dependence`."""
 _LEAST_RESPONSE_RATIO = 0.1
 """Response relative to the largest of its quantity, input and level, below which a channel has no row. Chosen."""
 

@@ -26,6 +26,7 @@ _SHARE_NOTE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
     "is named, the share of the mismatch's power that occurs in it."
 )
+"""Note below a table of mismatches."""
 _PART_NAMES: Mapping[str, str] = {"fit": "the fitted data", "test": "held-out data"}
 """Name of each part of the data in captions and rows, by its key."""
 

@@ -1,8 +1,9 @@
-"""Amplifier lag: a closed current loop that follows its command as a first-order low pass; an entry of the catalogue.
+"""Amplifier lag: a closed current loop that follows its command as a first-order low pass.
 
     T dF/dt + F = u        T in s, command u and actuator force F in N (a rotation: N m)
 
-The solution for a command that is held over a step is exact (`simulation.command_path`).
+The solution for a command that is held over a step is exact (`simulation.command_path`). An entry of `catalogue`, which
+simulation and diagnosis look up by name.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 
 The moving mass along the driven axis is split: the motor becomes a body of its own, which the command drives, and acts
 on the handle through a spring and a damper that only push. The gap and the displacement r of motor minus handle are in
-m (a rotation: rad). An entry of the catalogue.
+m (a rotation: rad). An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 from dataclasses import replace

@@ -5,7 +5,8 @@
 The sample with time stamp t was taken at t (1 + ppm 1e-6): later than t for ppm > 0, by a clock that runs slow. A file
 may have been resampled from one clock to the other: `interpolated` is the share (0 to 1) of linear interpolation in the
 resampling; the rest is band-limited and does not change the spectrum. `with_position` is 1 where the position has the
-clock of the response and 0 where it has that of the commands. An entry of the catalogue.
+clock of the response and 0 where it has that of the commands. An entry of `catalogue`, which simulation and diagnosis
+look up by name.
 """
 
 import numpy as np

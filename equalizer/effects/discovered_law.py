@@ -55,6 +55,7 @@ class Channels:
     quantity: str = "acceleration"
     """Quantity of the response."""
     conditions: tuple[str, ...] = ()
+    """Names of the recorded conditions."""
 
 
 def collect_channels(recording: Recording) -> Channels:

@@ -27,14 +27,15 @@ STEPS = 4
 between samples."""
 
 ALL_SITES = -1
-"""Placeholder for the site when starting values are asked for all axes or channels together."""
+"""Placeholder for the index of a site when starting values are asked for all axes or channels together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number that a fit may move between `lower` and `upper`."""
+    """A parameter of an effect that a fit varies between `lower` and `upper`, in SI units."""
 
     name: str
+    """Key in `Values`."""
     lower: float
     upper: float
     none: float | None
@@ -51,7 +52,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Changes the linear model: masses, dampers, springs, couplings."""
+    """Action that changes the linear model: masses, dampers, springs, couplings."""
 
     change: Callable[[MechanicalModel, int, Values], MechanicalModel]
     """Arguments: model, index of the driven axis, values. Returns the changed model."""
@@ -59,7 +60,7 @@ class Structure:
 
 @dataclass(frozen=True, slots=True)
 class AxisForce:
-    """A force along a driven axis that depends on the motion."""
+    """Action that adds a force along a driven axis that depends on the motion."""
 
     law: Any
     """Compiled function law(parameters, memory, step_motion) -> mean force in N over a step;
@@ -78,8 +79,8 @@ class AxisForce:
 
 @dataclass(frozen=True, slots=True)
 class JointForce:
-    """A force between two bodies, or within a body that the model takes as rigid, that depends on their relative
-    motion."""
+    """Action that adds a force between two bodies, or within a body that the model takes as rigid, that depends on
+    their relative motion."""
 
     change: Callable[[MechanicalModel, int, Values], tuple[MechanicalModel, FloatArray]]
     """Arguments as in `Structure`. Returns the model with the joint in it (its additional coordinates come last), and
@@ -100,7 +101,7 @@ def pack_values(*names: str) -> Callable[[MechanicalModel, int, Values], FloatAr
 
 @dataclass(frozen=True, slots=True)
 class OnCommand:
-    """Changes one channel of the command."""
+    """Action that changes one channel of the command before it becomes a force."""
 
     change: Callable[[FloatArray, float, Values], FloatArray]
     """Arguments: samples (n,), sample period in seconds, values. A sample is the mean over its period."""
@@ -116,7 +117,7 @@ class OnCommand:
 
 @dataclass(frozen=True, slots=True)
 class OnResponse:
-    """Changes the response."""
+    """Action that changes the sensed response."""
 
     change: Callable[[FloatArray, float, tuple[int, ...], Values], FloatArray]
     """Arguments: samples (n, p), sample rate in Hz, indices of the affected channels, values."""
@@ -138,6 +139,7 @@ class OnResponse:
 
 
 Action = Structure | AxisForce | JointForce | OnCommand | OnResponse
+"""The five ways in which an effect acts."""
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
@@ -147,7 +149,9 @@ class Effect:
 
     name: str
     equation: str
+    """Equation in ASCII, with the names of the parameters."""
     source: str
+    """Reference of the equation."""
     signature: str
     """Features of the effect in the data, as the end of a sentence that begins with its name."""
     parameters: tuple[Parameter, ...]
@@ -198,4 +202,5 @@ class PlacedEffect:
 
     effect: Effect
     sites: tuple[int, ...]
+    """Indices of driven axes or, for a sensor effect, of response channels."""
     values: Values

@@ -3,7 +3,8 @@
     F = -k (x - x_s) where x lies beyond the stop x_s, else 0        k in N/m (a rotation: N m/rad)
 
 A second stop at -x_s has the stiffness `opposite` times k (0 = none). Beyond means away from zero, unless `side` states
-the direction (1: upwards, -1: downwards); there is no second stop then. An entry of the catalogue.
+the direction (1: upwards, -1: downwards); there is no second stop then. An entry of `catalogue`, which simulation and
+diagnosis look up by name.
 """
 
 import numpy as np

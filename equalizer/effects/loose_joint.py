@@ -8,7 +8,8 @@ Over a step the spring's force is the weighted mean of the forces at both ends (
 = -k ((1 - theta) p + theta p+), with p the deflection of the spring at the start and p+ = p_free + c F the deflection
 at the end, which depends on F through the compliance c of the structure over the step. theta is 1/2 (trapezoidal rule)
 where k c is small, and tends to 1 (backward Euler) where the spring is too stiff for the step and the trapezoidal rule
-would ring. Friction is solved last, for the velocity that results with the spring's force. An entry of the catalogue.
+would ring. Friction is solved last, for the velocity that results with the spring's force. An entry of `catalogue`,
+which simulation and diagnosis look up by name.
 """
 
 from itertools import product

@@ -88,11 +88,11 @@ def _lose_positions_as_measured(
     return _repeat_rows(position, is_lost | _is_clearly_repeated(position, measured))
 
 
-def _repeat_rows(position: FloatArray, lost: BoolArray) -> FloatArray:
+def _repeat_rows(position: FloatArray, is_lost: BoolArray) -> FloatArray:
     """Replace each lost row of positions (n, p) by the last row that was not lost."""
-    repeated = np.empty(position.shape)
-    repeat_lost_samples(np.ascontiguousarray(position), lost, repeated)
-    return repeated
+    repeated_position = np.empty(position.shape)
+    repeat_lost_samples(np.ascontiguousarray(position), is_lost, repeated_position)
+    return repeated_position
 
 
 def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> BoolArray:
@@ -124,14 +124,14 @@ def _estimate_fraction(evidence: Evidence, columns: list[int], direction: int) -
     `LEAST_LOST_SAMPLES`. direction: 1, or -1 for the negative control, in reversed time (samples that equal the
     next)."""
     samples, measured = evidence.predicted[::direction, columns], evidence.response[::direction, columns]
-    noise, used = evidence.noise[columns], evidence.used[::direction] > 0
+    noise, is_used = evidence.noise[columns], evidence.used[::direction] > 0
     is_distinguishable = (
         np.sum((np.diff(samples, axis=0, prepend=samples[:1]) / noise) ** 2, axis=1) > DISTINGUISHABLE_SIGMA**2
     )
-    is_countable = is_distinguishable & used
+    is_countable = is_distinguishable & is_used
     if not is_countable.any():
         return None
-    fraction = 0.01
+    fraction = 0.01  # start of the iteration
     for _ in range(FRACTION_ITERATIONS):
         is_lost = _repeat_by_likelihood(samples, measured, noise, fraction)[1]
         lost_count = int(np.count_nonzero(is_lost & is_countable))

@@ -3,7 +3,7 @@
     y = x + A sin(2 pi f t + phase)        A in the unit of the response, f in Hz, phase in rad
 
 Starting values come from spectral lines of the residual that are strong, steady over the recording, and not commanded.
-An entry of the catalogue.
+An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import math

@@ -3,7 +3,8 @@
     y = R x,    R the rotation of a rotation vector (degrees about x, y, z)
 
 Three channels are rotated; of two channels, the readings are the first two components of the rotated vector whose third
-component is 0: a rotation where R is about the axis perpendicular to both. An entry of the catalogue.
+component is 0: a rotation where R is about the axis perpendicular to both. An entry of `catalogue`, which simulation
+and diagnosis look up by name.
 """
 
 import math

@@ -4,8 +4,8 @@
 
 D (N s/m) and K (N/m) are the model's damping and stiffness to the ground along the axis, mainly those of the hand. v
 and x are the velocity (m/s) and position (m) of the axis, t the time (s) from the start of the recording. Starting
-values: least squares of the missing force on the modulated forces, at every modulation frequency. An entry of the
-catalogue.
+values: least squares of the missing force on the modulated forces, at every modulation frequency. An entry of
+`catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np

@@ -99,9 +99,11 @@ class SameLevelFit:
     """Difference of a cue between two directions at the same level, with its standard error and residuals."""
 
     difference_db: float
+    """Values at side +1 minus those at side -1."""
     error_db: float
     """Standard error."""
     df: int
+    """Degrees of freedom of the residuals."""
     residual_db: FloatArray
     """(n,): value of each trial minus the fitted value for its direction and level."""
 

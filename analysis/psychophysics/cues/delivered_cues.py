@@ -39,6 +39,7 @@ class DeliveredTrials:
 
     frequency_hz: float
     subjects: tuple[str, ...]
+    """Codes of the participants, in the order of their first trial."""
     person: NDArray[np.intp]
     """Index of each trial's participant in `subjects`."""
     side: FloatArray
@@ -167,6 +168,7 @@ _RATIO_FUNCTIONS: dict[Cue, Callable[[Trial], float | None]] = {
     Cue.SPECTRUM: _compute_spectrum_ratio,
     Cue.COUPLING: _compute_coupling_ratio,
 }
+"""Function that computes the ratio of a trial whose dB value is the cue, by cue."""
 
 
 def _convert_to_db(amplitudes: list[float]) -> FloatArray:

@@ -25,7 +25,8 @@ from scipy.special import erfcx, log_ndtr, ndtr, ndtri_exp
 from equalizer.signals.signal import FloatArray
 
 TARGET_PROPORTION = 0.5 ** (1 / 3)
-"""Share of right answers at a threshold: where one wrong and three right answers in a row are equally likely."""
+"""Share p of right answers at a threshold: where three right answers in a row, which lower the level, are as likely as
+not, p^3 = 1/2 (H. Levitt, J. Acoust. Soc. Am. 49 (1971), 467-477)."""
 NEPER_PER_DB = math.log(10.0) / 20.0
 """Natural logarithm of an amplitude ratio of 1 dB."""
 LARGEST_T = 30.0

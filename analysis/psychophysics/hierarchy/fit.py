@@ -74,7 +74,7 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
         family=family,
         parameters=maximum.parameters,
         latent=objective.marginal.find_modes(maximum.parameters)[0],
-        shared_means=maximum.moments.shared[:, 1:],
+        shared_means=maximum.moments.shared_means[:, 1:],
         shared_errors=np.sqrt(np.diagonal(maximum.moments.covariance, axis1=1, axis2=2)[:, 1:]),
         log_likelihood=maximum.log_likelihood,
         scores=maximum.scores,

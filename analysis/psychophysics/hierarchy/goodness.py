@@ -47,7 +47,7 @@ class GoodnessOfFit:
 
 def compute_goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
     """Compute the shares in at most `BINS` bins of about equally many trials, in ascending order of the predicted
-    share. All trials of a cell (one person, level and direction) are in the same bin."""
+    share. All trials of a cell (one run, level and direction) are in the same bin."""
     predicted_shares, answers = predict_shares(fit), fit.answers
     trials = answers.right + answers.wrong
     cell_order = np.argsort(predicted_shares, kind="stable")

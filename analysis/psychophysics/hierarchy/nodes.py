@@ -51,15 +51,15 @@ weight is on a single node. Chosen: small against the variance itself."""
 class Moments:
     """Posterior moments of each person's latent parameters that place the nodes; n persons, k frequencies."""
 
-    shared: FloatArray
+    shared_means: FloatArray
     """(n, 3): means of u, b and c."""
     covariance: FloatArray
     """(n, 3, 3): covariance of u, b and c."""
-    threshold: FloatArray
+    threshold_means: FloatArray
     """(n, k): means of the thresholds, dB."""
     regression: FloatArray
     """(n, k, 3): regression coefficients of the thresholds on u, b and c."""
-    variance: FloatArray
+    threshold_variances: FloatArray
     """(n, k): variances of the thresholds at given u, b and c, dB²."""
 
 
@@ -67,11 +67,11 @@ class Moments:
 class Nodes:
     """Positions and log weights of the nodes: n persons, q outer nodes, k frequencies, r inner nodes."""
 
-    shared: FloatArray
+    outer_positions: FloatArray
     """(n, q, 3): outer nodes, u (dB), b and c (d')."""
-    log_weight: FloatArray
+    outer_log_weight: FloatArray
     """(n, q): of the outer nodes."""
-    threshold: FloatArray
+    inner_positions: FloatArray
     """(n, q, k, r): inner nodes, dB."""
     inner_log_weight: FloatArray
     """(n, 1, k, r): of the inner nodes, the same at every outer node."""
@@ -126,46 +126,48 @@ def compute_laplace_moments(parameters: FloatArray, mode: FloatArray, informatio
     covariance[:, 0, 0] += u_variance
     shared_means = mode @ weights.T
     shared_means[:, 0] -= u_weight * population.means.sum()
-    variance = 1.0 / (information[:, index, index] + 1.0 / interaction_variance)
+    threshold_variances = 1.0 / (information[:, index, index] + 1.0 / interaction_variance)
     coupling = np.concatenate([np.full((len(mode), k, 1), 1.0 / interaction_variance), -information[:, :k, k:]], axis=2)
-    return Moments(shared_means, covariance, mode[:, :k], coupling * variance[..., None], variance)
+    return Moments(
+        shared_means, covariance, mode[:, :k], coupling * threshold_variances[..., None], threshold_variances
+    )
 
 
 def place_nodes(moments: Moments, counts: NodeCounts) -> Nodes:
     """Place nodes with log weights for each person: outer nodes for u, b and c, inner nodes for each threshold, both
     scaled by the moments. counts: number of nodes by latent parameter."""
     cholesky = np.linalg.cholesky(moments.covariance)
-    positions, log_weights = _make_product_rule(counts)
-    deviations = np.einsum("nab,qb->nqa", cholesky, positions)
-    threshold_centre_db = moments.threshold[:, None] + np.einsum("nka,nqa->nqk", moments.regression, deviations)
-    inner_positions, inner_weights = _make_gauss_hermite_rule(counts.threshold)
-    threshold_sd_db = np.sqrt(moments.variance)[:, None, :, None]
+    outer_standard_positions, outer_log_weights = _make_product_rule(counts)
+    deviations = np.einsum("nab,qb->nqa", cholesky, outer_standard_positions)
+    threshold_centre_db = moments.threshold_means[:, None] + np.einsum("nka,nqa->nqk", moments.regression, deviations)
+    inner_standard_positions, inner_log_weights = _make_gauss_hermite_rule(counts.threshold)
+    threshold_sd_db = np.sqrt(moments.threshold_variances)[:, None, :, None]
     return Nodes(
-        shared=moments.shared[:, None] + deviations,
-        log_weight=log_weights + np.log(np.diagonal(cholesky, axis1=1, axis2=2)).sum(axis=1)[:, None],
-        threshold=threshold_centre_db[..., None] + threshold_sd_db * inner_positions,
-        inner_log_weight=inner_weights + np.log(threshold_sd_db),
+        outer_positions=moments.shared_means[:, None] + deviations,
+        outer_log_weight=outer_log_weights + np.log(np.diagonal(cholesky, axis1=1, axis2=2)).sum(axis=1)[:, None],
+        inner_positions=threshold_centre_db[..., None] + threshold_sd_db * inner_standard_positions,
+        inner_log_weight=inner_log_weights + np.log(threshold_sd_db),
     )
 
 
 def compute_posterior_moments(nodes: Nodes, outer_weight: FloatArray, inner_weight: FloatArray) -> Moments:
     """Compute the posterior moments by the nodes. outer_weight: (n, q), posterior probabilities of the outer nodes;
     inner_weight: (n, q, k, r), those of the inner nodes at each outer node."""
-    shared_means = np.einsum("nq,nqa->na", outer_weight, nodes.shared)
-    outer_deviation = nodes.shared - shared_means[:, None]
+    shared_means = np.einsum("nq,nqa->na", outer_weight, nodes.outer_positions)
+    outer_deviation = nodes.outer_positions - shared_means[:, None]
     covariance = np.einsum("nq,nqa,nqb->nab", outer_weight, outer_deviation, outer_deviation)
-    covariance += LEAST_VARIANCE_SHARE * np.einsum("na,ab->nab", nodes.shared.var(axis=1), np.eye(3))
-    inner_means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.threshold)
-    threshold = np.einsum("nq,nqk->nk", outer_weight, inner_means)
-    threshold_deviation = inner_means - threshold[:, None]
+    covariance += LEAST_VARIANCE_SHARE * np.einsum("na,ab->nab", nodes.outer_positions.var(axis=1), np.eye(3))
+    inner_means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.inner_positions)
+    threshold_means = np.einsum("nq,nqk->nk", outer_weight, inner_means)
+    threshold_deviation = inner_means - threshold_means[:, None]
     regression = np.einsum("nq,nqa,nqk->nka", outer_weight, outer_deviation, threshold_deviation) @ np.linalg.pinv(
         covariance, hermitian=True
     )
     residual = threshold_deviation - np.einsum("nka,nqa->nqk", regression, outer_deviation)
-    inner_variance = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.threshold - inner_means[..., None]) ** 2)
-    variance = np.einsum("nq,nqk->nk", outer_weight, inner_variance + residual**2)
-    variance += LEAST_VARIANCE_SHARE * nodes.threshold.var(axis=3).mean(axis=1)
-    return Moments(shared_means, covariance, threshold, regression, variance)
+    inner_variance = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.inner_positions - inner_means[..., None]) ** 2)
+    threshold_variances = np.einsum("nq,nqk->nk", outer_weight, inner_variance + residual**2)
+    threshold_variances += LEAST_VARIANCE_SHARE * nodes.inner_positions.var(axis=3).mean(axis=1)
+    return Moments(shared_means, covariance, threshold_means, regression, threshold_variances)
 
 
 @cache

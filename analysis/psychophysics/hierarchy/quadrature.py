@@ -89,7 +89,7 @@ class Quadrature:
     def compute_log_likelihoods(self, nodes: Nodes, lapse: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Log-likelihood of each run, and its first two derivatives by the logit of the lapse rate, (n, q, k, r)
         each."""
-        node_sets = zip(self._persons, nodes.shared, nodes.threshold, strict=True)
+        node_sets = zip(self._persons, nodes.outer_positions, nodes.inner_positions, strict=True)
         by_person = [
             person.compute_log_likelihoods(shared, threshold, lapse) for person, shared, threshold in node_sets
         ]
@@ -105,13 +105,13 @@ def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, 
     population = PopulationParameters.from_parameters(parameters, k)
     nodes = place_nodes(moments, counts)
     likelihood, logit_slope, logit_curvature = quadrature.compute_log_likelihoods(nodes, population.lapse)
-    u, b, c = np.moveaxis(nodes.shared, 2, 0)
-    e = (nodes.threshold - population.means[:, None] - u[..., None, None]) / population.interaction_sd
+    u, b, c = np.moveaxis(nodes.outer_positions, 2, 0)
+    e = (nodes.inner_positions - population.means[:, None] - u[..., None, None]) / population.interaction_sd
     inner_integral, inner_weight = _normalise(nodes.inner_log_weight + likelihood - 0.5 * e**2)
     deviations = np.stack([
         u / population.shared_sd, (b - population.slope) / population.slope_sd, c / population.criterion_sd
     ], axis=-1)  # fmt: skip
-    outer_terms = nodes.log_weight + inner_integral.sum(axis=2) - 0.5 * (deviations**2).sum(axis=2)
+    outer_terms = nodes.outer_log_weight + inner_integral.sum(axis=2) - 0.5 * (deviations**2).sum(axis=2)
     value, weight = _normalise(outer_terms)
     value -= k * math.log(population.interaction_sd) + math.log(
         population.shared_sd * population.slope_sd * population.criterion_sd

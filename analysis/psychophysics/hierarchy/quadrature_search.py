@@ -47,6 +47,7 @@ class QuadratureEvaluation:
     cost: float
     """Minus the penalized log marginal likelihood."""
     log_likelihood: float
+    """Log marginal likelihood of all persons, without the penalty."""
     scores: FloatArray
     """(n, size): gradient of each person's log marginal likelihood."""
     hessian: FloatArray
@@ -63,6 +64,7 @@ class QuadratureSearch:
     """Newton search for the maximum of one objective by quadrature."""
 
     def __init__(self, objective: Objective) -> None:
+        """Prepare the quadrature, and the bounds and longest steps (size,) of the parameters, for an objective."""
         self.objective, self._quadrature = objective, Quadrature(objective.answers, objective.family)
         bounds = [
             (-np.inf if lower is None else lower, np.inf if upper is None else upper)

@@ -45,14 +45,17 @@ class SinglePersons:
     """Estimates of each person without a population, and likelihood intervals of their runs."""
 
     family: Family
+    """Shape of the psychometric function."""
     frequencies_hz: tuple[float, ...]
     """Frequencies with answers, in ascending order."""
     confidence: float
     """Confidence of the intervals of `runs`, 0 to 1."""
     persons: tuple[PersonEstimate, ...]
+    """Most probable thresholds, slope and criterion of each participant."""
     lapse: float
     """Most probable lapse rate (0 to 1), the same for all persons."""
     runs: tuple[RunLikelihood, ...]
+    """Likelihood interval of each run."""
 
 
 def fit_single_persons(
@@ -68,6 +71,7 @@ def fit_single_persons(
     parameters[layout.log_sds] = [0.0, math.log(THRESHOLD_SD_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
     def evaluate_cost(logit_lapse: float) -> float:
+        """Evaluate the cost at a lapse rate, given by its logit."""
         parameters[layout.lapse] = logit_lapse
         return objective(parameters)[0]
 

@@ -55,6 +55,7 @@ class Share:
     """A share of the simulated studies with its interval."""
 
     value: float
+    """Share, 0 to 1."""
     lower: float
     upper: float
     """Limits of Wilson's 95 % interval, due to the limited number of simulated studies."""

@@ -34,6 +34,7 @@ TRAVEL_TOLERANCE = 3e-3
 """Residual of the travel equation, in units of z_max, at which the iteration ends: the last linear correction reduces
 it to about its square."""
 _VECTOR = types.float64[::1]
+"""Type of a contiguous vector that a kernel may write to."""
 
 
 @njit(inline="always")

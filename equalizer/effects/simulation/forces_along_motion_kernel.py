@@ -38,8 +38,9 @@ from equalizer.signals.signal import FloatArray
 
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
-_THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
+_THREE_MATRICES = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-untyped-call]
+"""Types of the kernel's arguments."""
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
 """Positions, velocities and accelerations, (n, m) each."""
@@ -70,7 +71,9 @@ def _write_all_axes(
 
 
 @njit(
-    types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY_MATRIX, _MATRIX, _MATRIX, types.float64),
+    types.void(
+        _LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE_MATRICES, READ_ONLY_MATRIX, _MATRIX, _MATRIX, types.float64
+    ),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
 def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays

@@ -21,6 +21,7 @@ _OUTPUT_MATRIX = types.float64[:, ::1]
 _INPUT_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _INPUT_VECTOR = types.Array(types.float64, 1, "C", readonly=True)
 _OUTPUT_MASK = types.boolean[::1]
+"""Types of the kernels' arguments: inputs are read only."""
 
 BoolArray = npt.NDArray[np.bool_]
 

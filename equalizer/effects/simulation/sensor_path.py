@@ -12,6 +12,7 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 
 _INPUT_MATRIX = types.Array(types.float64, 2, "A", readonly=True)
+"""A matrix of any stride that is only read."""
 
 
 @njit(types.void(_INPUT_MATRIX, types.float64, types.float64[:, ::1]), cache=True, nogil=True)

@@ -11,7 +11,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 LATTICE_TOLERANCE = 0.02
-"""Largest deviation of a value from the lattice, in steps. Rounding to single precision causes less."""
+"""Largest deviation of a value from the lattice, in steps. Chosen: rounding to single precision causes less."""
 LEAST_LATTICE_SHARE = 0.999
 """Share of the values above which they count as lying on a lattice. Chosen, as are the limits below."""
 LEAST_POINTS, LARGEST_POINT_RATIO = 3, 0.2

@@ -86,7 +86,7 @@ def fit_coefficients(residual: FloatArray, basis: FloatArray, used: FloatArray) 
 
 def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag_samples: int) -> float:
     """Estimate the number of samples by which the measured response (n, p) lags the predicted one, from the peak of the
-    normalised cross-correlation, summed over channels. At most `largest_lag` samples either way; not refined at that
+    normalised cross-correlation, summed over channels. At most `largest_lag_samples` either way; not refined at that
     limit."""
     largest_lag_samples = min(largest_lag_samples, len(measured) - 1)
     padded_length = next_fast_len(len(measured) + largest_lag_samples, True)

@@ -31,7 +31,7 @@ def test_factor_sign_and_lag_of_an_acceleration_are_found(make_recording, motion
     force, place, _, acceleration = motion
     noise = 0.02 * acceleration.std() * np.random.default_rng(2).standard_normal(len(force))
     (pair,) = find_pairs(make_recording(force, factor * (delay(acceleration, lag) + noise), position=place))
-    assert (pair.lower_label, pair.higher_label, pair.order) == ("position 'x1'", "response 'a1'", 2)
+    assert (pair.place, pair.derivative, pair.order) == ("position 'x1'", "response 'a1'", 2)
     assert pair.agreement.gain == pytest.approx(factor, rel=0.03)
     assert pair.agreement.lag_samples == pytest.approx(lag, abs=0.1)
 
@@ -68,7 +68,7 @@ def test_each_of_three_axes_finds_its_own_position(make_recording, simulate_moti
     motions = [simulate_motion(forces[:, k]) for k in range(3)]
     places = np.column_stack([motions[k][0] for k in (2, 0, 1)])
     found = find_pairs(make_recording(forces, np.column_stack([m[2] for m in motions]), position=places))
-    assert [(pair.higher_label, pair.lower_label) for pair in found] == [
+    assert [(pair.derivative, pair.place) for pair in found] == [
         ("response 'a1'", "position 'x2'"), ("response 'a2'", "position 'x3'"), ("response 'a3'", "position 'x1'"),
     ]  # fmt: skip
 

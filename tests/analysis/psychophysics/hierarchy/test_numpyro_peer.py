@@ -69,8 +69,8 @@ def test_thresholds_of_people_are_those_that_a_sampler_finds(fit, posterior_draw
     for _ in range(3):
         moments = integrate(quadrature, fit.parameters, moments, FINE_COUNTS).moments
     by_shared = np.einsum("nka,nab,nkb->nk", moments.regression, moments.covariance, moments.regression)
-    spread, theta = np.sqrt(moments.variance + by_shared), posterior_draws["theta"]
-    np.testing.assert_allclose((moments.threshold - theta.mean(axis=0)) / spread, 0.0, atol=0.1)
+    spread, theta = np.sqrt(moments.threshold_variances + by_shared), posterior_draws["theta"]
+    np.testing.assert_allclose((moments.threshold_means - theta.mean(axis=0)) / spread, 0.0, atol=0.1)
     np.testing.assert_allclose(spread / theta.std(axis=0), 1.0, atol=0.1)
     off = np.abs(fit.latent[:, :K] - theta.mean(axis=0)) / spread
     assert off.max() > 0.15  # the control: the modes, from which Laplace's method starts, are not the means
