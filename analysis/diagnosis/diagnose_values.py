@@ -7,6 +7,7 @@ Checks and prepares the recordings, fits a linear first model where none is give
 from collections.abc import Sequence
 from dataclasses import replace
 
+from analysis.diagnosis.balance.free_laws import FREE_LAWS
 from analysis.diagnosis.data.input_checks import require_comparable, require_model_of
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
@@ -65,7 +66,8 @@ def _fit_first_model(
 ) -> FirstModel:
     """Fit a linear model, with remarks: to these recordings, with their force balances, or to the clean ones alone."""
     if not settings.clean:
-        return fit_first_model(recordings, settings.without, settings.time_left, progress, map_)
+        excluded = (*settings.without, *(() if settings.discovery else FREE_LAWS))
+        return fit_first_model(recordings, excluded, settings.time_left, progress, map_)
     step = "fitting a linear model, as none was given"
     return FirstModel(
         *fit_first_linear_model(settings.clean, lambda share: progress(step, share), "the clean recordings")

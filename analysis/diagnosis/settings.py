@@ -275,6 +275,8 @@ LAW_OF_CEILING = 0.05  # share of that reduction which each named law must reach
 RIVAL_STAYS_BEHIND = 0.15  # share of a law's gain by which a rival in its place must be worse to be ruled out
 # share of the force's rms that a law must take: laboratory recordings are not calibrated better
 LAW_OF_SIGNAL = 0.02
+# share of the squared held-out error that a law outside the catalogue must remove: it halves the error
+FREE_LAW_GAIN = 0.75
 SECOND_OF_FAMILY = 2 / 3  # share of the remaining error that a second law of one family must remove
 LARGEST_CLASS = 4  # effects in a class at most; a larger class says nothing, unless all of them are dry friction
 LEAST_JUDGED_BLOCKS = 4  # least number of test blocks by which laws are judged

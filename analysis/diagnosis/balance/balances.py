@@ -1,7 +1,8 @@
 """Force balance of each axis of the recordings: the regression M a + B v + K x + laws = command.
 
 Each axis is first fitted in the band that noise allows (`band.py`). If no law is named there, the regression is
-repeated in the narrower band in which the device moves, and then with the samples in motion only. Called by `diagnose`.
+repeated in the narrower band in which the device moves, and then with the samples in motion only. Laws outside the
+catalogue are compared with the result at the end. Called by `diagnose` and `first_model.fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,6 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
 from analysis.diagnosis.balance.actuator_equivalents import withdraw_ambiguous_names
+from analysis.diagnosis.balance.compare_free_laws import compare_with_free_laws
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import find_driven_channels, search_with_linear_part
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
@@ -26,8 +28,9 @@ def find_balances(
     recordings: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
     """One force balance per command; empty where no motion was measured, or too little of it. excluded: names of
-    effects that are left out. Where no law is named in the band that noise allows, the narrower band in which the
-    device moves is tried, because power of the command above that band hides laws; then the samples in motion alone."""
+    effects that are left out, of the catalogue or of `FREE_LAWS`. Where no law is named in the band that noise allows,
+    the narrower band in which the device moves is tried, because power of the command above that band hides laws; then
+    the samples in motion alone. Laws outside the catalogue are compared with the result."""
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = compute_motions(records)
@@ -36,9 +39,9 @@ def find_balances(
         return ()
     for select in (restrict_to_motion_band, select_samples_in_motion):
         if any(balance.named or not balance.tested for balance in balances) or not time_left():
-            return balances
+            break
         balances = balance_selected_motions(select, records, motions, excluded, time_left, map_) or balances
-    return balances
+    return tuple(compare_with_free_laws(balance, excluded) if time_left() else balance for balance in balances)
 
 
 MotionSelector = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]

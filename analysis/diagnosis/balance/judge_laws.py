@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.blocks import Block
+from analysis.diagnosis.balance.free_laws import FREE_LAWS
 from analysis.diagnosis.balance.judged_law import FRICTIONS, JudgedLaw, compute_force_ratio, find_family, list_simpler
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
@@ -24,6 +25,7 @@ from analysis.diagnosis.balance.structures import (
 from analysis.diagnosis.data.correlated_residuals import bootstrap_gain, draw_bootstrap_blocks, is_confirmed_by_folds
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
+    FREE_LAW_GAIN,
     FURTHER_LAW_GAIN,
     FURTHER_LAW_OF_ALL,
     LARGEST_CLASS,
@@ -93,13 +95,13 @@ def judge_laws(search: StructureSearch) -> Balance:
     if not select_test_blocks(regression):
         error = float(np.sqrt(search.linear.error / _sum_power(regression)))
         return Balance(search, search.linear, (), (), error, error, error, search.complete, tested=False)
-    balance = _judge_structure(search, choose_simplest_structure(search))
+    balance = judge_structure(search, choose_simplest_structure(search))
     if balance.named or not _has_two_frictions(regression, balance.chosen.laws):
         return balance
     # Either of two frictions could explain the same error, so that neither seems necessary: try with one of them.
     one_friction = tuple(structure for structure in search.ranked if not _has_two_frictions(regression, structure.laws))
     best = min(one_friction, key=lambda structure: structure.error, default=search.linear)
-    simpler = _judge_structure(search, choose_simplest_structure(replace(search, ranked=one_friction, best=best)))
+    simpler = judge_structure(search, choose_simplest_structure(replace(search, ranked=one_friction, best=best)))
     return simpler if simpler.named else balance
 
 
@@ -110,19 +112,18 @@ def _has_two_frictions(regression: Regression, law_indices: Sequence[int]) -> bo
     return len(channels) > len(set(channels))
 
 
-def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
+def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
     """Test each law of `chosen`, and further laws; the decrease is at least 1e-6 of the linear error (a divisor)."""
     regression = search.regression
-    errors = _compute_errors(regression, chosen.laws)
-    linear_errors = _compute_errors(regression, ())
+    errors, linear_errors = _compute_errors(regression, chosen.laws), _compute_errors(regression, ())
     ceiling = _compute_ceiling(regression, errors)
     decrease = max(float(linear_errors.sum() - ceiling), 1e-6 * float(linear_errors.sum()), 1e-300)
     coverage = 1 - float(errors.sum() - ceiling) / decrease
-    laws = [_judge_law(regression, chosen.laws, index, (errors, decrease, coverage)) for index in chosen.laws]
+    judged = [_judge_law(regression, chosen.laws, index, (errors, decrease, coverage)) for index in chosen.laws]
     further_laws = _judge_further_laws(regression, chosen, (errors, decrease))
     ratios = [float(np.sqrt(error / _sum_power(regression))) for error in (linear_errors.sum(), errors.sum(), ceiling)]
-    checked_laws = _name_once_per_family(sorted(laws, key=lambda law: -law.gain))
-    return Balance(search, chosen, checked_laws, further_laws, ratios[0], ratios[1], ratios[2], search.complete)
+    laws = _name_once_per_family(sorted(judged, key=lambda law: -law.gain))
+    return Balance(search, chosen, laws, further_laws, ratios[0], ratios[1], ratios[2], search.complete)
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
@@ -164,9 +165,8 @@ def _sum_power(regression: Regression) -> float:
 
 def _compute_errors(regression: Regression, law_indices: Sequence[int]) -> FloatArray:
     """Compute the sum of squared force errors with laws (indices in the regression) on each test block, (blocks,)."""
-    columns = regression.select_columns(law_indices)
-    uses_held_out = select_test_blocks(regression) is regression.test
-    return regression.compute_test_errors(columns) if uses_held_out else regression.cross_validate(columns)
+    columns, tested = regression.select_columns(law_indices), select_test_blocks(regression)
+    return regression.compute_test_errors(columns) if tested is regression.test else regression.cross_validate(columns)
 
 
 def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float:
@@ -185,8 +185,7 @@ def _judge_law(
     other_laws = tuple(index for index in laws if index != law_index)
     reduced = _compute_errors(regression, other_laws)
     gain, gain_low = bootstrap_gain(reduced, full)
-    share = float((reduced - full).sum()) / decrease
-    law = regression.laws[law_index]
+    share, law = float((reduced - full).sum()) / decrease, regression.laws[law_index]
     values = dict(zip(laws, fit_values(regression, laws), strict=True))[law_index]
     equivalents, probability = _find_equivalents(regression, other_laws, law_index, (reduced, full))
     force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_power(regression)))
@@ -195,17 +194,15 @@ def _judge_law(
         weakness if force_share < LAW_OF_SIGNAL else ""
     )
     ratio = compute_force_ratio(regression, laws, law_index)
-    is_physical = values is not None and ratio <= LARGEST_LAW_FORCE
     if not objection and ratio > LARGEST_LAW_FORCE:
         objection = f"its force would be {ratio:.0f} times the recorded force, almost cancelled by other terms"
     stands_for = ""
     if not objection and law.effect in SIMULATED_AS:
         equivalents = (law.effect, *(effect for effect in equivalents if effect != SIMULATED_AS[law.effect]))
         stands_for, law = law.effect, replace(law, effect=SIMULATED_AS[law.effect])
-    formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
         law_index, law, values or {}, gain, gain_low, share, equivalents, probability, objection, stands_for,
-        formula=formula, is_physical=is_physical,
+        formula=law.make_formula(values), is_physical=values is not None and ratio <= LARGEST_LAW_FORCE,
         confirmed_by_folds=is_confirmed_by_folds((reduced, full), _compute_fold_errors(regression, (other_laws, laws))),
     )  # fmt: skip
 
@@ -233,9 +230,8 @@ def _find_equivalents(
         error = float(regression.cross_validate(regression.select_columns(laws)).sum())
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
             best_by_effect[law.effect] = error, laws
-    decrease = float((reduced_errors - full_errors).sum())
-    equivalents, draws = [], draw_bootstrap_blocks(len(full_errors))
-    is_best = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
+    decrease, draws = float((reduced_errors - full_errors).sum()), draw_bootstrap_blocks(len(full_errors))
+    equivalents, is_best = [], np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for effect, (_, laws) in best_by_effect.items():
         increases = _compute_errors(regression, laws) - full_errors
         if tested_law.effect not in list_simpler(effect):
@@ -243,6 +239,8 @@ def _find_equivalents(
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
         is_richer = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
         limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * decrease
+        if tested_law.effect in FREE_LAWS:  # it must leave 1 - FREE_LAW_GAIN of the squared error of any other law
+            limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
         if float(increases.sum()) <= limit:
             equivalents.append((float(increases.sum()), effect))
     return tuple(effect for _, effect in sorted(equivalents)), float(is_best.mean())
@@ -261,6 +259,8 @@ def _find_objection(
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
     if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:
         return f"it explains {100 * share:.1f} % of what all laws together explain"
+    if law.effect in FREE_LAWS and gain < FREE_LAW_GAIN:
+        return "a law that the catalogue lacks is named only where it halves the error on held-out data"
     if coverage < NAMED_OF_CEILING:
         return (f"even with it, {100 * (1 - coverage):.0f} % of what all laws together explain remain: the main cause "
                 "is another")  # fmt: skip
@@ -278,7 +278,7 @@ def _judge_further_laws(
 ) -> tuple[JudgedLaw, ...]:
     """Test the best law of each other effect, the best eight (chosen): those with a significant gain, largest first."""
     chosen_errors, decrease = reference
-    effects = {regression.laws[chosen_index].effect for chosen_index in chosen.laws}
+    effects = {regression.laws[index].effect for index in chosen.laws}
     best_by_effect: dict[str, tuple[float, int]] = {}
     for index, law in enumerate(regression.laws):
         if law.effect in effects or fit_values(regression, (*chosen.laws, index))[-1] is None:
@@ -288,13 +288,13 @@ def _judge_further_laws(
             best_by_effect[law.effect] = error, index
     judged = []
     for _, index in sorted(best_by_effect.values())[:8]:
-        laws = (*chosen.laws, index)
-        errors = _compute_errors(regression, laws)
+        errors = _compute_errors(regression, laws := (*chosen.laws, index))
         gain, low = bootstrap_gain(chosen_errors, errors)
         values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
         reason = ("it explains too little in addition to the named laws" if chosen.laws
                   else WEAK_GAINS[gain > FURTHER_LAW_GAIN])  # fmt: skip
         if gain > 0 and low > 0:
             law, is_physical = regression.laws[index], compute_force_ratio(regression, laws, index) <= LARGEST_LAW_FORCE
-            judged.append(JudgedLaw(index, law, values, gain, low, share, (), 0.0, reason, is_physical=is_physical))
+            tested = JudgedLaw(index, law, values, gain, low, share, (), 0.0, reason, is_physical=is_physical)
+            judged.append(replace(tested, formula=law.make_formula(values)))
     return tuple(sorted(judged, key=lambda judged_law: -judged_law.gain))

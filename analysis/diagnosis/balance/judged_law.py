@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.balance.free_laws import FREE_LAWS, FREE_POSITION_LAWS, FREE_SPEED_LAWS
 from analysis.diagnosis.balance.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
 from equalizer.effects.catalogue import EFFECTS
@@ -25,6 +26,8 @@ FRICTIONS = {
 FAMILIES = (
     FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
+    FREE_SPEED_LAWS,
+    FREE_POSITION_LAWS,
 )  # fmt: skip
 """Families of effects with similar forces. A law whose equally good rivals are all of its own family is named, with
 the rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a family of its
@@ -69,6 +72,11 @@ class JudgedLaw:
     def simulated_as(self) -> str:
         """Name of the effect that simulates the law: an effect of the catalogue, or `DISCOVERED_LAW` for a formula."""
         return self.law.effect if self.formula is None else DISCOVERED_LAW
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the law is none of the catalogue but one of `free_laws`, with a formula."""
+        return self.law.effect in FREE_LAWS and self.formula is not None
 
     @property
     def has_column(self) -> bool:

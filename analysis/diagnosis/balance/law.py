@@ -65,6 +65,10 @@ class Law:
         """Effect and channel: laws with the same key differ in their parameters only."""
         return self.effect, self.channel
 
+    def make_formula(self, values: dict[str, float] | None) -> Formula | None:
+        """Make the formula with these parameters; None where the catalogue has the effect, or without parameters."""
+        return self.formula(values) if self.formula is not None and values else None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseTerms:

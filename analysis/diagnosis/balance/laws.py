@@ -50,8 +50,8 @@ MODE_DAMPING_RATIOS, MODE_FREQUENCIES = (0.02, 0.1, 0.4), tuple(np.geomspace(0.0
 
 
 def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
-    """Make all laws of all channels except `make_cogging_law`, whose pitch is found from the residual of the others.
-    Laws that need a time axis are left out where the band is infinite."""
+    """Make all laws of the catalogue for all channels except `make_cogging_law`, whose pitch is found from the residual
+    of the others. Laws that need a time axis are left out where the band is infinite."""
     for channel in range(len(motions[0].channels)):
         scales = measure_scales(motions, channel, rotational)
         yield from make_friction_laws(channel, scales)

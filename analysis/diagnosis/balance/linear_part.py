@@ -110,7 +110,7 @@ def _complete_base(
     motions = [_delay_forces(motion, delay_s) for motion in regression.motions]
     laws = [*(regression.laws[k] for k in nonlinear), *linear_laws]
     extended = build_regression(
-        motions, regression.axis, laws, _is_freely_turning(regression), replace(base_terms, laws=base_laws)
+        motions, regression.axis, laws, is_freely_turning(regression), replace(base_terms, laws=base_laws)
     )
     chosen = Structure(
         tuple(range(len(nonlinear))), extended.cross_validate(extended.select_columns(range(len(nonlinear))))
@@ -148,7 +148,7 @@ def _is_worth_adding(base: Structure, extended: Structure) -> bool:
     return extended.error < (1 - LINEAR_LAW_GAIN) * base.error and improves_significantly(base, extended)
 
 
-def _is_freely_turning(regression: Regression) -> bool:
+def is_freely_turning(regression: Regression) -> bool:
     """Whether the base has two columns per motion, mass and damping: a shaft that turns freely has no stiffness."""
     return regression.matrices == 2 * len(regression.motions[0].channels)
 

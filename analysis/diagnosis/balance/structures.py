@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.free_laws import FREE_LAWS
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, measure_scales
 from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.model_base import ModelBase, build_regression_with_model, can_laws_explain
@@ -107,9 +108,7 @@ def _search(fit: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
     """The regression with its laws refined, the structures of all sizes, and the best."""
     beam, ranked, best = [linear], [linear], linear
     for _ in range(MOST_SUMMED_LAWS):
-        if not time_left():
-            break
-        sums = _add_law_to_each(fit, beam)
+        sums = _add_law_to_each(fit, beam) if time_left() else []
         if not sums:
             break
         fit = refine_parameters(fit, sums[:STRUCTURES_BEAM])
@@ -290,11 +289,11 @@ def _extends(regression: Regression, base: Sequence[int], extended: Sequence[int
 
 
 def count_parameters(regression: Regression, laws: Sequence[int]) -> int:
-    """Number of parameters of these laws. The width of the smoothed sign of dry friction is not counted, and a gravity
-    torque counts as a parameter less, because it replaces the spring."""
+    """Number of parameters of these laws. The width of a smoothed sign is not counted; a gravity torque counts as a
+    parameter less, because it replaces the spring, and a law outside the catalogue as one more (description length)."""
     count = 0
     for number in laws:
         law, place = regression.laws[number], regression.places[number]
         count += place.stop - place.start + (0 if law.effect in WIDTH_ALONE else len(law.numbers))
-        count -= law.effect == "gravity_torque"
+        count += (law.effect in FREE_LAWS) - (law.effect == "gravity_torque")
     return count

@@ -12,6 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
+from analysis.diagnosis.balance.law import Formula
 from analysis.diagnosis.balance.structures import fit_values
 from analysis.diagnosis.confirm.require_gain import CONSTANT
 from analysis.diagnosis.errors.hypothesis import (
@@ -23,6 +24,7 @@ from analysis.diagnosis.errors.hypothesis import (
 )
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
+from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -32,6 +34,12 @@ _AXIS_SIGNALS = re.compile(r"\b[qvf]\b")
 _SIGNAL_PREFIX = {"q": "", "v": "v", "f": "f"}
 """Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance: on axis x, q becomes x,
 v becomes vx and f becomes fx."""
+
+
+def write_law(formula: Formula, axis_letter: str) -> Law:
+    """Write a formula of the balance as a law of an axis: the signals q, v and f become, on axis x, x, vx and fx."""
+    law_text = _AXIS_SIGNALS.sub(lambda symbol: f"{_SIGNAL_PREFIX[symbol[0]]}{axis_letter}", formula.text)
+    return Law(law_text, formula.numbers, (), formula.acts_on, axis_letter)
 
 
 def can_be_simulated(own_channel: int, judged_law: JudgedLaw) -> bool:
@@ -110,11 +118,9 @@ def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> H
         # Imported here to save start-up time: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import make_law_hypothesis
         from equalizer.effects.discovered_law import derive_axis_letters
-        from equalizer.laws.law import Law
 
-        axis_letter, formula = derive_axis_letters(recording.command.channels)[axis], judged_law.formula
-        law_text = _AXIS_SIGNALS.sub(lambda symbol: f"{_SIGNAL_PREFIX[symbol[0]]}{axis_letter}", formula.text)
-        return make_law_hypothesis(Law(law_text, formula.numbers, (), formula.acts_on, axis_letter), axis, recording)
+        axis_letter = derive_axis_letters(recording.command.channels)[axis]
+        return make_law_hypothesis(write_law(judged_law.formula, axis_letter), axis, recording)
     parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters
     return make_claim_hypothesis(
         Claim(EFFECTS[judged_law.law.effect], "one", (axis,)),

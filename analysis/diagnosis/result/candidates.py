@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.diagnosis.confirm.require_gain import CONSTANTS
-from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
+from analysis.diagnosis.document import Candidate, Diagnosis, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.effect_words import get_noun, get_place
 from analysis.diagnosis.result.candidate_wording import REFINEMENT_REASON
 from analysis.diagnosis.result.findings import BalanceErrors
@@ -71,7 +71,7 @@ def add_balances_with_given_model(
         for law in (*balance.laws, *balance.further_laws)
     ]
     balance_candidates = [
-        _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.linear else law, axis)
+        _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.linear else law, axis, channels)
         for axis, law in sorted(judged_laws, key=lambda entry: (_rank_law(entry[1]), -entry[1].gain))
         if law.share >= LAW_OF_CEILING and law.gain >= FURTHER_LAW_GAIN
     ]
@@ -118,7 +118,7 @@ def add_balances_with_fitted_model(
     )
     named_keys = {(name, effect.axis) for effect in effects for name in _list_covered_names(effect)}
     ranked = [
-        (_rank_law(law), _make_candidate(law, shorten_axis_name(channels[axis], channels), effects))
+        (_rank_law(law), _make_candidate(law, shorten_axis_name(channels[axis], channels), channels, effects))
         for axis, balance in enumerate(balances)
         for law in (*balance.laws, *balance.further_laws)
         if law.formula is None or (law.simulated_as, shorten_axis_name(channels[axis], channels)) not in named_keys
@@ -236,17 +236,21 @@ def _add_balance_results(effect: NamedEffect, law_and_share: "tuple[JudgedLaw, f
     if law_and_share is None:
         is_delay = effect.effect in DELAY_EFFECTS
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *DELAY_EFFECTS)))) if is_delay else effect
+    # Imported on demand: without balances it is not needed.
+    from analysis.diagnosis.balance.free_laws import FREE_LAWS
+
     law, share = law_and_share
     known_rivals = {rival.effect for rival in effect.rivals}
+    rival_names = [name for name in law.equivalents if name not in FREE_LAWS]  # no name, but another form of a formula
     equivalents = tuple(
-        name for name in law.equivalents if name == law.stands_for or not is_refinement_of(name, effect.effect)
+        name for name in rival_names if name == law.stands_for or not is_refinement_of(name, effect.effect)
     )
     rivals = tuple(
         Rival(name, 0.0, name in equivalents, EQUALLY_GOOD if name in equivalents else REFINEMENT_REASON)
-        for name in law.equivalents
+        for name in rival_names
         if name not in known_rivals
     )
-    effect_names = (effect.effect,) if law.formula is None else (effect.effect, law.law.effect)
+    effect_names = (effect.effect,) if law.formula is None or law.is_free else (effect.effect, law.law.effect)
     class_names = (*effect_names, *equivalents) if len(effect_names) + len(equivalents) > 1 else ()
     return replace(
         effect, share=share, probability=law.probability, rivals=(*effect.rivals, *rivals), class_=class_names
@@ -259,18 +263,36 @@ def is_refinement_of(effect: str, special_case: str) -> bool:
     return special_case in special_cases
 
 
-def _make_candidate(judged_law: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
-    """A law of a balance as a candidate of the document. effects: the named effects."""
+def _make_candidate(
+    judged_law: "JudgedLaw", axis: str, channels: tuple[str, ...], effects: Sequence[NamedEffect] = ()
+) -> Candidate:
+    """A law of a balance as a candidate of the document. axis: its letter. effects: the named effects."""
     has_named_special_case = any(
         is_refinement_of(judged_law.law.effect, effect.effect) and effect.axis == axis for effect in effects
     )
     default_reason = SPECIAL_CASE if has_named_special_case else "simulations of the whole recording do not confirm it"
+    law = _write_found_law(judged_law, axis, channels) if judged_law.is_free else None
+    effect = judged_law.law.effect if law is None else judged_law.simulated_as
     return Candidate(
-        effect=judged_law.law.effect,
-        place=get_place(judged_law.law.effect),
+        effect=effect,
+        place=get_place(effect),
         axis=axis or None,
         parameters=judged_law.values,
         held_out_gain=min(max(judged_law.gain, 0.0), 1.0),
         share_of_black_box=min(max(judged_law.share, 0.0), 1.0),
         why_not=judged_law.objection or default_reason,
+        law=law,
     )
+
+
+def _write_found_law(judged_law: "JudgedLaw", axis: str, channels: tuple[str, ...]) -> FoundLaw | None:
+    """The formula of a law outside the catalogue, as the document writes it; None without valid parameters."""
+    # Imported on demand: few diagnoses have such a law.
+    from analysis.diagnosis.confirm.laws_for_simulation import write_law
+    from equalizer.effects.discovered_law import derive_axis_letters
+
+    short_names = (shorten_axis_name(name, channels) for name in channels)
+    letters = dict(zip(short_names, derive_axis_letters(channels), strict=False))  # letters exist for three axes
+    if judged_law.formula is None or axis not in letters:
+        return None
+    return make_found_law(replace(write_law(judged_law.formula, letters[axis]), axis=axis))

@@ -1,0 +1,153 @@
+"""Laws without a name in the catalogue as terms of the force balance: powers, saturation, products and attraction.
+
+`balances` adds them to the laws of the catalogue only where a first search named nothing. With position q and velocity
+v of the driven axis, weight w, and nonlinear parameters p (exponent), s (scale) and c (position), the force that
+resists the motion is
+
+    power_of_speed           w sgn(v) |v|^p         power_of_position        w sgn(q) |q|^p
+    even_power_of_speed      w |v|^p                even_power_of_position   w |q|^p
+    saturating_damping       w tanh(v / s)          exponential_spring       w exp(q / s)
+    damping_beyond_speed     w sgn(v) max(|v| - s, 0)
+    product_of_position_and_speed   w g(q, v), for each g in `PRODUCTS`
+    inverse_distance         w / (q - c)^n, n = 1 or 2, with c outside the travel
+
+Each depends on one axis alone, which is what the formula of a `judged_law` can express. Nonlinear parameters are tried
+on grids over the motion and refined like those of the catalogue's laws (`structures`).
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import Columns, Formula, Law, NonlinearParameters, Scales
+from analysis.diagnosis.balance.motion import Motion
+from equalizer.signals.signal import FloatArray
+
+FREE_SPEED_LAWS = {"power_of_speed", "even_power_of_speed", "saturating_damping", "damping_beyond_speed"}
+FREE_POSITION_LAWS = {"power_of_position", "even_power_of_position", "exponential_spring", "inverse_distance"}
+FREE_LAWS = frozenset({*FREE_SPEED_LAWS, *FREE_POSITION_LAWS, "product_of_position_and_speed"})
+"""Names of all laws of this file; a diagnosis reports their formulas as `discovered_law`."""
+POWERS, POWER_BOUNDS = (0.3, 0.6, 1.5, 2.0, 3.0, 4.5), ((0.05, 6.0),)
+"""Tried exponents, and bounds of their refinement; 6 is the largest that a search by simulation names as well."""
+SPEED_SHARES = (0.03, 0.1, 0.3, 1.0)
+"""Tried scales of a speed, relative to the rms speed: from dry friction to nearly viscous damping."""
+TRAVEL_SHARES = (0.1, 0.3, 1.0)
+"""Tried scales of a position and distances beyond the ends of the travel, relative to the travel."""
+LARGEST_EXPONENT = 30.0
+"""Largest |q / s| of an exponential: beyond it, the column is one spike at the end of the travel."""
+PRODUCTS: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
+    "q*v": lambda q, v: q * v,
+    "abs(q)*v": lambda q, v: np.abs(q) * v,
+    "q**2*v": lambda q, v: q**2 * v,
+    "q*v**2": lambda q, v: q * v**2,
+    "q*abs(v)": lambda q, v: q * np.abs(v),
+    "abs(q)*abs(v)*v": lambda q, v: np.abs(q) * np.abs(v) * v,
+}
+"""Products of position and speed, by their formula."""
+
+
+def make_free_laws(channel: int, scales: Scales) -> Iterator[Law]:
+    """Make all free laws of one channel of the motion; only those of the position without a time axis, and none of the
+    position for a shaft that turns freely."""
+    if np.isfinite(scales.band_hz) and scales.speed > 0:
+        yield from _make_speed_laws(channel, scales.speed)
+    if scales.turns or not scales.travel > 0:
+        return
+    yield from _make_position_laws(channel, scales)
+    if np.isfinite(scales.band_hz):
+        for text, compute in PRODUCTS.items():
+            yield Law(
+                "product_of_position_and_speed", channel, (), _make_product_columns(channel, compute), _read_weight,
+                formula=_make_formula(f"-p0*{text}"),
+            )  # fmt: skip
+
+
+def _make_speed_laws(c: int, speed: float) -> Iterator[Law]:
+    """Make the laws of the speed alone. speed: rms, m/s (rad/s)."""
+    for power in POWERS:
+        yield Law(
+            "power_of_speed", c, (power,), lambda m, n: _raise_with_sign(m.velocity[:, [c]], n[0]), _read_weight,
+            bounds=POWER_BOUNDS, formula=_make_formula("-p0*abs(v)**p1*sign(v)"),
+        )  # fmt: skip
+        yield Law(
+            "even_power_of_speed", c, (power,), lambda m, n: np.abs(m.velocity[:, [c]]) ** n[0], _read_weight,
+            bounds=POWER_BOUNDS, formula=_make_formula("-p0*abs(v)**p1"),
+        )  # fmt: skip
+    for share in SPEED_SHARES:
+        yield Law(
+            "saturating_damping", c, (share * speed,), lambda m, n: np.tanh(m.velocity[:, [c]] / n[0]), _read_weight,
+            bounds=((1e-3 * speed, 3 * speed),), formula=_make_formula("-p0*tanh(v/p1)"),
+        )  # fmt: skip
+        yield Law(
+            "damping_beyond_speed", c, (share * speed,), lambda m, n: _cut_dead_zone(m.velocity[:, [c]], n[0]),
+            _read_weight, bounds=((1e-2 * speed, 3 * speed),),
+            formula=_make_formula("-p0*sign(v)*maximum(abs(v) - p1, 0)"),
+        )  # fmt: skip
+
+
+def _make_position_laws(c: int, scales: Scales) -> Iterator[Law]:
+    """Make the laws of the position alone."""
+    for power in POWERS:
+        yield Law(
+            "power_of_position", c, (power,), lambda m, n: _raise_with_sign(m.position[:, [c]], n[0]), _read_weight,
+            bounds=POWER_BOUNDS, formula=_make_formula("-p0*abs(q)**p1*sign(q)"),
+        )  # fmt: skip
+        yield Law(
+            "even_power_of_position", c, (power,), lambda m, n: np.abs(m.position[:, [c]]) ** n[0], _read_weight,
+            bounds=POWER_BOUNDS, formula=_make_formula("-p0*abs(q)**p1"),
+        )  # fmt: skip
+    largest = max(abs(scales.low), abs(scales.high))
+    for scale in (sign * share * scales.travel for share in TRAVEL_SHARES for sign in (1.0, -1.0)):
+        if largest < LARGEST_EXPONENT * abs(scale):
+            yield Law(
+                "exponential_spring", c, (scale,), lambda m, n: np.exp(m.position[:, [c]] / n[0]), _read_weight,
+                bounds=(_order(0.3 * scale, 3 * scale),), formula=_make_formula("-p0*exp(q/p1)"),
+            )  # fmt: skip
+    for share in TRAVEL_SHARES:
+        distance = share * scales.travel
+        for place, side in ((scales.high + distance, 1), (scales.low - distance, -1)):
+            end = scales.high if side > 0 else scales.low
+            bounds = (_order(end + 0.02 * side * scales.travel, end + 3 * side * scales.travel),)
+            for power in (1, 2):
+                yield Law(
+                    "inverse_distance", c, (place,), _make_inverse_columns(c, power), _read_weight, bounds=bounds,
+                    formula=_make_formula(f"-p0/(q - p1)**{power}"),
+                )  # fmt: skip
+
+
+def _raise_with_sign(signal: FloatArray, power: float) -> FloatArray:
+    """sgn(u) |u|^power, elementwise."""
+    return np.asarray(np.sign(signal) * np.abs(signal) ** power)
+
+
+def _cut_dead_zone(signal: FloatArray, width: float) -> FloatArray:
+    """sgn(u) max(|u| - width, 0), elementwise."""
+    return np.asarray(np.sign(signal) * np.maximum(np.abs(signal) - width, 0.0))
+
+
+def _order(first: float, second: float) -> tuple[float, float]:
+    return min(first, second), max(first, second)
+
+
+def _make_product_columns(c: int, compute: Callable[[FloatArray, FloatArray], FloatArray]) -> Columns:
+    """Make the function for the column (n, 1) of a product of position and velocity."""
+    return lambda m, _: compute(m.position[:, [c]], m.velocity[:, [c]])
+
+
+def _make_inverse_columns(c: int, power: int) -> Columns:
+    """Make the function for the column (n, 1) of an attraction to a position outside the travel."""
+
+    def compute_columns(m: Motion, n: NonlinearParameters) -> FloatArray:
+        return np.asarray(1.0 / (m.position[:, [c]] - n[0]) ** power)
+
+    return compute_columns
+
+
+def _read_weight(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+    """Convert the weight and the nonlinear parameters to p0, p1, … of the formula; either sign is possible."""
+    return {f"p{index}": float(value) for index, value in enumerate((w[0], *n))}
+
+
+def _make_formula(text: str) -> Callable[[dict[str, float]], Formula]:
+    """Make the formula of a force with the parameters p0, p1, …"""
+    return lambda parameters: Formula(text, tuple(parameters.values()), "force")
