@@ -1,8 +1,11 @@
-"""Data analysis. Pure functions: trials and recordings in, results, figures and pages out; no files, no screens.
+"""Data analysis. Pure functions: trials and recordings in, results, figures and pages out; no files, no screens. Used
+by `study`.
 
-Folders: `psychophysics` (trials -> thresholds and statistics), `look` (statistics of recordings), `diagnosis`
-(recordings and a model -> the physics that the model lacks), `evaluation` (scores of blind tests); `figures` and
-`reports` present the results. Begin at `psychophysics/study_analysis.py` or `diagnosis/diagnose.py`.
+Folders: `psychophysics` (trials -> thresholds and statistics), `look` (checks of recordings before any model),
+`device_change` (changes of a device between recordings), `diagnosis` (recordings and a model -> the physics that the
+model lacks), `evaluation` (scores of blind tests, comparison with published figures); `figures` and `reports` present
+the results. `wording` formats numbers and sentences, `threshold_words` the kinds of thresholds. Begin at
+`psychophysics/study_analysis.py` or `diagnosis/diagnose.py`.
 
 Decisions:
 

@@ -1,10 +1,11 @@
 """Models of a haptic device, their identification, and the control that equalizes its response.
 
-Functions are pure: values in, values out, independent of protocols and sessions.
+Functions are pure: values in, values out, independent of protocols and sessions. Used by `analysis` and `study`.
 
-Read in this order: `signals.signal` and `signals.recording` (the two basic types), `signals.lockin`,
-`plant` (models of the device, the vocabulary of effects), `tracking.feedforward.equalizer` (the interface that a
-stimulus passes through).
+Folders, each using only those before it: `signals` (recordings), `laws` (formulas of forces), `plant` (models of the
+device) and `linkage` (its kinematics), `effects` (physics that a model may lack, and simulation), `identification`
+(recordings -> models), `tracking` (models -> forces). Begin at `signals.signal` and `signals.recording` (the two basic
+types), then `plant.identified_model`, `tracking.feedforward.equalizer` (the interface that a stimulus passes through).
 """
 
 from importlib import import_module

@@ -1,11 +1,12 @@
 """Protocols of experiments: numbers and rules that are fixed before a participant takes part. Nothing here reads or
-writes files, or imports another package of this project.
+writes files, or imports another package of this project. Used by `analysis` and `study`.
 
 Folders: `definition` (schema of a TOML file), `wording` (texts for participants) -> `document` (text to protocol and
-back, hash, lock) -> `procedure` (order, levels, random draws). Read in this order: `staircase_rule` and `staircase`
-(rule for the next level), `study_protocol` and `recording_protocol` (schemas of TOML files), `schedule` (order and
-random draws), `trial` (one row of the results), `loading` (text to protocol, with all problems listed), `hashing` and
-`lock` (proof that a protocol was fixed before data were recorded).
+back, hash, lock) -> `procedure` (order, levels, random draws). `trial` is one row of the results. Read in this order:
+`definition.staircase_rule` and `procedure.staircase` (rule for the next level), `definition.study_protocol` and
+`definition.recording_protocol` (schemas), `procedure.schedule` (order and random draws), `document.loading` (text to
+protocol, with all problems listed), `document.hashing` and `document.lock` (proof that a protocol was fixed before data
+were recorded).
 
 Decisions:
 

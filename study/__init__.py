@@ -2,12 +2,12 @@
 
 Layers, each importing only those after it: `cli`, `tui`, `evaluation`, `workflows`, `importing`, `devices`, then
 `store` and `participants` (independent of each other), then `local_clock`, `session` (without side effects),
-`regular_file` and `errors`.
+`regular_file` and `errors`. The command `hapteq` starts in `cli.main`.
 
-Read in this order: `session.facts.events` (the facts), `session.state.fold` (the state that follows from them),
-`session.state.machine` (the next action), `workflows.session.run_session` and `workflows.trial.present_trial` (its
-execution), `devices.device` (interface of a device), `devices.governor.govern` (force limits) and
-`store.sessions.event_log` (facts are on disk before the program acts on them).
+Read in this order: `session.facts.events` (logged events, called facts), `session.state.fold` (the state that follows
+from them), `session.state.machine` (the next action), `workflows.session.run_session` and
+`workflows.trial.present_trial` (its execution), `devices.device` (interface of a device), `devices.governor.govern`
+(force limits) and `store.sessions.event_log` (facts are on disk before the program acts on them).
 
 Decisions:
 

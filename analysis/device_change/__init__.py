@@ -1,6 +1,7 @@
 """Changes of a device since an earlier recording of the same excitation: friction, gain, response, noise.
 
-For the daily check of a free device: `measure_device` computes the numbers from one recording, `compare_devices`
-compares those of two recordings with limits. For short probes within a session, with a hand on the handle,
-`probe_lines` computes spectra and `probe_drift` compares them. Begin at `compare_devices.py`.
+Daily check of a free device: `measure_device` (numbers from one recording) -> `compare_devices` (compares those of two
+recordings with limits); used by `study.workflows.checks`. Drift within a session, with a hand on the handle:
+`probe_lines` (spectra of a probe) -> `probe_drift` (compares them); used by `study.workflows.results.session_drift`.
+Begin at `compare_devices.py`.
 """

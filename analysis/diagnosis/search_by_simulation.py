@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
-from analysis.diagnosis.confirm.require_gain import require_enough_gain, unname_doubtful_effects
+from analysis.diagnosis.confirm.require_gain import require_enough_gain, withdraw_doubtful_names
 from analysis.diagnosis.data.measured_motion import select_time_unit
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import make_tuning
@@ -103,7 +103,7 @@ def search_by_simulation(
             outcome = _search(context, catalogue, settings, progress, impact_search)
     if balances and outcome.result.judgement.named:
         is_repeated = all(floor.method == "repeats" for floor in chosen.floors)
-        outcome = replace(outcome, result=unname_doubtful_effects(require_enough_gain(outcome.result, is_repeated)))
+        outcome = replace(outcome, result=withdraw_doubtful_names(require_enough_gain(outcome.result, is_repeated)))
     return replace(outcome, result=impact_search.explain_at_end(outcome.result))
 
 

@@ -118,9 +118,7 @@ def _warn_of_stopped_runs(thresholds: Sequence[Threshold], rule: StaircaseRule) 
 
 def _describe_progress(run: Threshold, rule: StaircaseRule) -> str:
     """Describe the progress of an incomplete run: its reversals, or with the Psi method its trials."""
-    if rule.is_bayesian:
-        return f"{run.trials} trials"
-    return f"{run.reversals} of {rule.reversals} reversals"
+    return f"{run.trials} trials" if rule.is_bayesian else f"{run.reversals} of {rule.reversals} reversals"
 
 
 def _warn_of_missing_thresholds(table: ThresholdTable) -> str:
@@ -137,11 +135,11 @@ def _warn_of_censoring(table: ThresholdTable, rule: StaircaseRule) -> str:
     ]
     if not cells:
         return ""
+    count, clause = _format_count(cells, "threshold"), select_threshold_words(rule).cut_clause
     return (
-        f"{_format_count(cells, 'threshold')} cut by the cap of {rule.cap_n:g} N, "
-        f"{select_threshold_words(rule).cut_clause}: {conjoin(cells)}. As in the published analysis they enter "
-        "means and tests as plain numbers, so means near the cap are too low, differences towards it too small, and "
-        "intervals and effect sizes without coverage."
+        f"{count} cut by the cap of {rule.cap_n:g} N, {clause}: {conjoin(cells)}. As in the published analysis they "
+        "enter means and tests as plain numbers, so means near the cap are too low, differences towards it too small, "
+        "and intervals and effect sizes without coverage."
     )
 
 

@@ -1,6 +1,8 @@
-"""What a TOML file may say, table by table, each number with its unit, bounds and reason.
+"""Schemas of protocol files (TOML), table by table: each field with its unit, bounds and the reason for its default.
 
-`staircase_rule`, `apparatus`, `session_settings`, `preparation`, `participant_text` -> `study_protocol`
-(`study_contradictions` across tables); `recording_segments` -> `recording_protocol`. `problem` is what is wrong with a
-key. Begin at `study_protocol.py`.
+Tables: `staircase_rule`, `apparatus`, `session_settings`, `preparation`, `participant_text`, `measurement`, `probes`,
+`declared_analysis` -> `study_protocol` (`study_contradictions`: checks across tables); `recording_segments` ->
+`recording_protocol`. `field_types` are shared types, `plausibility` the bounds of position readings, `problem` a
+validation problem of one key. Used by `document`, `procedure`, `study` and `analysis.psychophysics`. Begin at
+`study_protocol.py`.
 """

@@ -93,7 +93,7 @@ OPTIONAL_ROOMS = (
     "analysis.diagnosis.first_model.one_motion_per_force",
     "analysis.diagnosis.first_model.model_from_balance",
     "analysis.diagnosis.errors.windows",  # only where the device drifts or its command is fed back
-    "analysis.diagnosis.forces.force_views",  # only where forces are compared
+    "analysis.diagnosis.forces.force_measure",  # only where forces are compared
     "analysis.diagnosis.balance",  # only without a given model, or where the search leaves something unexplained
     "analysis.diagnosis.confirm.confirm_laws",  # only where a balance names laws
     "analysis.diagnosis.confirm.force_balance_measures",

@@ -1,9 +1,11 @@
-"""The force balance along a measured motion: linear regression of the force on many laws at once, before any model.
+"""Force balance along a measured motion: linear regression of the force on many candidate laws at once.
 
-Data pass through `motion` (positions, velocities and accelerations of a recording, in the band that its noise allows)
--> `laws` (candidate terms in addition to mass, damping and stiffness) -> `regression` (filters all terms alike and
-holds their products block by block) -> `structures` (beam search over sums of one to three laws; selects the one with
-the fewest parameters that fits about as well as the best) -> `compare_free_laws` (puts a formula outside the catalogue
-in their place where it halves the error) -> `judge_laws` (decides on held-out data which laws are named, which are
-candidates, and which the data cannot distinguish). `balances` runs all of them. Begin at `judge_laws.py`.
+`balances` runs all steps for each axis: `motion` (positions, velocities and accelerations, in the `band` that their
+noise allows) -> `laws` (candidate terms, each a `law`; also `friction_laws`, `condition_laws`) -> `regression` (on
+mass, damping, stiffness, or a given model: `model_base`, and the laws; products in `blocks` of samples) -> `structures`
+(beam search over sums of laws, repeated by `linear_part` for delays and linear dynamics) -> `judge_laws` (decides on
+held-out data which laws are named: `judged_law`) -> `compare_free_laws` (replaces them by `free_laws`, outside the
+catalogue, where these fit clearly better). `actuator` finds laws of the actuator (`command_laws`) by an
+`inverse_balance`; `actuator_equivalents` withdraws names that these explain as well. Used by `diagnose`, `first_model`,
+`contrast` and `confirm`. Begin at `balances.py`, then `judge_laws.py`.
 """

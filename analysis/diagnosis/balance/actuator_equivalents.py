@@ -21,6 +21,7 @@ from analysis.diagnosis.balance.structures import SLIDING, Structure, improves_s
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
 DEAD_BAND_EFFECT = "force_deadband"
+"""Name of the actuator's dead band in the catalogue of effects."""
 EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND_EFFECT: "coulomb_friction"}
 """For each law, the effect with the same motion where inertia is negligible; for the dead band, also where the axis
 rests in it."""
@@ -29,19 +30,20 @@ NO_REVERSAL_REASON = "the motion never changes direction"
 
 
 def withdraw_ambiguous_names(balance: Balance) -> Balance:
-    """The balance of a driven axis without the names of laws that its actuator explains equally well. Where this leaves
-    no law of the command with a name, the other laws lose theirs too: they were fitted to the force behind that law."""
-    laws = tuple(_withdraw_ambiguous_name(law, balance) for law in balance.laws)
-    command_laws = [law.law.effect for law in balance.named if not law.has_column]
-    if command_laws and not any(law.named and not law.has_column for law in laws):
+    """Withdraw the names of laws of a driven axis that its actuator explains equally well. Where laws of the command
+    were named and none of them keeps its name, all laws lose theirs: they were fitted to the force behind such a
+    law."""
+    judged_laws = tuple(_withdraw_ambiguous_name(judged_law, balance) for judged_law in balance.laws)
+    command_laws = [judged_law.law.effect for judged_law in balance.named if not judged_law.has_column]
+    if command_laws and not any(judged_law.named and not judged_law.has_column for judged_law in judged_laws):
         reason = f"it was found together with {command_laws[0]}, which these data do not confirm"
-        laws = tuple(replace(law, objection=law.objection or reason) for law in laws)
-    return replace(balance, laws=laws)
+        judged_laws = tuple(replace(judged_law, objection=judged_law.objection or reason) for judged_law in judged_laws)
+    return replace(balance, laws=judged_laws)
 
 
 def _withdraw_ambiguous_name(judged_law: JudgedLaw, balance: Balance) -> JudgedLaw:
-    """The law, with its name withdrawn or with its equivalent added, by the three cases of the module's docstring;
-    unchanged where none applies."""
+    """Withdraw the law's name, or add its equivalent, by the three cases of the module's docstring; unchanged where
+    none applies, and for a law without a name."""
     regression, effect = balance.search.regression, judged_law.law.effect
     if (
         judged_law.named
@@ -57,10 +59,11 @@ def _withdraw_ambiguous_name(judged_law: JudgedLaw, balance: Balance) -> JudgedL
     if effect in SLIDING and not _has_reversal(regression, judged_law.law.channel):
         return _add_equivalent(judged_law, DEAD_BAND_EFFECT, NO_REVERSAL_REASON)
     if effect == "quadratic_damping":
-        has_friction = any(
-            law.law.effect in SLIDING and law.law.channel == judged_law.law.channel for law in balance.named
+        has_named_friction = any(
+            named_law.law.effect in SLIDING and named_law.law.channel == judged_law.law.channel
+            for named_law in balance.named
         )
-        if has_friction and not _has_reversal(regression, judged_law.law.channel):
+        if has_named_friction and not _has_reversal(regression, judged_law.law.channel):
             return _add_equivalent(judged_law, "force_nonlinearity", NO_REVERSAL_REASON)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
         return _add_equivalent(judged_law, EQUIVALENT_LAWS[effect], "the inertia is negligible in this recording")
@@ -68,8 +71,8 @@ def _withdraw_ambiguous_name(judged_law: JudgedLaw, balance: Balance) -> JudgedL
 
 
 def _is_at_rest_in_dead_band(regression: Regression) -> bool:
-    """Whether the axis rests in most samples in which its dead band passes no force; False without such samples. The
-    forces of the regression are those behind the dead band, so that such samples have a force of exactly 0."""
+    """Whether the axis moves in less than half of the samples in which its dead band passes no force; False without
+    such samples. The forces of the regression are those behind the dead band, so that these are exactly 0."""
     motions, axis, driven_channel = regression.motions, regression.axis, regression.base_terms.driven_channel
     velocity = np.concatenate([motion.velocity[motion.fit, driven_channel] for motion in motions])
     force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
@@ -78,7 +81,7 @@ def _is_at_rest_in_dead_band(regression: Regression) -> bool:
 
 
 def _add_equivalent(judged_law: JudgedLaw, equivalent: str, reason: str) -> JudgedLaw:
-    """The law with a reason not to name it, and with its equivalent added in front of its class."""
+    """Add a reason not to name the law, and its equivalent in front of the other equivalent effects."""
     equivalents = tuple(dict.fromkeys((equivalent, *judged_law.equivalents)))
     return replace(
         judged_law,

@@ -3,7 +3,7 @@
 X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force. A
 block keeps the Gram matrix X'X and the cross products X'y only. Sums of these over blocks give the fit to any subset of
 blocks and columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
-y'y - 2 w'X'y + w'X'X w. `regression` and `inverse_balance` use it.
+y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part` and `first_model.joint_fit`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 
 RIDGE = 1e-10
 """Ridge, relative to the mean diagonal element of X'X. It keeps the equations solvable where two columns of a block are
-equal, or a column holds rounding errors alone."""
+equal, or a column holds rounding errors alone. By hand."""
 
 
 Prior = tuple[FloatArray, FloatArray] | None
@@ -34,8 +34,8 @@ class Block:
     cross: FloatArray
     """(k,): X'y, the cross products of the columns with the force y."""
     power: float
-    """Sum of squares of the force."""
-    signal: float
+    """Sum of squares of the force y, y'y."""
+    centred_power: float
     """Sum of squares of the force about its mean over all fitted samples."""
     motion: int
     """Index of the motion to which the block belongs."""
@@ -44,7 +44,8 @@ class Block:
 
 
 def compute_scale(columns: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
-    """Compute (k,): root mean square of each column over the masked samples of all motions; 1 where that is 0."""
+    """Compute (k,): root mean square of each column over the masked samples of all motions; 1 where that is 0. columns,
+    masks: (n, k) and (n,) per motion."""
     rms = np.sqrt(
         np.mean(
             np.vstack([motion_columns[mask] for motion_columns, mask in zip(columns, masks, strict=True)]) ** 2, axis=0
@@ -59,10 +60,11 @@ def build_blocks(
     masks: Sequence[Mask],
     scale_and_mean: tuple[FloatArray, float],
 ) -> tuple[Block, ...]:
-    """Build about 2 `BALANCE_FOLDS` blocks of the masked samples, from columns divided by their scales. scale_and_mean:
-    scales (k,), and the mean about which `Block.signal` is taken. Of more than `BALANCE_MOST_SAMPLES` samples, only the
-    first part of each block is used."""
-    scale, mean = scale_and_mean
+    """Build about 2 `BALANCE_FOLDS` blocks of the masked samples, from columns divided by their scales; at least one
+    block per motion with such samples. columns, forces, masks: (n, k), (n,) and (n,) per motion. scale_and_mean: scales
+    (k,), and the mean force for `Block.centred_power`. Of more than `BALANCE_MOST_SAMPLES` samples, only the first part
+    of each block is used."""
+    scale, mean_force = scale_and_mean
     total_samples = sum(int(mask.sum()) for mask in masks)
     blocks = []
     used_share = min(1.0, BALANCE_MOST_SAMPLES / max(total_samples, 1))
@@ -75,7 +77,7 @@ def build_blocks(
             used_indices = block_indices[: max(int(used_share * len(block_indices)), 1)]
             x, y = motion_columns[used_indices] / scale, force[used_indices]
             blocks.append(
-                Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), motion_index, used_indices)
+                Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean_force) ** 2)), motion_index, used_indices)
             )
     return tuple(blocks)
 
@@ -87,7 +89,7 @@ def select_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, F
 
 
 def stack_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Stack each block's Gram matrix and cross products of c columns: (blocks, c, c) and (blocks, c)."""
+    """Stack each block's Gram matrix and cross products of k columns: (blocks, k, k) and (blocks, k)."""
     indices = np.asarray(columns, dtype=np.intp)
     grid = indices[:, None], indices[None, :]
     grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(indices), len(indices))
@@ -102,7 +104,8 @@ def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[Float
 
 def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
     """Solve for weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge:
-    added to the diagonal, relative to its mean. Raises LinAlgError where a system is singular nevertheless."""
+    added to the diagonal, relative to its mean, and 1e-300 for a matrix of zeros. Raises LinAlgError where a system is
+    singular nevertheless."""
     gram, cross = products
     column_count = gram.shape[-1]
     mean_diagonal = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / column_count
@@ -120,8 +123,9 @@ def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> F
 
 
 def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, is_unpenalised: Mask) -> FloatArray:
-    """Solve for weights (..., c) by ridge regression (Hoerl and Kennard, Technometrics 12:55, 1970). ridge: relative to
-    the mean diagonal element; columns that are unpenalised (c,) have `RIDGE` instead."""
+    """Solve for weights (..., c) by ridge regression (Hoerl and Kennard, Technometrics 12:55, 1970). products: Gram
+    matrices (..., c, c) and cross products (..., c). ridge: relative to the mean diagonal element; columns that are
+    unpenalised (c,) have `RIDGE` instead."""
     gram, cross = products
     mean_diagonal = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
     return np.asarray(

@@ -160,7 +160,7 @@ def _measure_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArr
 
 def _sum_power(regression: Regression) -> float:
     """Sum the squares of the force about its mean, at least 1e-300, over the test blocks, or else the fit blocks."""
-    return max(sum(block.signal for block in select_test_blocks(regression) or regression.fit), 1e-300)
+    return max(sum(block.centred_power for block in select_test_blocks(regression) or regression.fit), 1e-300)
 
 
 def _compute_errors(regression: Regression, law_indices: Sequence[int]) -> FloatArray:

@@ -1,5 +1,6 @@
 """A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights.
-The laws themselves are made by `laws`, `friction_laws` and `condition_laws`, and fitted by `regression`.
+The laws are made by `laws`, `friction_laws`, `condition_laws`, `command_laws` and `free_laws`, and fitted by
+`regression`.
 
 The balance of one axis is linear in its weights w,
 
@@ -20,12 +21,12 @@ from analysis.diagnosis.balance.motion import Motion
 from equalizer.signals.signal import FloatArray
 
 NonlinearParameters = tuple[float, ...]
-"""Nonlinear parameters: speeds, pitches, time constants; in SI units."""
+"""Nonlinear parameters of a law, such as a speed, a pitch and a time constant, in SI units; empty for none."""
 Columns = Callable[[Motion, NonlinearParameters], FloatArray]
-"""Maps a motion and nonlinear parameters to the law's regressors (n, weights)."""
+"""Maps a motion of n samples and nonlinear parameters to the law's regressors (n, weights)."""
 WeightConverter = Callable[[FloatArray, NonlinearParameters, float], dict[str, float] | None]
-"""Maps weights (weights,), nonlinear parameters and the moving mass to the effect's parameters; None where the signs
-are not physical."""
+"""Maps weights (weights,), nonlinear parameters and the moving mass in kg (kg m²) to the effect's parameters in SI
+units; None where the values are not physical, such as a negative friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,9 @@ class Formula:
     text: str
     """Formula with the free parameters p0, p1, …"""
     numbers: tuple[float, ...]
+    """Values of p0, p1, … in SI units."""
     acts_on: Literal["force", "command"] = "command"
+    """force: the formula's value is added to the force at the axis; command: it replaces the command."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,9 +47,9 @@ class Law:
     the fitted weights."""
 
     effect: str
-    """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
+    """Name of the effect in the catalogue (`equalizer.effects`), or a new name for physics that the catalogue lacks."""
     channel: int
-    """Channel of the motion that it depends on; -1 = none."""
+    """Index of the motion's channel that it depends on; -1 = none."""
     numbers: NonlinearParameters
     """Values of its nonlinear parameters."""
     columns: Columns
@@ -56,7 +59,7 @@ class Law:
     linear: bool = False
     """Whether it is linear in the motion, so that a linear model of a higher order could replace it."""
     bounds: tuple[tuple[float, float], ...] = ()
-    """Bounds of each nonlinear parameter within which it is refined; empty: as given."""
+    """Bounds of each nonlinear parameter within which it is refined; empty: it keeps its given value."""
     formula: Callable[[dict[str, float]], Formula] | None = None
     """Maps its parameters to the formula that simulations use where the catalogue has no such effect."""
 
@@ -84,25 +87,29 @@ class BaseTerms:
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Sizes of one channel's motion on the fit samples, in m or rad and s."""
+    """Sizes of one channel's motion on the fit samples."""
 
     speed: float
-    """rms speed"""
+    """rms speed in m/s (rad/s)."""
     travel: float
-    """Peak to peak, from `low` to `high`."""
+    """Peak-to-peak travel, from `low` to `high`, in m (rad)."""
     low: float
+    """Lowest position in m (rad)."""
     high: float
+    """Highest position in m (rad)."""
     duration_s: float
-    """Duration of all fit samples."""
+    """Duration of all fit samples in s."""
     band_hz: float
-    """Upper end of the band; infinite without a time axis."""
+    """Upper end of the band in Hz; infinite without a time axis."""
     turns: bool
-    """Whether the shaft makes more than two turns: only the position within a turn matters."""
+    """Whether it is a shaft that makes more than two turns: only the position within a turn matters."""
     rotational: bool
+    """Whether positions are angles in rad."""
 
 
 def measure_scales(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
-    """Measure a channel's motion over the samples to fit of all motions: rms speed, travel and its ends, duration."""
+    """Measure a channel's motion over the samples to fit of all motions, at least one sample: rms speed, travel and its
+    ends, duration."""
     position = np.concatenate([motion.position[motion.fit, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[motion.fit, channel] for motion in motions])
     low, high = float(position.min()), float(position.max())
@@ -118,26 +125,27 @@ def compute_relative_time(motion: Motion) -> FloatArray:
 
 
 def smooth_sign(velocity: FloatArray, width: float) -> FloatArray:
-    """tanh(velocity / width): the sign of a velocity, continuous within `width` of standstill."""
+    """Compute tanh(velocity / width): the sign of a velocity, continuous about zero. width: above 0, in the velocity's
+    unit."""
     return np.asarray(np.tanh(velocity / width))
 
 
 def name_weights(*names: str) -> WeightConverter:
-    """A `WeightConverter` that gives the weights these names, in their order, with either sign."""
+    """Make a `WeightConverter` that gives the weights these names, in their order, with either sign."""
     return lambda w, n, mass: dict(zip(names, map(float, w), strict=True))
 
 
 def name_positive_weight(name: str) -> WeightConverter:
-    """A `WeightConverter` for a single weight that is physical only where it is positive; else None."""
+    """Make a `WeightConverter` that gives a single weight this name; it returns None unless the weight is positive."""
     return lambda w, n, mass: {name: float(w[0])} if w[0] > 0 else None
 
 
 def filter_from_rest(
     samples: FloatArray, rate_hz: float, transfer_function: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """(n, k): samples (n, k) through a linear filter that starts from rest. transfer_function: continuous, at
-    s = i omega, omega (lines,) in rad/s. Computed by FFT, zero-padded to twice the length so that the filter's memory,
-    which must be shorter than the samples, does not wrap round."""
+    """Filter samples (n, k) by a linear filter that starts from rest. transfer_function: of the continuous filter, at
+    s = i omega (lines,) with omega in rad/s. Computed by FFT, zero-padded to twice the length so that the filter's
+    memory, which must be shorter than the samples, does not wrap round."""
     sample_count = len(samples)
     padded_length = next_fast_len(2 * sample_count, real=True)
     spectrum = rfft(samples, padded_length, axis=0)

@@ -6,7 +6,8 @@ amplifier lag. Friction and damping are in `friction_laws`; `law` states the bal
 The force of a law is phi(q, v, a; n)' w: linear in the weights w, with columns phi from the measured motion for given
 nonlinear parameters n. The grids of n span the travel and the band of the recording, so that the search needs no
 starting values. Columns are in SI units and have the sign of a force that resists the motion, as the balance's terms of
-mass, damping and stiffness do. Called by `structures` and `force_base`.
+mass, damping and stiffness do. Letters in the code: weights w and nonlinear parameters n, as here; s = i omega is
+Laplace's variable. Called by `structures` and `contrast.force_base`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,21 +38,22 @@ travel is about 1 / travel wide."""
 MOST_WAVENUMBERS = 600
 """Number of wavenumbers that are searched, from the longest pitch down: pitches below 1 / 211 of the travel, or below 1
 / 601 of a turn for a shaft that turns, are not found."""
-MOST_SAMPLES = 6000
-"""Largest number of samples, evenly spaced, from which the spectrum is computed."""
+MOST_SPECTRUM_SAMPLES = 6000
+"""About the largest number of samples, evenly spaced, from which the spectrum over the position is computed."""
 MOST_PITCHES = 4
-"""Number of the strongest spectral lines that are kept."""
+"""Largest number of pitches that are kept: those of the strongest spectral lines."""
 STOP_DISTANCES = (0.02, 0.05, 0.1, 0.2)
-"""Tried positions of an end stop: distances from either end of the travel, relative to the travel."""
+"""Tried positions of an end stop: distances from either end of the travel, relative to the travel. By hand."""
 HALF_GAPS = tuple(np.geomspace(0.01, 0.3, 6).tolist())
-"""Tried half gaps of a backlash, relative to the travel."""
+"""Tried half gaps of a backlash, relative to the travel. By hand."""
 MODE_DAMPING_RATIOS, MODE_FREQUENCIES = (0.02, 0.1, 0.4), tuple(np.geomspace(0.02, 1.2, 12).tolist())
-"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band."""
+"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band. By hand."""
 
 
 def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
     """Make all laws of the catalogue for all channels except `make_cogging_law`, whose pitch is found from the residual
-    of the others. Laws that need a time axis are left out where the band is infinite."""
+    of the others. Laws that need a time axis are left out where the band is infinite; the drifting force also where an
+    acceleration was measured."""
     for channel in range(len(motions[0].channels)):
         scales = measure_scales(motions, channel, rotational)
         yield from make_friction_laws(channel, scales)
@@ -65,7 +67,7 @@ def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
 
             yield from make_condition_laws(motions, channel, scales)
     if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
-        yield Law("drifting_force", -1, (), lambda m, _: compute_relative_time(m), name_weights("change"))
+        yield Law("drifting_force", -1, (), lambda motion, _: compute_relative_time(motion), name_weights("change"))
 
 
 def _compute_longest_pitch(scales: Scales) -> float:
@@ -80,8 +82,11 @@ def make_cogging_law(channel: int, pitch: float, scales: Scales) -> Law:
     longest = _compute_longest_pitch(scales)
     return Law(
         "cogging", channel, (pitch,),
-        lambda m, n: np.hstack(
-            [np.sin(2 * np.pi * m.position[:, [channel]] / n[0]), np.cos(2 * np.pi * m.position[:, [channel]] / n[0])]
+        lambda motion, n: np.hstack(
+            [
+                np.sin(2 * np.pi * motion.position[:, [channel]] / n[0]),
+                np.cos(2 * np.pi * motion.position[:, [channel]] / n[0]),
+            ]
         ),
         # Both weights change sign: the catalogue's force drives the motion, that of the balance resists it.
         lambda w, n, mass: {
@@ -95,8 +100,8 @@ def find_likely_pitches(
     motions: Sequence[Motion], residuals: Sequence[FloatArray], channel: int, scales: Scales
 ) -> list[float]:
     """Find the pitches (m or rad) of the strongest lines in the spectrum of the residual force over the position, the
-    strongest first. residuals: per motion, residual force (kept samples,). Empty without samples, or where the speed is
-    too high for the band. For a shaft that turns, only whole numbers of periods
+    strongest first; at most `MOST_PITCHES`. residuals: per motion, residual force (kept samples,) in N (N m). Empty
+    without samples, or where the speed is too high for the band. For a shaft that turns, only whole numbers of periods
     per turn are searched."""
     q = np.concatenate(
         [motion.position[:: motion.step, channel][motion.mask_valid_samples(motion.fit)] for motion in motions]
@@ -115,7 +120,7 @@ def find_likely_pitches(
     wavenumber_spacing = 1 / (2 * np.pi) if scales.turns else WAVENUMBER_SPACING / scales.travel
     wavenumbers = 1 / longest + wavenumber_spacing * np.arange(MOST_WAVENUMBERS)
     wavenumbers = wavenumbers[wavenumbers * shortest < 1]
-    stride = max(len(q) // MOST_SAMPLES, 1)
+    stride = max(len(q) // MOST_SPECTRUM_SAMPLES, 1)
     power = np.array(
         [
             abs(np.mean(residual[::stride] * np.exp(-2j * np.pi * wavenumber * q[::stride])))
@@ -126,28 +131,35 @@ def find_likely_pitches(
     return [float(1 / wavenumbers[k]) for k in sorted(peaks, key=lambda k: -power[k])[:MOST_PITCHES]]
 
 
-def make_stiffness_laws(c: int, scales: Scales) -> Iterator[Law]:
-    """Make gravity torque, nonlinear springs, end stops and backlash along channel c, with starting values on grids
-    over its travel. For a shaft that makes more than two turns: gravity torque only."""
+def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
+    """Make gravity torque, nonlinear springs, end stops and backlash along a channel, with starting values on grids
+    over its travel. Gravity torque only where a shaft's travel exceeds `LEAST_TRAVEL_RAD`; for a shaft that makes more
+    than two turns no other law."""
     if scales.rotational and scales.travel > LEAST_TRAVEL_RAD:
         yield Law(
-            "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
+            "gravity_torque", channel, (),
+            lambda motion, _: np.hstack([np.sin(motion.position[:, [channel]]), np.cos(motion.position[:, [channel]])]),
             lambda w, n, mass: {"torque": float(np.hypot(*w)), "angle": float(np.arctan2(w[1], w[0]))},
         )  # fmt: skip
     if scales.turns:
         return
-    yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, name_weights("k3"))
-    yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, name_weights("k2"))
+    yield Law(
+        "hardening_stiffness", channel, (), lambda motion, _: motion.position[:, [channel]] ** 3, name_weights("k3")
+    )
+    yield Law(
+        "asymmetric_stiffness", channel, (), lambda motion, _: motion.position[:, [channel]] ** 2, name_weights("k2")
+    )
     for share in STOP_DISTANCES:
         for end, side in ((scales.high - share * scales.travel, 1.0), (scales.low + share * scales.travel, -1.0)):
             yield Law(
-                "end_stop", c, (float(end),),
-                _make_stop_columns(c, side), _make_stop_reader(side), bounds=((scales.low, scales.high),),
+                "end_stop", channel, (float(end),),
+                _make_stop_columns(channel, side), _make_stop_reader(side), bounds=((scales.low, scales.high),),
             )  # fmt: skip
     for half_gap in scales.travel * np.array(HALF_GAPS):
         # Added to the balance's own spring term k x, it gives k (x - clip(x)): a spring that acts beyond the gap only.
         yield Law(
-            "backlash", c, (float(half_gap),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
+            "backlash", channel, (float(half_gap),),
+            lambda motion, n: -np.clip(motion.position[:, [channel]], -n[0], n[0]),
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
             bounds=((1e-3 * scales.travel, 0.45 * scales.travel),),
         )  # fmt: skip
@@ -164,40 +176,46 @@ def _make_stop_reader(side: float) -> WeightConverter:
     return read_values
 
 
-def _make_stop_columns(c: int, side: float) -> Columns:
-    """Make the column (n, 1): penetration of the stop (m or rad), with the sign of `side`; zero before contact."""
-    return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - n[0]), 0.0)
+def _make_stop_columns(channel: int, side: float) -> Columns:
+    """Make the column (samples, 1): penetration of the stop (m or rad), with the sign of `side`; zero before
+    contact."""
+    return lambda motion, n: side * np.maximum(side * (motion.position[:, [channel]] - n[0]), 0.0)
 
 
-def make_dynamic_laws(c: int, scales: Scales) -> Iterator[Law]:
-    """Make pose-dependent inertia, an extra mode on a grid of frequencies and damping ratios, and amplifier lag along
-    channel c."""
+def make_dynamic_laws(channel: int, scales: Scales) -> Iterator[Law]:
+    """Make pose-dependent inertia (not for a shaft that turns), an extra mode on a grid of frequencies and damping
+    ratios, and amplifier lag along a channel."""
     if not scales.turns:
         # Lagrange's equation of a mass M (1 + c x) adds M c (x a + v² / 2) to M a; the weight is M c.
         yield Law(
-            "pose_dependent_inertia", c, (),
-            lambda m, _: m.position[:, [c]] * m.acceleration[:, [c]] + 0.5 * m.velocity[:, [c]] ** 2,
+            "pose_dependent_inertia", channel, (),
+            lambda motion, _: motion.position[:, [channel]] * motion.acceleration[:, [channel]]
+            + 0.5 * motion.velocity[:, [channel]] ** 2,
             lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5} if mass > 0 else None,
         )  # fmt: skip
     for ratio in MODE_DAMPING_RATIOS:
         for f in scales.band_hz * np.array(MODE_FREQUENCIES):
             yield Law(
-                "extra_mode", c, (float(f), ratio), lambda m, n: _compute_mode_force(m, c, n), _read_mode_values,
+                "extra_mode", channel, (float(f), ratio),
+                lambda motion, n: _compute_mode_force(motion, channel, n), _read_mode_values,
                 linear=True, bounds=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
             )  # fmt: skip
     # With a first-order lag, the command is (1 + T s) times the delivered force. Only T s M a is no base term.
     yield Law(
-        "amplifier_lag", c, (), lambda m, _: filter_from_rest(m.acceleration[:, [c]], m.rate_hz, lambda s: s),
+        "amplifier_lag", channel, (),
+        lambda motion, _: filter_from_rest(motion.acceleration[:, [channel]], motion.rate_hz, lambda s: s),
         lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, linear=True,
     )  # fmt: skip
 
 
-def _compute_mode_force(m: Motion, c: int, n: NonlinearParameters) -> FloatArray:
-    """Compute (n, 1): force per kg of a body on a spring and damper at the axis: the axis acceleration times
+def _compute_mode_force(motion: Motion, channel: int, n: NonlinearParameters) -> FloatArray:
+    """Compute (samples, 1): force per kg of a body on a spring and damper at the axis: the axis acceleration times
     (omega² + 2 zeta omega s) / (s² + 2 zeta omega s + omega²). n: frequency (Hz) and damping ratio zeta."""
     omega, damping = 2 * np.pi * n[0], 2 * n[1] * 2 * np.pi * n[0]
     return filter_from_rest(
-        m.acceleration[:, [c]], m.rate_hz, lambda s: (omega**2 + damping * s) / (s**2 + damping * s + omega**2)
+        motion.acceleration[:, [channel]],
+        motion.rate_hz,
+        lambda s: (omega**2 + damping * s) / (s**2 + damping * s + omega**2),
     )
 
 

@@ -2,7 +2,8 @@
 
 A lag, a delay, a mode or a relaxation is not missing physics but part of a linear first model. If the balance lacks it,
 nonlinear laws are hidden, or others imitate it. Therefore the search for laws is repeated with the linear terms that it
-found as part of the base, up to `LINEAR_PART_ROUNDS` searches. Called by `balances` and `actuator`.
+found as part of the base, up to `LINEAR_PART_ROUNDS` searches. Called by `balances`, `actuator` and
+`compare_free_laws`.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,9 +29,10 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 TRIAL_DELAY_PERIODS = 2.0 ** np.arange(-5, 2)
-"""Delays that are tried, in periods of the upper end of the band: up to two, beyond which signals repeat."""
+"""Delays that are tried in ascending order, in periods of the upper end of the band: from 1/32 to two. By hand."""
 DELAY_HALVINGS = 4
-"""Number of halvings of the step around the best delay."""
+"""Number of halvings of the step around the best delay: the last step is 1/16 of the delay at the first minimum.
+By hand."""
 DELAY_LIKE_LAWS = ("amplifier_lag", "transport_delay")
 """Linear laws that are equivalent to a delay."""
 
@@ -43,7 +45,8 @@ def search_with_linear_part(
     time_left: TimeBudget,
 ) -> StructureSearch:
     """Search for laws with `search_structures`; then again with the delay and the linear laws that this search finds as
-    part of the base. excluded_effects: names of effects that are not tried. time_left: False ends the search."""
+    part of the base, until it finds no further ones. excluded_effects: names of effects that are not tried. time_left:
+    the search ends where it returns False."""
     base_terms = BaseTerms(find_driven_channels(motions)[axis])
     search = search_structures(motions, axis, rotational, excluded_effects, time_left, base_terms)
     for _ in range(LINEAR_PART_ROUNDS - 1):
@@ -61,26 +64,28 @@ def search_with_linear_part(
 
 
 def find_driven_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
-    """Find, per force, the channel of the motion that it drives: the channel of the same index, or, where more motions
-    than forces were measured, that whose acceleration the regression needs most (linear assignment)."""
-    forces, channels = motions[0].force.shape[1], len(motions[0].channels)
-    if channels <= forces:
-        return tuple(min(axis, channels - 1) for axis in range(forces))
-    errors = [_compute_errors_without_channel(motions, axis, channels) for axis in range(forces)]
+    """Find, per force, the channel of the motion that it drives: the channel of the same index or else the last, or,
+    where more motions than forces were measured, that whose acceleration the regression needs most (linear
+    assignment)."""
+    force_count, channel_count = motions[0].force.shape[1], len(motions[0].channels)
+    if channel_count <= force_count:
+        return tuple(min(axis, channel_count - 1) for axis in range(force_count))
+    errors = [_compute_errors_without_channel(motions, axis, channel_count) for axis in range(force_count)]
     # Imported here: the package takes longer to import than a diagnosis that does not need it.
     from scipy.optimize import linear_sum_assignment
 
     return tuple(linear_sum_assignment(errors, maximize=True)[1].tolist())
 
 
-def _compute_errors_without_channel(motions: Sequence[Motion], axis: int, channels: int) -> list[float]:
-    """Compute (channels,): cross-validated error over the signal power, without the acceleration of each channel."""
+def _compute_errors_without_channel(motions: Sequence[Motion], axis: int, channel_count: int) -> list[float]:
+    """Compute, per channel, the cross-validated error over the power of the force about its mean, without the
+    acceleration of that channel."""
     regression = build_regression(motions, axis, (), turns=False)
     all_columns = regression.select_columns(())
-    signal_power = max(sum(block.signal for block in regression.fit), 1e-300)
+    signal_power = max(sum(block.centred_power for block in regression.fit), 1e-300)
     return [
         float(regression.cross_validate([k for k in all_columns if k != channel]).sum()) / signal_power
-        for channel in range(channels)
+        for channel in range(channel_count)
     ]
 
 
@@ -102,49 +107,56 @@ def _extend_base(search: StructureSearch, base_terms: BaseTerms) -> BaseTerms:
 def _complete_base(
     regression: Regression, base_terms: BaseTerms, nonlinear: Sequence[int], delay_s: float
 ) -> tuple[BaseTerms, float]:
-    """Extend the base by this delay and the linear laws that are significant with it; returns it with its
-    cross-validated error. Where the delay is zero, a delay is estimated after these laws. nonlinear: indices of the
-    laws that are not linear."""
+    """Extend the base by this delay and the linear laws that are significant with it, up to `MOST_LINEAR_LAWS`; returns
+    it with its cross-validated error without a later delay. Where there is no delay yet, one is estimated after these
+    laws. nonlinear: indices of the chosen laws that are not linear."""
     base_laws = tuple(law for law in base_terms.laws if not (delay_s and law.effect in DELAY_LIKE_LAWS))
     linear_laws = [law for law in regression.laws if law.linear and not (delay_s and law.effect in DELAY_LIKE_LAWS)]
     motions = [_delay_forces(motion, delay_s) for motion in regression.motions]
     laws = [*(regression.laws[k] for k in nonlinear), *linear_laws]
-    extended = build_regression(
+    extended_regression = build_regression(
         motions, regression.axis, laws, is_freely_turning(regression), replace(base_terms, laws=base_laws)
     )
-    chosen = Structure(
-        tuple(range(len(nonlinear))), extended.cross_validate(extended.select_columns(range(len(nonlinear))))
+    chosen_structure = Structure(
+        tuple(range(len(nonlinear))),
+        extended_regression.cross_validate(extended_regression.select_columns(range(len(nonlinear)))),
     )
-    while len(base_laws) + len(chosen.laws) - len(nonlinear) < MOST_LINEAR_LAWS:
-        improved = _add_linear_law(extended, chosen)
-        if improved is None:
+    while len(base_laws) + len(chosen_structure.laws) - len(nonlinear) < MOST_LINEAR_LAWS:
+        improved_fit = _add_linear_law(extended_regression, chosen_structure)
+        if improved_fit is None:
             break
-        extended, chosen = improved
-    added = [extended.laws[k] for k in chosen.laws if extended.laws[k].linear]
+        extended_regression, chosen_structure = improved_fit
+    added_laws = [extended_regression.laws[k] for k in chosen_structure.laws if extended_regression.laws[k].linear]
     if not delay_s and not base_terms.delay_s:
-        delay_s = _find_delay_s(keep_laws(extended, chosen.laws))
-    return replace(base_terms, laws=(*base_laws, *added), delay_s=base_terms.delay_s + delay_s), chosen.error
+        delay_s = _find_delay_s(keep_laws(extended_regression, chosen_structure.laws))
+    return replace(
+        base_terms, laws=(*base_laws, *added_laws), delay_s=base_terms.delay_s + delay_s
+    ), chosen_structure.error
 
 
-def _add_linear_law(regression: Regression, chosen: Structure) -> tuple[Regression, Structure] | None:
+def _add_linear_law(regression: Regression, base_structure: Structure) -> tuple[Regression, Structure] | None:
     """Add the linear law that gives the smallest error, with its parameters refined; None where that law is not
     significant."""
-    best: Structure | None = None
+    best_structure: Structure | None = None
     for law_index, law in enumerate(regression.laws):
-        if not law.linear or law_index in chosen.laws:
+        if not law.linear or law_index in base_structure.laws:
             continue
-        laws = (*chosen.laws, law_index)
-        trial = Structure(laws, regression.cross_validate(regression.select_columns(laws)))
-        if (best is None or trial.error < best.error) and fit_values(regression, laws)[-1] is not None:
-            best = trial
-    if best is None or not _is_worth_adding(chosen, best):
+        laws = (*base_structure.laws, law_index)
+        trial_structure = Structure(laws, regression.cross_validate(regression.select_columns(laws)))
+        if (best_structure is None or trial_structure.error < best_structure.error) and fit_values(regression, laws)[
+            -1
+        ] is not None:
+            best_structure = trial_structure
+    if best_structure is None or not _is_worth_adding(base_structure, best_structure):
         return None
-    regression = refine_parameters(regression, [best])
-    return regression, Structure(best.laws, regression.cross_validate(regression.select_columns(best.laws)))
+    regression = refine_parameters(regression, [best_structure])
+    return regression, Structure(
+        best_structure.laws, regression.cross_validate(regression.select_columns(best_structure.laws))
+    )
 
 
 def _is_worth_adding(base: Structure, extended: Structure) -> bool:
-    """Whether a linear term removes `LINEAR_LAW_GAIN` of the error, and significantly."""
+    """Whether a linear term removes more than `LINEAR_LAW_GAIN` of the cross-validated error, and significantly."""
     return extended.error < (1 - LINEAR_LAW_GAIN) * base.error and improves_significantly(base, extended)
 
 
@@ -155,7 +167,7 @@ def is_freely_turning(regression: Regression) -> bool:
 
 def _find_delay_s(regression: Regression) -> float:
     """Estimate the delay in s from the force to the motion: the minimum nearest to zero of the cross-validated error; 0
-    where it is not significant."""
+    where it is not significant (`_is_worth_adding`), and without a time axis."""
     columns = regression.select_columns(range(len(regression.laws)))
 
     def compute_errors(trial_delay_s: float) -> FloatArray:
@@ -178,37 +190,38 @@ def _find_nearest_minimum(
     """Find the delay in s at the first minimum of the error from delay zero on, and the errors there. Zero where the
     minimum is beyond the range: the motion is then too uniform to distinguish a delay from damping and stiffness.
     Negative delays are not causal and not tried. undelayed_errors: at delay zero."""
-    best_s, best_errors = 0.0, undelayed_errors
+    best_delay_s, best_errors = 0.0, undelayed_errors
     for delay_periods in TRIAL_DELAY_PERIODS:
         trial_errors = compute_errors(float(delay_periods) * period_s)
         if trial_errors.sum() >= best_errors.sum():
             break
-        best_s, best_errors = float(delay_periods) * period_s, trial_errors
+        best_delay_s, best_errors = float(delay_periods) * period_s, trial_errors
     else:
         return 0.0, undelayed_errors
-    step_s = best_s / 2
-    for _ in range(DELAY_HALVINGS if best_s else 0):
-        for trial_s in (best_s - step_s, best_s + step_s):
+    step_s = best_delay_s / 2
+    for _ in range(DELAY_HALVINGS if best_delay_s else 0):
+        for trial_s in (best_delay_s - step_s, best_delay_s + step_s):
             trial_errors = compute_errors(trial_s)
             if trial_errors.sum() < best_errors.sum():
-                best_s, best_errors = trial_s, trial_errors
+                best_delay_s, best_errors = trial_s, trial_errors
                 break
         step_s /= 2
-    return best_s, best_errors
+    return best_delay_s, best_errors
 
 
 def _replace_forces(regression: Regression, motions: Sequence[Motion]) -> Regression:
-    """Replace the forces of a regression; the columns stay. motions: as in the regression, with the new forces."""
+    """Replace the forces of a regression; columns and scales stay. motions: those of the regression with new forces."""
     targets = [motion.decimate(motion.force[:, [regression.axis]])[:, 0] for motion in motions]
-    fit, test = ([motion.mask_valid_samples(mask) for motion, mask in zip(motions, masks, strict=True)] for masks in (
-        [motion.fit for motion in motions], [motion.test for motion in motions],
-    ))  # fmt: skip
-    mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
+    fit_masks, test_masks = (
+        [motion.mask_valid_samples(mask) for motion, mask in zip(motions, masks, strict=True)]
+        for masks in ([motion.fit for motion in motions], [motion.test for motion in motions])
+    )
+    mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit_masks, strict=True)]).mean())
     scale_and_mean = regression.scale, mean
     return replace(
         regression, motions=tuple(motions), force=tuple(targets),
-        fit=build_blocks(regression.columns, targets, fit, scale_and_mean),
-        test=build_blocks(regression.columns, targets, test, scale_and_mean),
+        fit=build_blocks(regression.columns, targets, fit_masks, scale_and_mean),
+        test=build_blocks(regression.columns, targets, test_masks, scale_and_mean),
     )  # fmt: skip
 
 

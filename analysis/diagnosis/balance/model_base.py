@@ -58,7 +58,7 @@ def can_laws_explain(regression: Regression, least_share: float) -> bool:
     cross-validated sum of squares by more than `least_share`² times the force's sum of squares."""
     base_error = float(regression.cross_validate(regression.select_columns(())).sum())
     all_laws_error = fit_all_laws(regression, range(regression.columns[0].shape[1]))[0]
-    return base_error - all_laws_error > least_share**2 * sum(block.signal for block in regression.fit)
+    return base_error - all_laws_error > least_share**2 * sum(block.centred_power for block in regression.fit)
 
 
 def _find_sensitive_columns(model_base: ModelBase) -> list[int]:

@@ -171,7 +171,7 @@ def build_regression(
 
 def compute_signal_power(blocks: Sequence[Block]) -> float:
     """Sum the squares of the force about its mean over the blocks."""
-    return sum(block.signal for block in blocks)
+    return sum(block.centred_power for block in blocks)
 
 
 def _make_linear_columns(motion: Motion, turns: bool, linear_laws: Sequence[Law]) -> FloatArray:

@@ -37,7 +37,7 @@ from analysis.diagnosis.confirm.laws_for_simulation import (
     make_hypothesis,
     refit_laws,
 )
-from analysis.diagnosis.confirm.require_gain import CONSTANT
+from analysis.diagnosis.confirm.require_gain import CONSTANT_FORCE
 from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
@@ -81,14 +81,14 @@ class _ConfirmationStart:
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
-    """Convert the named laws of the balances (one per axis) to a search result. repeats: whether the noise is known
-    from repeats; otherwise the verdict is not `explained`. None where no law is named that can be simulated, or
-    simulations confirm none."""
+    """Convert the named laws of the balances (one per axis) to a search result; None where none can be simulated, or
+    simulations confirm none. repeats: whether repeats show the noise; else the verdict is not `explained`."""
     named_laws = [
         (axis, law)
         for axis, balance in enumerate(balances)
         for law in balance.named
-        if law.law.effect != CONSTANT and can_be_simulated(balance.search.regression.base_terms.driven_channel, law)
+        if law.law.effect != CONSTANT_FORCE
+        and can_be_simulated(balance.search.regression.base_terms.driven_channel, law)
     ]
     if not named_laws:
         return None

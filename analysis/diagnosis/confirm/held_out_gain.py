@@ -4,7 +4,8 @@
 
 No model of a real device reaches the sensors' noise, so an effect is judged by its prediction of held-out samples, not
 by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
-Stat. 17:1217, 1989). Called by `decide_with_model`, `require_gain`, `confirm_laws` and `discovery`.
+Stat. 17:1217, 1989). Called by `decide_with_model`, `require_gain`, `confirm_laws`, `discovery` and
+`result.unconfirmed_candidates`.
 """
 
 from dataclasses import dataclass
@@ -35,7 +36,7 @@ def estimate_held_out_gain(
     measure: ErrorMeasure, baseline: FittedCandidate, candidate: FittedCandidate
 ) -> HeldOutGain | None:
     """Estimate the gain of `candidate` over `baseline`, both fitted with this measure. None where fewer than
-    `LEAST_HELD_OUT_STRETCHES` are held out, or where a residual is not finite."""
+    `LEAST_HELD_OUT_STRETCHES` stretches are held out, or where a held-out residual is not finite."""
     powers_without, powers_with = (_compute_stretch_powers(measure, fit) for fit in (baseline, candidate))
     if len(powers_without) < LEAST_HELD_OUT_STRETCHES or not (
         np.isfinite(powers_without).all() and np.isfinite(powers_with).all()
@@ -47,24 +48,25 @@ def estimate_held_out_gain(
         (powers_without / channel_powers).mean(axis=1),
         (powers_with / channel_powers).mean(axis=1),
     )
-    draws = draw_bootstrap_blocks(len(scaled_without))
-    gain_draws = 1 - scaled_with[draws].sum(axis=1) / np.maximum(
-        scaled_without[draws].sum(axis=1), np.finfo(float).tiny
+    drawn_stretches = draw_bootstrap_blocks(len(scaled_without))
+    bootstrap_gains = 1 - scaled_with[drawn_stretches].sum(axis=1) / np.maximum(
+        scaled_without[drawn_stretches].sum(axis=1), np.finfo(float).tiny
     )
-    low, high = np.quantile(gain_draws, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
+    low, high = np.quantile(bootstrap_gains, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
     return HeldOutGain(float(1 - scaled_with.sum() / scaled_without.sum()), float(low), float(high))
 
 
 def predicts_motion(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether the model with its effects predicts a held-out motion better than the mean of that motion does. A law
-    that only stabilises an unstable model fails this test. Channels that contain only noise are not counted. True
-    without a test where forces are compared, or where no motion is held out."""
+    that only stabilises an unstable model fails this test, as does one whose residuals are not finite. Channels that
+    contain only noise are not counted. True without a test where forces are compared, or where nothing is held out."""
     return measure.name == "predicted force" or _compute_remaining_share(measure, candidate, 0.0) < 1
 
 
 def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether the model with its effects explains more than half of the held-out power beyond noise. With less, its law
-    may only be the best substitute for a law that was not found. True where no motion is held out."""
+    """Whether the model with its effects explains more than half of the held-out power beyond noise (chosen: with less,
+    its law may only be the best substitute for a law that was not found), and passes `predicts_motion`. True where
+    nothing is held out."""
     return predicts_motion(measure, candidate) and _compute_remaining_share(measure, candidate, 1.0) < 0.5
 
 
@@ -88,12 +90,15 @@ def _compute_remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, 
 
 def _compute_stretch_powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
     """Compute (stretches, c): sums of squares of the held-out residuals, in units of `measure.unit`. All records
-    together are cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record."""
+    together are cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record with held-out
+    samples; (0, …) without any."""
     total_samples = sum(int(record.test.sum()) for record in measure.records)
-    sums = []
+    power_sums = []
     for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):
         indices = np.flatnonzero(record.test)
         if len(indices):
-            count = int(np.clip(round(HELD_OUT_STRETCHES * len(indices) / total_samples), 1, len(indices)))
-            sums += [np.sum(residuals[stretch] ** 2, axis=0) for stretch in np.array_split(indices, count)]
-    return np.array(sums).reshape(len(sums), -1)
+            stretch_count = int(np.clip(round(HELD_OUT_STRETCHES * len(indices) / total_samples), 1, len(indices)))
+            power_sums += [
+                np.sum(residuals[stretch] ** 2, axis=0) for stretch in np.array_split(indices, stretch_count)
+            ]
+    return np.array(power_sums).reshape(len(power_sums), -1)

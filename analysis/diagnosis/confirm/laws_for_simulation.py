@@ -14,7 +14,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.law import Formula
 from analysis.diagnosis.balance.structures import fit_values
-from analysis.diagnosis.confirm.require_gain import CONSTANT
+from analysis.diagnosis.confirm.require_gain import CONSTANT_FORCE
 from analysis.diagnosis.errors.hypothesis import (
     NO_EFFECTS,
     Claim,
@@ -106,7 +106,7 @@ def estimate_constant_forces(balances: Sequence[Balance]) -> Hypothesis:
             continue
         constant_force = -float(regression.fit_weights(regression.select_columns(()))[-1])
         if constant_force:
-            claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
+            claim = Claim(EFFECTS[CONSTANT_FORCE], "one", (axis,))
             hypothesis = combine_hypotheses(hypothesis, make_claim_hypothesis(claim, [{"force": constant_force}]))
     return hypothesis
 

@@ -2,7 +2,8 @@
 
 Laws are searched where the catalogue leaves a mismatch, or where its named effects may only approximate a law. They
 replace the named effects if they pass the checks of `validation` on held-out data; otherwise they are reported as
-unconfirmed candidates, with the reasons. The search itself is `discover`; its equations are in the package's docstring.
+unconfirmed candidates, with the reasons. The search itself is `discover_laws`; its equations are in the package's
+docstring.
 """
 
 import itertools
@@ -13,13 +14,13 @@ import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain
 from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
-from analysis.diagnosis.discovery.discover import Discovery, Round, depends_on_another_axis, discover
+from analysis.diagnosis.discovery.discover import Discovery, Round, depends_on_another_axis, discover_laws
 from analysis.diagnosis.discovery.validation import (
     choose_on_held_out,
+    describe_held_out_test,
     find_failed_checks,
     is_confirmed_on_held_out,
     is_shorter_and_as_good,
-    write_proof_sentence,
 )
 from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
@@ -51,7 +52,7 @@ class LawSearch:
         (`is_short_description`)."""
         if not _needs_law(result) or not self.time_left():
             return result
-        discovery = discover(
+        discovery = discover_laws(
             result.context, result.found, self.progress, self.time_left, LAW_MOST_ROUNDS, single_term=True
         )
         if discovery is not None and discovery.explanation.after.score.worst_channel <= NOISE_ALONE:
@@ -81,7 +82,7 @@ class LawSearch:
             if model is result.found.retuned and law_count == max_laws
         ]
         if not discoveries:
-            discoveries = [discover(result.context, result.found, self.progress, self.time_left, max_laws)]
+            discoveries = [discover_laws(result.context, result.found, self.progress, self.time_left, max_laws)]
             self._completed.append((result.found.retuned, max_laws, discoveries[0]))
         return result if discoveries[0] is None else check_laws(result, discoveries[0], self.time_left)
 
@@ -128,7 +129,7 @@ def check_laws(result: SearchResult, discovery: Discovery, time_left: TimeBudget
         reasons = (*reasons, "the held-out data do not confirm it")
     if reasons:
         return replace(result, unconfirmed=(*result.unconfirmed, *_yield_candidates(context, discovery, reasons)))
-    remarks = (write_proof_sentence(context, identifiable, rivals, discovery.chosen_of),)
+    remarks = (describe_held_out_test(context, identifiable, rivals, discovery.equally_good_count),)
     return SearchResult(
         context, identifiable, judgement, remarks, None if identifiable.errors is None else identifiable.errors[1]
     )

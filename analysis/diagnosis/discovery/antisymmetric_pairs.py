@@ -51,8 +51,10 @@ def find_antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
 def _combine_halves(force: Sum, partner: Sum, factor: float) -> Sum:
     """Both forces as one sum with opposite factors; its errors are the means of the two fits."""
     return replace(
-        force, factors=(factor,), cross_validated=(force.cross_validated + partner.cross_validated) / 2,
-        base_error=(force.base_error + partner.base_error) / 2, spread=max(force.spread, partner.spread),
+        force, factors=(factor,),
+        cross_validated_error=(force.cross_validated_error + partner.cross_validated_error) / 2,
+        base_error=(force.base_error + partner.base_error) / 2,
+        factor_error=max(force.factor_error, partner.factor_error),
         partner=replace(partner, factors=(-factor,)),
     )  # fmt: skip
 

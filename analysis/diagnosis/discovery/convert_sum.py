@@ -2,7 +2,8 @@
 
 The search for unknown physics fits a sum  factor_1 term_1 + factor_2 term_2 + … (`fit_sum`) with signals named x, y, z
 by their order. A simulation needs a formula in the language of laws (`equalizer.laws`), with parameters p0, p1, … and
-the recording's own names for the signals. Called by `fit_laws`, `antisymmetric_pairs` and `validation`.
+the recording's own names for the signals. Called by `fit_laws`, `antisymmetric_pairs`, `snap_exponents`, `validation`
+and `add_laws`.
 """
 
 import re
@@ -56,7 +57,7 @@ def convert_sum_to_law(term_sum: Sum, recording: Recording) -> Law:
 
 
 def _renumber_parameters(shape: str, first_index: int) -> str:
-    """Formula of a term with its parameters p0, p1, … renumbered from `first_index` on."""
+    """Renumber the parameters p0, p1, … of a term's formula from `first_index` on."""
     return _PARAMETER_PATTERN.sub(lambda match: f"p{int(match[1]) + first_index}", shape)
 
 
@@ -82,6 +83,6 @@ def list_fitted_laws(hypothesis: Hypothesis) -> tuple[Law | None, ...]:
 
 
 def _list_values_in_order(values: object) -> Sequence[float]:
-    """Values of p0, p1, … in this order. values: by parameter name."""
+    """List the values of p0, p1, … in this order. values: dict of all of them by parameter name."""
     assert isinstance(values, dict)
     return [values[f"p{index}"] for index in range(len(values))]

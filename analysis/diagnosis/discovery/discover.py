@@ -1,9 +1,9 @@
 """Forward selection of discovered laws, up to `LAW_MOST_ROUNDS`.
 
 In each round, sums of terms are screened on the axes and readings with the largest excess error, the best sums are
-fitted by output error, and the best fit is added.
-
-Steps and equations: see the theory of operation in the package's docstring (`analysis/diagnosis/discovery`).
+fitted by output error, and the best fit is added. Finally exponents are rounded where that fits as well
+(`snap_exponents`). Steps and equations: see the theory of operation in the package's docstring
+(`analysis/diagnosis/discovery`). Called by `add_laws`.
 """
 
 from collections.abc import Sequence
@@ -44,25 +44,28 @@ from analysis.diagnosis.types import Progress, TimeBudget
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Round:
-    """A round of the selection, in which a law was added."""
+    """A round of the forward selection, in which a law was added."""
 
     fitted_candidates: tuple[FittedCandidate, ...]
-    """The best first."""
+    """The preferred one first (`put_simplest_first`), which was added; the others by rising error."""
     sums: tuple[Sum, ...]
     """The screened sums in the order of `fitted_candidates`."""
-    placebo: float
+    chance_share: float
     """Negative control: largest share of the held-out squares that a term removes from the missing force after that was
     shuffled in time."""
     complete: bool = True
-    """Whether all sums were fitted before the time ended."""
+    """Whether time was left after the sums were fitted."""
 
     @property
     def shares_above_noise(self) -> tuple[float, float]:
-        """Shares (at most 1) of the held-out squares of the missing force above the noise that the law removes, and
-        that chance removes."""
+        """Shares (at most 1) of the held-out squares of the missing force above the noise that the added law removes,
+        and that chance removes."""
         best_sum = self.sums[0]
         excess_error = max(best_sum.base_error - 1.0, 1e-300)
-        removed, removed_by_chance = best_sum.base_error - best_sum.cross_validated, self.placebo * best_sum.base_error
+        removed, removed_by_chance = (
+            best_sum.base_error - best_sum.cross_validated_error,
+            self.chance_share * best_sum.base_error,
+        )
         return min(removed / excess_error, 1.0), min(removed_by_chance / excess_error, 1.0)
 
 
@@ -73,12 +76,13 @@ class Discovery:
     explanation: Explanation
     """The explanation whose `after` contains the laws, with the rounds and steps of their selection."""
     rounds: tuple[Round, ...]
-    chosen_of: int = 1
+    """The rounds in order, at least one."""
+    equally_good_count: int = 1
     """Number of laws that fitted about equally well, of which the last law was chosen by its error on held-out
     stretches."""
 
 
-def discover(
+def discover_laws(
     context: SearchContext,
     catalogue_explanation: Explanation,
     progress: Progress,
@@ -86,40 +90,41 @@ def discover(
     max_laws: int = LAW_MOST_ROUNDS,
     single_term: bool = False,
 ) -> Discovery | None:
-    """Search laws by forward selection: at most `max_laws`, fitted by output error; None where none is worth its
-    parameters or, with single_term, where such a law does not suffice.
-    catalogue_explanation: by named effects. single_term: only laws of single terms that are likely to explain the whole
-    error; the search ends where a screen or a fit shows that they do not, unless such a law may act on another axis."""
+    """Search laws by forward selection: at most `max_laws`, fitted by output error; None where the error is that of the
+    noise, where no law is worth its parameters or, with single_term, where such a law does not suffice.
+    catalogue_explanation: by effects of the catalogue; its re-tuned model is the start. single_term: only laws of
+    single terms that are likely to explain the whole error; the search ends where a screen or a fit shows that they do
+    not, unless such a law depends on another axis."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = catalogue_explanation.retuned.fitted
-    best = context.score_fit(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
+    current = context.score_fit(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
     rounds: list[Round] = []
-    steps: list[FittedCandidate] = []
+    law_steps: list[FittedCandidate] = []
     target_error = EXPLAINED_ERROR if single_term else NOISE_ALONE
-    while len(rounds) < max_laws and time_left() and best.score.worst_channel > target_error:
+    while len(rounds) < max_laws and time_left() and current.score.worst_channel > target_error:
         progress("looking for a law outside the catalogue", 0.6 + 0.1 * len(rounds))
-        next_round = _find_next_law(context, best.fitted, time_left, single_term)
-        if next_round is None or not is_worthwhile(best, next_round.fitted_candidates[0]):
+        next_round = _find_next_law(context, current.fitted, time_left, single_term)
+        if next_round is None or not is_worthwhile(current, next_round.fitted_candidates[0]):
             break
         if next_round.sums[0].partner is not None:
-            steps.append(_remove_partner_law(context, next_round.fitted_candidates[0]))
-        best = next_round.fitted_candidates[0]
+            law_steps.append(_remove_partner_law(context, next_round.fitted_candidates[0]))
+        current = next_round.fitted_candidates[0]
         rounds.append(next_round)
-        steps.append(best)
+        law_steps.append(current)
         may_act_elsewhere = next_round.sums[0].partner is None and depends_on_another_axis(next_round.sums[0])
-        if single_term and best.score.worst_channel > target_error and not may_act_elsewhere:
+        if single_term and current.score.worst_channel > target_error and not may_act_elsewhere:
             return None
     if not rounds:
         return None
-    snapped = run_within_time(lambda: snap_exponents(context, best.fitted), best.fitted)
-    snapped_candidate = context.score_fit(make_antisymmetric(context.measure, context.tuning, snapped))
-    steps[-1] = snapped_candidate
+    snapped_fit = run_within_time(lambda: snap_exponents(context, current.fitted), current.fitted)
+    snapped_candidate = context.score_fit(make_antisymmetric(context.measure, context.tuning, snapped_fit))
+    law_steps[-1] = snapped_candidate
     explanation = Explanation(
         catalogue_explanation.before,
         catalogue_explanation.retuned,
         context.with_test_score(snapped_candidate),
         tuple(round_.fitted_candidates for round_ in rounds for _ in range(1 if round_.sums[0].partner is None else 2)),
-        tuple(steps),
+        tuple(law_steps),
     )
     return Discovery(explanation, tuple(rounds))
 
@@ -131,13 +136,14 @@ def depends_on_another_axis(term_sum: Sum) -> bool:
 
 
 def _remove_partner_law(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
-    """The candidate without the second law of its antisymmetric pair: each law is a step of the explanation."""
+    """Remove the second law of an antisymmetric pair from the candidate: each law is a step of the explanation."""
     hypothesis = remove_claim(pair.fitted.hypothesis, len(pair.fitted.hypothesis.claims) - 1)
     return context.score_fit(evaluate_fit(context.measure, context.tuning, pair.fitted.deviations, hypothesis))
 
 
 def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudget, single_term: bool) -> Round | None:
-    """The next law: sums screened in the views with the largest excess, the best fitted. None where nothing fits."""
+    """Find the next law: screen sums in the views with the largest excess error, and fit the best. None where none can
+    be fitted or, with single_term, where the best sum leaves too much in the screen (`_may_explain_alone`)."""
     views = build_views(context.measure, context.tuning, base_fit)
     ranked_by_view = [
         (view, search_best_sums(build_normal_equations(view), list_view_terms(view), time_left))
@@ -167,39 +173,40 @@ def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudg
     best_sum = ranked_fits[0][1]
     # The negative control of the views that the best law, or either half of a pair, acts in.
     acting_views = [(half.acts_on, half.axis) for half in (best_sum, best_sum.partner) if half is not None]
-    placebo = max(
-        (ranked_sums.placebo for view, ranked_sums in ranked_by_view if (view.acts_on, view.axis) in acting_views),
+    chance_share = max(
+        (ranked_sums.chance_share for view, ranked_sums in ranked_by_view if (view.acts_on, view.axis) in acting_views),
         default=0.0,
     )
     return Round(
         tuple(candidate for candidate, _ in ranked_fits),
         tuple(term_sum for _, term_sum in ranked_fits),
-        placebo,
+        chance_share,
         time_left(),
     )
 
 
 def _find_constant_forces(views: Sequence[View]) -> list[Sum]:
-    """Constant forces that remove a noticeable share of the error of an axis. All axes are tested, because no view's
-    excess error shows a constant, which each regression contains."""
+    """Find the constant forces that remove more than `LAW_WORTH_SHARE` of the excess error of an axis. All axes are
+    tested, because no view's excess error shows a constant, which each regression contains."""
     constants = [fit_constant(view) for view in views if view.acts_on == "force"]
     return [
         constant
         for constant in constants
         if constant is not None
         and constant.base_error > LAW_ALMOST_NOISE
-        and is_worth_adding(constant.base_error, constant.cross_validated)
+        and is_worth_adding(constant.base_error, constant.cross_validated_error)
     ]
 
 
 def _may_explain_alone(best_sum: Sum) -> bool:
-    """Whether a single term leaves so little of the missing force in the screen that a fit is worth its time."""
-    leaves_little = best_sum.cross_validated - 1 <= LAW_ALONE_LEAVES * (best_sum.base_error - 1)
+    """Whether a sum is a single term that leaves at most `LAW_ALONE_LEAVES` of the excess error in the screen."""
+    leaves_little = best_sum.cross_validated_error - 1 <= LAW_ALONE_LEAVES * (best_sum.base_error - 1)
     return leaves_little and len(best_sum.terms) == 1
 
 
 def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
-    """The best few sums, and the best one that lacks a variable of the first, so that it has a rival."""
+    """Choose the best `LAW_FITTED` sums and, if each of them contains all variables of the first, also the best sum
+    that does not, so that the first has a rival. sums: the best first."""
     sums_to_fit = [*sums[:LAW_FITTED]]
     if not sums_to_fit or any(not set(sums[0].variables) <= set(term_sum.variables) for term_sum in sums_to_fit):
         return sums_to_fit
@@ -208,7 +215,8 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 
 
 def _select_views_to_search(views: Sequence[View]) -> list[View]:
-    """Views in which laws are searched: at most two of axes and two of readings, by falling excess error."""
+    """Select the views in which laws are searched, at most two of axes and two of readings, by falling excess error:
+    above `LAW_ALMOST_NOISE`, and at least `LAW_AXES_SHARE` of the largest of its kind."""
     selected: list[View] = []
     for acts_on in ("force", "response"):
         excess_by_output = [(_compute_excess_error(view), view.output) for view in views if view.acts_on == acts_on]
@@ -238,31 +246,33 @@ def _cancels_command(view: View, term_sum: Sum) -> bool:
 
 
 def _compute_excess_error(view: View) -> float:
-    """Excess error of a view: held-out squares of the re-tuned model over those of noise alone; 1 = noise."""
+    """Compute the held-out squares of the re-tuned model in a view over those of noise alone; 1 = noise."""
     model_equations = build_normal_equations(view)
     base_squares = cross_validate_terms(model_equations, view.residual[None, :]).base_squares
     return float(base_squares.sum()) / (view.noise * len(view.residual))
 
 
 def _compute_explained_squares(views: Sequence[View], term_sum: Sum) -> float:
-    """Held-out squares that a sum removes, in units of its view."""
+    """Compute the held-out squares that a sum removes, in squared units of its view's residual."""
     view = next(view for view in views if (view.acts_on, view.axis) == (term_sum.acts_on, term_sum.axis))
-    explained_squares = (term_sum.base_error - term_sum.cross_validated) * view.noise * len(view.residual)
+    explained_squares = (term_sum.base_error - term_sum.cross_validated_error) * view.noise * len(view.residual)
     # The errors of a pair are the means of those of its halves.
     return explained_squares if term_sum.partner is None else 2 * explained_squares
 
 
 def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
-    """The sums whose error above the noise is at most `LAW_FITTED_WITHIN` times that of the best sum."""
+    """Keep the sums whose error above the noise is at most `LAW_FITTED_WITHIN` times that of the first, which counts as
+    at least `LAW_ALMOST_NOISE` - 1."""
     return [
         term_sum
         for term_sum in sums
-        if term_sum.cross_validated - 1 <= LAW_FITTED_WITHIN * max(sums[0].cross_validated - 1, LAW_ALMOST_NOISE - 1)
+        if term_sum.cross_validated_error - 1
+        <= LAW_FITTED_WITHIN * max(sums[0].cross_validated_error - 1, LAW_ALMOST_NOISE - 1)
     ]
 
 
 def _select_best_of_each_structure(sums: Sequence[Sum]) -> list[Sum]:
-    """The best sum of each structure: same axis or reading, same shapes, a pair or not. sums: the best first."""
+    """Select the best sum of each structure (axis or reading, shapes, pair or not). sums: the best first."""
     best_by_structure: dict[object, Sum] = {}
     for term_sum in sums:
         shapes = frozenset(term.shape for term in term_sum.terms)

@@ -21,12 +21,13 @@ _NUMPY_FUNCTIONS: Mapping[str, Callable[..., FloatArray]] = {
     "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs,
     "sign": np.sign, "tanh": np.tanh, "atan": np.arctan, "minimum": np.minimum, "maximum": np.maximum,
 }  # fmt: skip
+"""NumPy function of each operator and function of a formula without memory."""
 
 
 def name_signals(evidence: Evidence) -> Columns:
     """Name the signals (n,) as the grammar does, in SI units: position x, velocity vx, acceleration dvx and command fx
-    of the first axis, ax of the first response channel as the model predicts it (free of noise), and so on; time t
-    in s."""
+    of the first axis, ax of the first response channel as the model predicts it (free of noise), and so on up to the
+    third axis and channel; further ones get no name. Time t in s from the first sample. At least two samples."""
     n, m = evidence.command.shape
     columns = {"t": np.arange(n) / evidence.sample_rate_hz}
     for axis, name in zip(range(m), AXES, strict=False):
@@ -39,8 +40,8 @@ def name_signals(evidence: Evidence) -> Columns:
 
 
 def evaluate_shape(shape: str, parameters: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
-    """(n,): the formula `shape` with these parameters; NaN or inf outside its domain. columns: signals (n,) by name, as
-    from `name_signals`. rate_hz: sample rate, used by formulas with memory."""
+    """Evaluate the formula `shape` with these parameters, (n,); NaN or inf outside its domain. columns: signals (n,) by
+    name, as from `name_signals`. rate_hz: sample rate, used by formulas with memory."""
     tree = parse_formula(shape, template=True)[0]
     with np.errstate(all="ignore"):
         if any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(tree)):
@@ -49,7 +50,7 @@ def evaluate_shape(shape: str, parameters: Sequence[float], columns: Columns, ra
 
 
 def _evaluate_node(node: Node, parameters: Sequence[float], columns: Columns) -> FloatArray:
-    """Value of a node of the parsed formula, recursively: a scalar, or an array (n,) where it contains a signal."""
+    """Evaluate a node of the parsed formula recursively: a scalar, or an array (n,) where it contains a signal."""
     match node:
         case Number(value):
             return np.float64(value)  # type: ignore[return-value]

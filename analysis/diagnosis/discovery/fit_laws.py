@@ -1,7 +1,8 @@
 """Fits sums of terms as laws by output error, and puts the simplest of those that fit about equally well first.
 
 Screening uses a linearised residual (`fit_sum`); here, each sum is simulated with the model, and all parameters are
-fitted together by Gauss-Newton steps (`errors.output_error`).
+fitted together by Gauss-Newton steps (`errors.output_error`). Called by `discover`; `run_within_time` by `validation`,
+too.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,121 +39,139 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
 
 T = TypeVar("T")
+"""Type of the result in `run_within_time`."""
 
 
 def fit_sums(
     context: SearchContext, base: Fitted, sums: Sequence[Sum], time_left: TimeBudget
 ) -> tuple[tuple[FittedCandidate, Sum], ...]:
-    """The sums fitted by output error. The best sum, and simpler sums that are inseparable from it, are fitted to
-    convergence, the others for a few steps. When the time ends, those begun by then; empty where none can be fitted."""
+    """Fit sums by output error, added to the hypothesis of `base`. The best sum, and then simpler sums that are
+    inseparable from it, are fitted to convergence and returned first, the others for a few steps. When the time ends,
+    returns those begun by then; empty where none can be fitted."""
     fit_few_steps = _prepare_first_fits(context, base)
-    fits = [
-        (run_within_time(partial(fit_few_steps, start), start), term_sum)
+    first_fits = [
+        (run_within_time(partial(fit_few_steps, starting_fit), starting_fit), term_sum)
         for term_sum in sums
         if time_left()
-        for start in _make_starting_fits(context, base, term_sum)
+        for starting_fit in _make_starting_fits(context, base, term_sum)
     ]
-    fits.sort(key=lambda pair: pair[0].cost)
-    if not fits or not np.isfinite(fits[0][0].cost):
+    first_fits.sort(key=lambda fit_and_sum: fit_and_sum[0].cost)
+    if not first_fits or not np.isfinite(first_fits[0][0].cost):
         return ()
-    best = fits[0]
+    best_fit = first_fits[0]
     # Of the starts of a law, that with the lower cost may converge to the fit of the re-tuned model without the law.
-    converged = [_refine(context, start) for start, term_sum in fits if term_sum is best[1] and np.isfinite(start.cost)]
-    refined = [(context.score_fit(min(converged, key=lambda end: end.cost)), best[1])]
-    other_fits = {id(term_sum): (start, term_sum) for start, term_sum in reversed(fits) if term_sum is not best[1]}
+    converged_fits = [
+        _refine(context, starting_fit)
+        for starting_fit, term_sum in first_fits
+        if term_sum is best_fit[1] and np.isfinite(starting_fit.cost)
+    ]
+    refined = [(context.score_fit(min(converged_fits, key=lambda converged_fit: converged_fit.cost)), best_fit[1])]
+    other_fits = {
+        id(term_sum): (starting_fit, term_sum)
+        for starting_fit, term_sum in reversed(first_fits)
+        if term_sum is not best_fit[1]
+    }
     other_candidates = [
-        (context.score_fit(_convert_to_pair(context, best, refined[0][0], pair)), pair[1])
-        for pair in sorted(other_fits.values(), key=lambda pair: pair[0].cost)
+        (context.score_fit(_convert_to_pair(context, best_fit, refined[0][0], fit_and_sum)), fit_and_sum[1])
+        for fit_and_sum in sorted(other_fits.values(), key=lambda fit_and_sum: fit_and_sum[0].cost)
     ]
-    simpler_candidates = [
-        pair
-        for pair in other_candidates
+    simpler_laws = [
+        fit_and_sum
+        for fit_and_sum in other_candidates
         if time_left()
-        and _count_parameters(pair) < _count_parameters(refined[0])
-        and are_inseparable(refined[0][0], pair[0])
+        and _count_parameters(fit_and_sum) < _count_parameters(refined[0])
+        and are_inseparable(refined[0][0], fit_and_sum[0])
     ]
-    refined += [(context.score_fit(_refine(context, candidate.fitted)), item) for candidate, item in simpler_candidates]
-    return (*refined, *(pair for pair in other_candidates if pair not in simpler_candidates))
+    refined += [(context.score_fit(_refine(context, candidate.fitted)), law_sum) for candidate, law_sum in simpler_laws]
+    return (*refined, *(fit_and_sum for fit_and_sum in other_candidates if fit_and_sum not in simpler_laws))
 
 
 def _prepare_first_fits(context: SearchContext, base: Fitted) -> Callable[[Fitted], Fitted]:
-    """Make the function that fits a start for a few steps. Where the drive repeats and the law does not depend on time,
-    it uses one period of each segment and longer simulation steps (`short_recordings`), which suffices for a ranking;
-    its result is that of all samples."""
-    tuning, short_form = context.tuning, shorten_recordings(context, base)
-    compute_sensitivity_to_model = cache(lambda ctx: compute_sensitivity(ctx, base.deviations, base.hypothesis))
-    short = None
-    if short_form is not None:
-        short = replace(short_form.context, measure=coarsen_steps(short_form.context.measure))
+    """Make the function that fits a start for `FIRST_FIT_ROUNDS` steps. Where the drive repeats and the law does not
+    depend on time, it fits to one period of each segment with longer simulation steps (`short_recordings`), which
+    suffices for a ranking, and returns the fit or the start, whichever has the lower cost on all samples."""
+    tuning, shortened = context.tuning, shorten_recordings(context, base)
+    compute_sensitivity_to_model = cache(
+        lambda search_context: compute_sensitivity(search_context, base.deviations, base.hypothesis)
+    )
+    short_context = None
+    if shortened is not None:
+        short_context = replace(shortened.context, measure=coarsen_steps(shortened.context.measure))
 
-    def fit_few_steps(start: Fitted) -> Fitted:
-        depends_on_time = any(effect.effect.of_time for effect in start.hypothesis.list_placed_effects())
-        if short is None or depends_on_time:
+    def fit_few_steps(starting_fit: Fitted) -> Fitted:
+        depends_on_time = any(effect.effect.of_time for effect in starting_fit.hypothesis.list_placed_effects())
+        if short_context is None or depends_on_time:
             sensitivity = compute_sensitivity_to_model(context)
-            return fit(context.measure, tuning, start, sensitivity, FIRST_FIT_ROUNDS, context.map_)
-        sensitivity = compute_sensitivity_to_model(short)
-        short_start = evaluate_fit(short.measure, tuning, start.deviations, start.hypothesis)
-        fitted = fit(short.measure, tuning, short_start, sensitivity, FIRST_FIT_ROUNDS, context.map_)
-        on_all_samples = evaluate_fit(context.measure, tuning, fitted.deviations, fitted.hypothesis)
-        return min(on_all_samples, start, key=lambda candidate: candidate.cost)
+            return fit(context.measure, tuning, starting_fit, sensitivity, FIRST_FIT_ROUNDS, context.map_)
+        sensitivity = compute_sensitivity_to_model(short_context)
+        short_start = evaluate_fit(short_context.measure, tuning, starting_fit.deviations, starting_fit.hypothesis)
+        short_fit = fit(short_context.measure, tuning, short_start, sensitivity, FIRST_FIT_ROUNDS, context.map_)
+        fit_on_all_samples = evaluate_fit(context.measure, tuning, short_fit.deviations, short_fit.hypothesis)
+        return min(fit_on_all_samples, starting_fit, key=lambda candidate: candidate.cost)
 
     return fit_few_steps
 
 
 def _make_starting_fits(context: SearchContext, base: Fitted, term_sum: Sum) -> list[Fitted]:
-    """The sum added to the fit, with the model's own parameters unchanged or shifted as in the fit of the sum: the
-    start with the lower cost. Where re-tuning without this law ended at a bound, also a start with the given
-    parameters."""
+    """Add the sum to the base fit, with the model's own parameters unchanged or shifted as in the fit of the sum: the
+    start with the lower cost. Where re-tuning without this law ended at a bound, also a start with the calibrated
+    parameters. Starts that make no model are left out."""
     recording = context.measure.records[0].recording
     bound = context.tuning.bound
-    shifted = np.clip(base.deviations + term_sum.model_shift, -bound, bound)
-    calibrated = np.zeros_like(base.deviations)
-    at_bound = context.tuning.is_at_bound(base.deviations)
-    starts = (term_sum,) if term_sum.partner is None else list_pair_starts(term_sum)
-    chosen: list[Fitted] = []
-    for deviation_sets in ((base.deviations, shifted), *([(calibrated,)] if at_bound else [])):
-        fits: list[Fitted] = []
-        for start, deviations in product(starts, deviation_sets):
-            hypothesis = combine_hypotheses(base.hypothesis, convert_sum_to_hypothesis(start, recording))
+    shifted_deviations = np.clip(base.deviations + term_sum.model_shift, -bound, bound)
+    calibrated_deviations = np.zeros_like(base.deviations)
+    is_at_bound = context.tuning.is_at_bound(base.deviations)
+    starting_sums = (term_sum,) if term_sum.partner is None else list_pair_starts(term_sum)
+    chosen_fits: list[Fitted] = []
+    for deviation_sets in ((base.deviations, shifted_deviations), *([(calibrated_deviations,)] if is_at_bound else [])):
+        trial_fits: list[Fitted] = []
+        for starting_sum, deviations in product(starting_sums, deviation_sets):
+            hypothesis = combine_hypotheses(base.hypothesis, convert_sum_to_hypothesis(starting_sum, recording))
             try:
-                fits.append(evaluate_fit(context.measure, context.tuning, deviations, hypothesis))
+                trial_fits.append(evaluate_fit(context.measure, context.tuning, deviations, hypothesis))
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
-        chosen += [min(fits, key=lambda start: start.cost)] if fits else []
-    return chosen
+        chosen_fits += [min(trial_fits, key=lambda trial_fit: trial_fit.cost)] if trial_fits else []
+    return chosen_fits
 
 
 def _convert_to_pair(
-    context: SearchContext, best: tuple[Fitted, Sum], refined: FittedCandidate, other_fit: tuple[Fitted, Sum]
+    context: SearchContext, best_fit: tuple[Fitted, Sum], refined_best: FittedCandidate, other_fit: tuple[Fitted, Sum]
 ) -> Fitted:
-    """The other fit; if it is a pair of which the best sum is a half, the refined best fit converted to that pair."""
-    single, pair = best[1], other_fit[1]
-    if single.partner is not None or pair.partner is None or not is_coupling(single):
+    """Convert the refined best fit to the pair of the other fit, if that is a pair and the best sum may be a half of
+    it; else, or where that fails, return the other fit."""
+    best_sum, other_sum = best_fit[1], other_fit[1]
+    if best_sum.partner is not None or other_sum.partner is None or not is_coupling(best_sum):
         return other_fit[0]
-    return convert_to_pair(context.measure, context.tuning, (refined.fitted, single), pair) or other_fit[0]
+    return convert_to_pair(context.measure, context.tuning, (refined_best.fitted, best_sum), other_sum) or other_fit[0]
 
 
 def put_simplest_first(
-    context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
+    context: SearchContext, fits_and_sums: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
-    """The candidates by rising error, with the preferred one moved to the front: among those inseparable from the best,
-    the one with the fewest parameters; among forces that are linear in another axis's motion, the one with the smallest
-    change of the model's own coupled parameters."""
-    ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
-    equivalent = [pair for pair in ranked if are_inseparable(ranked[0][0], pair[0])]
-    first = min(equivalent, key=_count_parameters)
-    if is_coupling(first[1]):
+    """Sort the candidates by rising error and move the preferred one to the front: among those inseparable from the
+    best, the one with the fewest parameters; if it is a force linear in another axis's motion, among equally
+    simple ones that with the smallest change of the model's own coupled parameters. At least one."""
+    ranked = sorted(fits_and_sums, key=lambda fit_and_sum: fit_and_sum[0].score.mean_log_error)
+    inseparable = [fit_and_sum for fit_and_sum in ranked if are_inseparable(ranked[0][0], fit_and_sum[0])]
+    preferred = min(inseparable, key=_count_parameters)
+    if is_coupling(preferred[1]):
         equally_simple = [
-            pair for pair in equivalent if is_coupling(pair[1]) and _count_parameters(pair) == _count_parameters(first)
+            fit_and_sum
+            for fit_and_sum in inseparable
+            if is_coupling(fit_and_sum[1]) and _count_parameters(fit_and_sum) == _count_parameters(preferred)
         ]
-        first = min(equally_simple, key=lambda pair: sum_squared_coupling_deviations(context.tuning, pair[0].fitted))
-    return [first, *(pair for pair in ranked if pair is not first)]
+        preferred = min(
+            equally_simple,
+            key=lambda fit_and_sum: sum_squared_coupling_deviations(context.tuning, fit_and_sum[0].fitted),
+        )
+    return [preferred, *(fit_and_sum for fit_and_sum in ranked if fit_and_sum is not preferred)]
 
 
-def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
-    """Number of free parameters of a sum. Exponents that are whole or half numbers are not counted, nor is the factor
-    of a soft limit that is 1."""
-    candidate, term_sum = pair
+def _count_parameters(fit_and_sum: tuple[FittedCandidate, Sum]) -> int:
+    """Count the free parameters of a sum. Exponents within `LAW_NEAR` of whole or half numbers are not counted, nor is
+    the factor of a soft limit that is 1."""
+    candidate, term_sum = fit_and_sum
     law = list_fitted_laws(candidate.fitted.hypothesis)[-1]
     count = 0 if law is None else -int(is_full_soft_limit(law, LAW_NEAR))
     for term in term_sum.terms:
@@ -163,15 +182,15 @@ def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
     return count
 
 
-def _refine(context: SearchContext, start: Fitted) -> Fitted:
-    """The fit continued to convergence; the start where the time ends before."""
-    return run_within_time(lambda: refine(context, start), start)
+def _refine(context: SearchContext, starting_fit: Fitted) -> Fitted:
+    """Continue a fit to convergence; returns its start where the time ends before."""
+    return run_within_time(lambda: refine(context, starting_fit), starting_fit)
 
 
-def run_within_time(work: Callable[[], T], fallback: T) -> T:
-    """The result of `work`, or `fallback` where the time ends during it: a stiff law may take a second per simulation,
-    and a fit simulates about a hundred times."""
+def run_within_time(compute: Callable[[], T], fallback: T) -> T:
+    """Return the result of `compute`, or `fallback` where the time ends during it (OutOfTimeError): a fit simulates
+    many times, and a stiff law may take long per simulation."""
     try:
-        return work()
+        return compute()
     except OutOfTimeError:
         return fallback

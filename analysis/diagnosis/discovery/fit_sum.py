@@ -2,8 +2,9 @@
 
 The residual is approximated by P d + sum of w_j phi_j(a_j): P the columns of the model's own parameters, w the factors
 and a the nonlinear parameters of the terms. At each step, d and w are solved for by least squares, so that only a is
-searched (variable projection, Golub and Pereyra 1973). Held-out errors are cross-validated over blocks. Called by
-`beam` and `antisymmetric_pairs`, which screen sums; `fit_laws` then fits the best of them by output error.
+searched (variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10:413, 1973). Held-out errors are
+cross-validated over blocks. Called by `beam`, `antisymmetric_pairs` and `discover`, which screen sums; `fit_laws` then
+fits the best of them by output error. Sizes: s samples of the view's residual, t parameters of the model.
 """
 
 from collections.abc import Sequence
@@ -26,12 +27,12 @@ from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 _DIFFERENCE_STEP, _FREQUENCY_DIFFERENCE_STEP = 1e-3, 1e-5
-"""Steps of the finite differences, absolute or relative (`_shift_parameter`). The factor of time, a frequency, has the
-smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
-_MOST_STEPS = 8
-"""Largest number of Gauss-Newton steps."""
+"""Steps of the finite differences, absolute or relative (`_shift_parameter`); chosen. The factor of time, a frequency,
+has the smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
+_MOST_GAUSS_NEWTON_STEPS = 8
+"""Largest number of Gauss-Newton steps; chosen."""
 _LEAST_DECREASE = 1e-3
-"""Relative decrease of the cost below which a step is the last."""
+"""Relative decrease of the cost below which a step is the last; chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,19 +40,21 @@ class Sum:
     """A fitted sum of terms on an axis or a reading, with its cross-validated error."""
 
     axis: int
-    """Driven axis, or channel of the response."""
+    """Index of the driven axis, or of the response's channel."""
     terms: tuple[Term, ...]
+    """With their fitted parameters."""
     factors: tuple[float, ...]
     """(terms,): factor of each term, in SI units."""
-    cross_validated: float
+    cross_validated_error: float
     """Held-out squares over the noise's, per sample: 1 = noise alone."""
     base_error: float
     """Held-out squares of the re-tuned model alone, in the same unit."""
-    spread: float
+    factor_error: float
     """Jackknife standard error of the first factor over the blocks, relative to it."""
     model_shift: tuple[float, ...]
     """(t,): change of the model's own parameters that is fitted with it, in standard deviations."""
     acts_on: ActsOn = "force"
+    """Whether the sum is a force along the axis, or added to the response."""
     partner: "Sum | None" = None
     """Second force of an antisymmetric pair, on another axis; None for a single force."""
 
@@ -63,8 +66,8 @@ class Sum:
 
 
 def compute_term_column(view: View, term: Term) -> FloatArray | None:
-    """(s,): the term of all records, filtered to the unit of the view's residual, joined; None where it is not
-    finite."""
+    """Compute (s,): the term along all records, filtered as the view's residual, joined; None where it is not finite
+    before the filter."""
     filtered_by_record = []
     for record in view.records:
         force = evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
@@ -75,27 +78,28 @@ def compute_term_column(view: View, term: Term) -> FloatArray | None:
 
 
 def fit_sum(model_equations: NormalEquations, terms: Sequence[Term]) -> Sum | None:
-    """Fit a sum of terms: its nonlinear parameters, factors and held-out errors. model_equations: normal equations of
-    the model's own parameters alone. None where the terms are not finite at their starting parameters."""
+    """Fit a sum of terms (at least one): its nonlinear parameters, factors and held-out errors. model_equations: normal
+    equations of the model's own parameters and the constant. None where a term is not finite at its starting
+    parameters."""
     view = model_equations.view
-    point = _Point(tuple(terms), *_compute_term_columns(view, terms))
-    if point.columns is None:
+    evaluated = _EvaluatedTerms(tuple(terms), *_compute_term_columns(view, terms))
+    if evaluated.columns is None:
         return None
-    solution = _solve_columns(model_equations, point.columns)
-    for _ in range(_MOST_STEPS if any(term.numbers for term in terms) else 0):
-        improved = _take_gauss_newton_step(model_equations, point, solution)
-        if improved is None:
+    solution = _solve_columns(model_equations, evaluated.columns)
+    for _ in range(_MOST_GAUSS_NEWTON_STEPS if any(term.numbers for term in terms) else 0):
+        next_step = _take_gauss_newton_step(model_equations, evaluated, solution)
+        if next_step is None:
             break
-        decrease = 1 - improved[1].cost / solution.cost
-        point, solution = improved
+        decrease = 1 - next_step[1].cost / solution.cost
+        evaluated, solution = next_step
         if decrease < _LEAST_DECREASE:
             break
-    assert point.columns is not None
-    return _score_sum(model_equations, point.terms, point.columns, solution)
+    assert evaluated.columns is not None
+    return _score_sum(model_equations, evaluated.terms, evaluated.columns, solution)
 
 
 def fit_constant(view: View) -> Sum | None:
-    """Fit a constant force of a view, in place of that which all regressions contain. None as of `fit_sum`."""
+    """Fit a constant as the only term, with the constant of the regression replaced by zeros. None as in `fit_sum`."""
     columns_without = np.vstack([view.parameter_columns[:-1], np.zeros_like(view.residual)])
     return fit_sum(build_normal_equations(replace(view, parameter_columns=columns_without)), (Term(CONSTANT),))
 
@@ -103,7 +107,7 @@ def fit_constant(view: View) -> Sum | None:
 def _score_sum(
     model_equations: NormalEquations, terms: tuple[Term, ...], columns: Sequence[FloatArray], solution: Solution
 ) -> Sum:
-    """The sum with cross-validated errors and the jackknife error of its first factor."""
+    """Compute the cross-validated errors of the fitted terms, and the jackknife error of the first factor."""
     view = model_equations.view
     other_equations = add_columns(model_equations, columns[1:])
     joint_errors = cross_validate_terms(other_equations, columns[0][None, :])
@@ -124,75 +128,78 @@ def _score_sum(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
-    """Terms with their present parameters, and their columns (s,); None where a column is not finite."""
+class _EvaluatedTerms:
+    """Terms with parameter values, and their columns (s,) there; None where a column is not finite."""
 
     terms: tuple[Term, ...]
     columns: tuple[FloatArray, ...] | None
 
 
 def _compute_term_columns(view: View, terms: Sequence[Term]) -> tuple[tuple[FloatArray, ...] | None]:
-    """The second field of `_Point`, as a tuple of one: the columns of all terms; None where one is not finite."""
+    """Compute the second field of `_EvaluatedTerms`, as a tuple of length one: the columns of all terms; None where one
+    is not finite."""
     columns = [compute_term_column(view, term) for term in terms]
     return (None if any(column is None for column in columns) else tuple(c for c in columns if c is not None),)
 
 
 def _solve_columns(model_equations: NormalEquations, columns: Sequence[FloatArray]) -> Solution:
-    """Least squares with the model's own parameters and these columns."""
+    """Solve for the weights of the model's own parameters and these columns by least squares."""
     return solve_all_blocks(add_columns(model_equations, columns))
 
 
 def _take_gauss_newton_step(
-    model_equations: NormalEquations, point: _Point, solution: Solution
-) -> tuple[_Point, Solution] | None:
-    """Take a Gauss-Newton step in the nonlinear parameters, shortened until the cost falls; None where it does not
-    fall, a column is not finite or no parameter is nonlinear."""
-    view, model_columns = model_equations.view, len(model_equations.view.parameter_columns)
-    assert point.columns is not None
-    term_factors = solution.weights[model_columns:]
+    model_equations: NormalEquations, evaluated: _EvaluatedTerms, solution: Solution
+) -> tuple[_EvaluatedTerms, Solution] | None:
+    """Take a Gauss-Newton step in the nonlinear parameters, each changed by at most 0.7 (`_shift_parameter`). The step
+    is shortened to 40, 15 and 5 % until the cost falls by more than 1e-6 of it (all chosen). None where it does not
+    fall, a shifted term is not finite, or no parameter is nonlinear."""
+    view, model_column_count = model_equations.view, len(model_equations.view.parameter_columns)
+    assert evaluated.columns is not None
+    term_factors = solution.weights[model_column_count:]
     parameter_indices, slopes = [], []
-    for term_index, term in enumerate(point.terms):
+    for term_index, term in enumerate(evaluated.terms):
         for parameter_index in range(len(term.numbers)):
             shift = _FREQUENCY_DIFFERENCE_STEP if f"p{parameter_index}*t" in term.shape else _DIFFERENCE_STEP
             column = compute_term_column(view, _shift_parameter(term, parameter_index, shift))
             if column is None:
                 return None
-            slopes.append(term_factors[term_index] * (column - point.columns[term_index]) / shift)
+            slopes.append(term_factors[term_index] * (column - evaluated.columns[term_index]) / shift)
             parameter_indices.append((term_index, parameter_index))
     if not parameter_indices:
         return None
     slope_norms = np.array([max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes])
     joint_equations = add_columns(
         model_equations,
-        [*point.columns, *(slope / slope_norm for slope, slope_norm in zip(slopes, slope_norms, strict=True))],
+        [*evaluated.columns, *(slope / slope_norm for slope, slope_norm in zip(slopes, slope_norms, strict=True))],
     )
     damped_solution = solve_all_blocks(_damp_slopes(joint_equations, len(slopes)))
-    step = np.clip(damped_solution.weights[-len(slopes) :] / slope_norms, -0.7, 0.7)
+    parameter_step = np.clip(damped_solution.weights[-len(slopes) :] / slope_norms, -0.7, 0.7)
     for step_share in (1.0, 0.4, 0.15, 0.05):
-        terms = point.terms
-        for (term_index, parameter_index), shift in zip(parameter_indices, step, strict=True):
+        terms = evaluated.terms
+        for (term_index, parameter_index), shift in zip(parameter_indices, parameter_step, strict=True):
             shifted_term = _shift_parameter(terms[term_index], parameter_index, step_share * float(shift))
             terms = (*terms[:term_index], shifted_term, *terms[term_index + 1 :])
         columns = _compute_term_columns(view, terms)[0]
         if columns is None:
             continue
-        candidate = _solve_columns(model_equations, columns)
-        if candidate.cost < solution.cost * (1 - 1e-6):
-            return _Point(terms, columns), candidate
+        candidate_solution = _solve_columns(model_equations, columns)
+        if candidate_solution.cost < solution.cost * (1 - 1e-6):
+            return _EvaluatedTerms(terms, columns), candidate_solution
     return None
 
 
 def _damp_slopes(joint_equations: NormalEquations, slope_count: int) -> NormalEquations:
-    """Levenberg damping of the slopes (of norm 1), so that slopes nearly collinear with other columns make no step."""
-    gram = joint_equations.gram.copy()
-    slope_indices = np.arange(gram.shape[1] - slope_count, gram.shape[1])
-    gram[:, slope_indices, slope_indices] += 1e-4 / len(gram)
-    return replace(joint_equations, gram=gram)
+    """Add Levenberg's damping to the slopes (of norm 1), so that slopes nearly collinear with other columns make a
+    small step: 1e-4 (chosen) on the diagonal of the sum over blocks."""
+    damped_gram = joint_equations.gram.copy()
+    slope_indices = np.arange(damped_gram.shape[1] - slope_count, damped_gram.shape[1])
+    damped_gram[:, slope_indices, slope_indices] += 1e-4 / len(damped_gram)
+    return replace(joint_equations, gram=damped_gram)
 
 
 def _shift_parameter(term: Term, parameter_index: int, shift: float) -> Term:
-    """The term with a parameter moved within its bounds: exponents and angles by `shift`, others by a factor
-    exp(shift)."""
+    """Change a parameter of a term within its bounds: exponents and angles by `shift` (angles in rad), others by a
+    factor exp(shift)."""
     numbers, (low, high) = list(term.numbers), term.bounds[parameter_index]
     value = numbers[parameter_index]
     is_additive = parameter_index in term.exponents or parameter_index in term.angles

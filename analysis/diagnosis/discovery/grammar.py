@@ -3,7 +3,9 @@
 A term is a shape times a factor; its free parameters (exponents, widths, time constants, pitches) start on a grid that
 spans the recording's travel, speed and duration. Forces linear in an axis's own motion are not terms: mass, damping and
 stiffness are parameters of the model. Nor is a constant force, which each regression contains (`screen_terms`).
-docs/diagnosis.md lists what the grammar contains and what it does not.
+docs/diagnosis.md lists what the grammar contains and what it does not. Grids and bounds, relative to the scales of the
+recording, are chosen by hand. `view_terms` calls `list_terms`; `Term` and the names of signals are used throughout the
+package.
 """
 
 import re
@@ -16,9 +18,10 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 Columns = Mapping[str, FloatArray]
-"""Along a recording, (n,) each, SI: x, y, z, vx, … and dvx, … (accelerations) the axes' motion, fx, … the commands, ax,
-… the readings, t."""
+"""Signals along a recording by name, (n,) each, in SI units: positions x, y, z, velocities vx, …, accelerations dvx, …
+and commands fx, … of the axes, readings ax, … of the response channels, time t."""
 AXES = "xyz"
+"""Letters of the first three axes in the names of signals; further axes are not searched."""
 _SIGNAL = re.compile(rf"\b(?:(?:v|f|a|dv)?[{AXES}]|t)\b")
 CONSTANT = "1"
 """Shape of a constant force."""
@@ -32,8 +35,9 @@ class Term:
     shape: str
     """Formula in the language of laws; its free parameters are p0, p1, …"""
     numbers: tuple[float, ...] = ()
-    """Starting values of the free parameters."""
+    """Starting values of the free parameters, in SI units."""
     bounds: tuple[tuple[float, float], ...] = ()
+    """Bounds of each parameter."""
     exponents: tuple[int, ...] = ()
     """Indices of the parameters that are exponents."""
     angles: tuple[int, ...] = ()
@@ -48,22 +52,22 @@ class Term:
         return frozenset(_SIGNAL.findall(self.shape))
 
 
-def format_odd_power(name: str, parameter_index: int) -> str:
-    """Formula of an odd power of a signal, abs(x)^p sign(x). parameter_index: index of the free exponent."""
-    return f"abs({name})**p{parameter_index}*sign({name})"
+def format_odd_power(signal_name: str, parameter_index: int) -> str:
+    """Write the formula of an odd power of a signal, abs(x)^p sign(x). parameter_index: index of the free exponent."""
+    return f"abs({signal_name})**p{parameter_index}*sign({signal_name})"
 
 
-def format_even_power(name: str, parameter_index: int) -> str:
-    """Formula of an even power of a signal, abs(x)^p. parameter_index: index of the free exponent."""
-    return f"abs({name})**p{parameter_index}"
+def format_even_power(signal_name: str, parameter_index: int) -> str:
+    """Write the formula of an even power of a signal, abs(x)^p. parameter_index: index of the free exponent."""
+    return f"abs({signal_name})**p{parameter_index}"
 
 
 POWER_BOUNDS = (0.15, 6.0)
-"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop."""
+"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop. By hand."""
 
 
 STATIC_EXCESS_BOUNDS = (0.02, 20.0)
-"""Bounds of the excess of static over sliding friction, relative to the latter."""
+"""Bounds of the excess of static over sliding friction, relative to the latter. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,19 +80,19 @@ class Axis:
     """Name of the velocity."""
     f: str
     """Name of the command."""
-    travel: float
+    largest_position: float
     """Largest magnitude of the position, in m (rad)."""
-    speed: float
+    largest_speed: float
     """Largest magnitude of the velocity, in m/s (rad/s)."""
-    force: float
+    largest_command: float
     """Largest magnitude of the command, in N (N m)."""
 
 
-def measure_axes(columns: Columns, count: int) -> tuple[Axis, ...]:
-    """Names and largest magnitudes of the signals of the first `count` axes, each at least 1e-12."""
+def measure_axes(columns: Columns, axis_count: int) -> tuple[Axis, ...]:
+    """Measure the largest magnitudes of the signals of the first `axis_count` axes, at most three."""
 
     def find_largest(signal_name: str) -> float:
-        """Largest magnitude of a signal in its SI unit, at least 1e-12 so that scales are positive."""
+        """Find the largest magnitude of a signal in its SI unit, at least 1e-12 so that scales are positive."""
         return max(float(np.abs(columns[signal_name]).max()), 1e-12)
 
     return tuple(
@@ -100,13 +104,13 @@ def measure_axes(columns: Columns, count: int) -> tuple[Axis, ...]:
             find_largest(f"v{letter}"),
             find_largest(f"f{letter}"),
         )
-        for letter in AXES[:count]
+        for letter in AXES[:axis_count]
     )
 
 
 def list_terms(axes: Sequence[Axis], axis_index: int, duration_s: float, rate_hz: float) -> tuple[Term, ...]:
-    """All terms of a force along one axis, except the periodic ones (`periodic_terms`). axes: as of
-    `measure_axes`. axis_index: the force's axis. duration_s: length of the recording."""
+    """List all terms of a force along one axis, except the periodic ones (`periodic_terms`). axes: from `measure_axes`.
+    axis_index: the force's axis. duration_s, rate_hz: length and sample rate of the recording."""
     own_axis, other_axes = axes[axis_index], [axis for index, axis in enumerate(axes) if index != axis_index]
     terms = (
         *_generate_power_terms(own_axis), *_generate_product_terms(own_axis), *_generate_hinge_terms(own_axis),
@@ -119,7 +123,7 @@ def list_terms(axes: Sequence[Axis], axis_index: int, duration_s: float, rate_hz
 
 
 def _generate_power_terms(axis: Axis) -> Iterator[Term]:
-    """Dry friction, and odd and even powers of velocity, position and command with a free exponent."""
+    """Generate dry friction, and odd and even powers of velocity, position and command with a free exponent."""
     yield Term(f"sign({axis.v})")
     for signal_name, exponents in ((axis.v, (0.25, 0.5, 1.5, 2.0, 3.0, 5.0)), (axis.x, (0.5, 1.5, 2.0, 3.0, 5.0)),
                             (axis.f, (0.5, 1.5, 2.0, 3.0, 5.0))):  # fmt: skip
@@ -130,7 +134,8 @@ def _generate_power_terms(axis: Axis) -> Iterator[Term]:
 
 
 def _generate_product_terms(axis: Axis) -> Iterator[Term]:
-    """Products of powers of position and velocity, and of a power of position or velocity with the command."""
+    """Generate products of powers of position and velocity, of a power of position with dry friction, and of a power of
+    position or velocity with the command or its magnitude."""
     for (x_power, v_power), x_exponent, v_exponent in product(
         product((format_odd_power, format_even_power), (format_odd_power, format_even_power)), (1.0, 2.0), (1.0, 2.0)
     ):
@@ -144,64 +149,79 @@ def _generate_product_terms(axis: Axis) -> Iterator[Term]:
 
 
 def _generate_hinge_terms(axis: Axis) -> Iterator[Term]:
-    """Forces that begin at an edge: springs and damping beyond a position, dead zones of position and of velocity."""
+    """Generate forces that begin at an edge: springs and damping beyond a position, dead zones of position and of
+    velocity."""
     for share in (0.2, 0.4, 0.6, 0.8):
-        start_edge, edge_bounds = share * axis.travel, (0.0, axis.travel)
+        start_edge, edge_bounds = share * axis.largest_position, (0.0, axis.largest_position)
         for position in (axis.x, f"(-{axis.x})"):
             yield Term(f"maximum({position} - p0, 0)**p1", (start_edge, 1.0), (edge_bounds, POWER_BOUNDS), (1,))
             yield Term(f"maximum(sign({position} - p0), 0)*{axis.v}", (start_edge,), (edge_bounds,))
         yield Term(
             f"maximum(abs({axis.x}) - p0, 0)**p1*sign({axis.x})", (start_edge, 1.0), (edge_bounds, POWER_BOUNDS), (1,)
         )
-        yield Term(f"maximum(abs({axis.v}) - p0, 0)*sign({axis.v})", (share * axis.speed,), ((0.0, axis.speed),))
+        yield Term(
+            f"maximum(abs({axis.v}) - p0, 0)*sign({axis.v})",
+            (share * axis.largest_speed,),
+            ((0.0, axis.largest_speed),),
+        )
 
 
 def _generate_saturation_terms(axis: Axis) -> Iterator[Term]:
-    """Saturating and peaked functions of velocity or position with a free width, dry friction that falls with the
-    speed, and limits of the command, soft or with an edge."""
-    for (signal_name, magnitude), share in product(
-        ((axis.v, axis.speed), (axis.x, axis.travel)), (0.03, 0.1, 0.3, 1.0)
+    """Generate saturating and peaked functions of velocity or position with a free width, dry friction that falls with
+    the speed, and limits of the command, soft or with an edge."""
+    for (signal_name, largest), share in product(
+        ((axis.v, axis.largest_speed), (axis.x, axis.largest_position)), (0.03, 0.1, 0.3, 1.0)
     ):
-        width = (share * magnitude,), ((1e-3 * magnitude, 10 * magnitude),)
-        yield Term(f"tanh({signal_name}/p0)", *width)
-        yield Term(f"atan({signal_name}/p0)", *width)
-        yield Term(f"{signal_name}/(1 + abs({signal_name})/p0)", *width)
-        yield Term(f"{signal_name}/(1 + ({signal_name}/p0)**2)", *width)
-        yield Term(f"{signal_name}*exp(-({signal_name}/p0)**2)", *width)
+        start_and_bounds = (share * largest,), ((1e-3 * largest, 10 * largest),)
+        yield Term(f"tanh({signal_name}/p0)", *start_and_bounds)
+        yield Term(f"atan({signal_name}/p0)", *start_and_bounds)
+        yield Term(f"{signal_name}/(1 + abs({signal_name})/p0)", *start_and_bounds)
+        yield Term(f"{signal_name}/(1 + ({signal_name}/p0)**2)", *start_and_bounds)
+        yield Term(f"{signal_name}*exp(-({signal_name}/p0)**2)", *start_and_bounds)
     for share in (0.01, 0.03, 0.1, 0.3):
-        speed_bounds = (1e-3 * axis.speed, 10 * axis.speed)
-        for decay in ("exp(-abs({0})/{1})", "exp(-({0}/{1})**2)"):
-            yield Term(f"sign({axis.v})*{decay.format(axis.v, 'p0')}", (share * axis.speed,), (speed_bounds,))
+        speed_bounds = (1e-3 * axis.largest_speed, 10 * axis.largest_speed)
+        for decay_formula in ("exp(-abs({0})/{1})", "exp(-({0}/{1})**2)"):
             yield Term(
-                f"sign({axis.v})*(1 + p0*{decay.format(axis.v, 'p1')})",
-                (0.5, share * axis.speed),
+                f"sign({axis.v})*{decay_formula.format(axis.v, 'p0')}", (share * axis.largest_speed,), (speed_bounds,)
+            )
+            yield Term(
+                f"sign({axis.v})*(1 + p0*{decay_formula.format(axis.v, 'p1')})",
+                (0.5, share * axis.largest_speed),
                 (STATIC_EXCESS_BOUNDS, speed_bounds),
             )
-    yield from generate_soft_limit_terms(axis.f, axis.force)
+    yield from generate_soft_limit_terms(axis.f, axis.largest_command)
     for share in (0.3, 0.5, 0.7, 0.9):
-        yield Term(f"maximum(abs({axis.f}) - p0, 0)*sign({axis.f})", (share * axis.force,), ((0.0, axis.force),))
+        yield Term(
+            f"maximum(abs({axis.f}) - p0, 0)*sign({axis.f})",
+            (share * axis.largest_command,),
+            ((0.0, axis.largest_command),),
+        )
 
 
-def generate_soft_limit_terms(name: str, magnitude: float) -> Iterator[Term]:
-    """Soft limits of a command or a reading, minus the signal itself, so that small signals are unchanged: no parameter
-    of the model could compensate for a gain. magnitude: the largest of the signal."""
-    for curve, share in product(("tanh({0}/p0)*p0", "atan({0}/p0)*p0", "{0}/(1 + abs({0})/p0)"), (0.2, 0.5, 1.0, 2.0)):
-        yield Term(f"({curve.format(name)} - {name})", (share * magnitude,), ((1e-2 * magnitude, 20 * magnitude),))
+def generate_soft_limit_terms(signal_name: str, largest: float) -> Iterator[Term]:
+    """Generate soft limits of a command or a reading, minus the signal itself, so that small signals are unchanged: no
+    parameter of the model could compensate for a gain. largest: magnitude of the signal, in its unit."""
+    for limit, share in product(("tanh({0}/p0)*p0", "atan({0}/p0)*p0", "{0}/(1 + abs({0})/p0)"), (0.2, 0.5, 1.0, 2.0)):
+        yield Term(
+            f"({limit.format(signal_name)} - {signal_name})", (share * largest,), ((1e-2 * largest, 20 * largest),)
+        )
 
 
 def _generate_pole_terms(axis: Axis) -> Iterator[Term]:
-    """Inverse powers of the distance to a position that the axis never reached, with or without their value at zero.
-    Integer exponents are fitted separately, because a free exponent is strongly correlated with the position."""
-    pole_bounds = (1.02 * axis.travel, 20 * axis.travel)
+    """Generate inverse powers of the distance to a position that the axis did not reach, with or without their value at
+    zero subtracted. Integer exponents are fitted separately, because a free exponent is strongly correlated with the
+    position."""
+    pole_bounds = (1.02 * axis.largest_position, 20 * axis.largest_position)
     for share, power, position in product((1.15, 1.5, 2.5), (1, 2, 3), (axis.x, f"(-{axis.x})")):
         integer_shape = f"(1/abs(p0 - {position})**{power} - 1/p0**{power})"
-        yield Term(integer_shape, (share * axis.travel,), (pole_bounds,), family=f"pole of {position}")
+        yield Term(integer_shape, (share * axis.largest_position,), (pole_bounds,), family=f"pole of {position}")
         for shape in (f"(1/abs(p0 - {position})**p1 - 1/p0**p1)", f"1/abs(p0 - {position})**p1"):
-            yield Term(shape, (share * axis.travel, float(power)), (pole_bounds, POWER_BOUNDS), (1,))
+            yield Term(shape, (share * axis.largest_position, float(power)), (pole_bounds, POWER_BOUNDS), (1,))
 
 
 def _generate_memory_terms(axis: Axis, other_axes: Sequence[Axis], duration_s: float, rate_hz: float) -> Iterator[Term]:
-    """Terms with memory: first-order lags, thermal drift of gains, play, delays and the integral of the position."""
+    """Generate terms with memory: first-order lags, drift of gains with a lagged square (heating), play, delays and the
+    integral of the position."""
     shortest_s, longest_s = 1 / rate_hz, duration_s
     for time_constant_s in np.geomspace(2 * shortest_s, max(min(8.0, duration_s / 4), 4 * shortest_s), 8).tolist():
         bounds = ((shortest_s, longest_s),)
@@ -213,7 +233,11 @@ def _generate_memory_terms(axis: Axis, other_axes: Sequence[Axis], duration_s: f
                 f"{signal_name}*lag({squared_signal}**2, p0)", (time_constant_s,), ((shortest_s, 10 * longest_s),)
             )
     for share in (0.03, 0.1, 0.2, 0.4, 0.7):
-        yield Term(f"play({axis.x}, p0)", (share * axis.travel,), ((1e-3 * axis.travel, axis.travel),))
+        yield Term(
+            f"play({axis.x}, p0)",
+            (share * axis.largest_position,),
+            ((1e-3 * axis.largest_position, axis.largest_position),),
+        )
     for delay_s in (2 * shortest_s, 5 * shortest_s, 0.01, 0.03):
         for signal_name in (axis.x, axis.f):
             yield Term(f"delay({signal_name}, p0)", (delay_s,), ((0.5 * shortest_s, 0.2),))
@@ -221,8 +245,8 @@ def _generate_memory_terms(axis: Axis, other_axes: Sequence[Axis], duration_s: f
 
 
 def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Iterator[Term]:
-    """Terms of the motion or the command of other axes, alone or times a signal of the own axis; and drag by the speed
-    in space."""
+    """Generate terms of the motion or the command of other axes, alone or times a signal of the own axis; and drag by
+    the speed in space."""
     x, v, f = own_axis.x, own_axis.v, own_axis.f
     for other_axis in other_axes:
         shapes = (
@@ -238,7 +262,8 @@ def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> It
     for first_axis, second_axis in product(other_axes, other_axes):
         if first_axis.x < second_axis.x:
             yield from (
-                Term(f"{a}*{b}") for a, b in product((first_axis.x, first_axis.v), (second_axis.x, second_axis.v))
+                Term(f"{first_signal}*{second_signal}")
+                for first_signal, second_signal in product((first_axis.x, first_axis.v), (second_axis.x, second_axis.v))
             )
     if other_axes:
         squared_speeds = " + ".join(f"{axis.v}**2" for axis in (own_axis, *other_axes))
@@ -246,7 +271,7 @@ def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> It
 
 
 def _generate_inertia_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Iterator[Term]:
-    """Inertia that changes with the position q as m(q) = m0 + c q or m0 + c q², by Lagrange's equation
+    """Generate inertia that changes with the position q as m(q) = m0 + c q or m0 + c q², by Lagrange's equation
     m(q) dv/dt + m'(q) v²/2 = F; that of the own axis may depend on another axis's position, whose speed then enters,
     and that of another axis on the own position."""
     x, v = own_axis.x, own_axis.v
@@ -259,6 +284,6 @@ def _generate_inertia_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Itera
 
 
 def _generate_drift_terms(axis: Axis, duration_s: float) -> Iterator[Term]:
-    """Stiffness, damping, gain or force that changes linearly with time."""
+    """Generate stiffness, damping, gain of the command and force that change linearly with time."""
     yield from (Term(f"{signal_name}*t") for signal_name in (axis.x, axis.v, axis.f))
     yield Term("t")

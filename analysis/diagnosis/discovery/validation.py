@@ -2,8 +2,8 @@
 
 Among so many formulas, some fit any data. A law is named only where held-out stretches of another kind than the fitted
 ones confirm it (extrapolation), where its parameters agree between stretches (stability), where the same search in a
-time-shuffled force finds nothing (negative control), and where no law of other variables fits as well. Called by
-`add_laws`.
+time-shuffled force finds clearly less (negative control), where no law of other variables fits as well, no exponent is
+beyond the grammar's bounds, and the model's coupled parameters cannot imitate it. Called by `add_laws`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,29 +35,30 @@ NO_OTHER_EXCITATION = (
     "the held-out data contain no other kind of excitation than the data in which it was found, such as a stronger "
     "one or one on several axes"
 )
-
+"""Reason not to name a law: see `describe_held_out_kinds`."""
 STEEP_POWER = (
     "its exponent {:.3g} is larger than any that the search begins with: such a power stands for an edge or a stop, "
     "whose place these recordings do not determine"
 )
-
+"""Reason not to name a law with an exponent, the format's argument, above `POWER_BOUNDS`."""
 COUPLING_EXPLAINS_HALF = (
     "the model's own coupled damping or stiffness, which acts on both axes alike, can explain half of such a force: "
     "a force on one axis and an antisymmetric pair of half its size fit equally well"
 )
+"""Reason not to name a law: see `can_coupling_imitate`."""
 
 
 def find_failed_checks(
     context: SearchContext, discovery: Discovery, rivals: Sequence[FittedCandidate]
 ) -> tuple[str, ...]:
-    """Why the laws are only candidates; empty where they pass. rivals: the best of the catalogue, with held-out
-    error."""
+    """List the reasons, as sentences, not to name the laws; empty where they pass all checks. rivals: the best of the
+    catalogue, with held-out error."""
     return tuple(dict.fromkeys(_run_checks(context, discovery, rivals)))
 
 
 def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discovery:
-    """The discovery with its last law replaced by an inseparable law of the same round whose held-out error is
-    significantly smaller, if there is one: formulas that agree on the fitted data may differ on stronger commands. The
+    """Replace the last law by an inseparable law of the same round whose held-out error is significantly smaller, if
+    there is one: formulas that agree on the fitted data may differ on stronger commands. The
     alternatives are few and fixed beforehand, and the chosen law must still pass all other checks. Ends early with
     the time of the context's map."""
     last_round, best_candidate, law_count = discovery.rounds[-1], discovery.explanation.after, 1
@@ -70,27 +71,27 @@ def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discover
         early_gain = estimate_held_out_gain(context.full_measure, best_candidate, context.with_test_score(candidate))
         if early_gain is not None and early_gain.high < 0:
             continue  # Significantly worse: converging to about the same fit would not make it better.
-        refined = run_within_time(partial(converge_and_snap, context, candidate.fitted), None)
-        if refined is None:
+        converged_fit = run_within_time(partial(converge_and_snap, context, candidate.fitted), None)
+        if converged_fit is None:
             break
-        alternative = context.with_test_score(context.score_fit(refined))
-        gain = estimate_held_out_gain(context.full_measure, best_candidate, alternative)
+        refined_candidate = context.with_test_score(context.score_fit(converged_fit))
+        gain = estimate_held_out_gain(context.full_measure, best_candidate, refined_candidate)
         if gain is not None and gain.low > 0:
-            best_candidate, chosen_sum = alternative, term_sum
+            best_candidate, chosen_sum = refined_candidate, term_sum
     if chosen_sum is last_round.sums[0]:
         return discovery
-    reordered = _put_first(last_round, chosen_sum)
+    reordered_round = _put_first(last_round, chosen_sum)
     explanation = replace(
         discovery.explanation,
         after=best_candidate,
-        rounds=(*discovery.explanation.rounds[:-1], reordered.fitted_candidates),
+        rounds=(*discovery.explanation.rounds[:-1], reordered_round.fitted_candidates),
         steps=(*discovery.explanation.steps[:-1], best_candidate),
     )
-    return Discovery(explanation, (*discovery.rounds[:-1], reordered), law_count)
+    return Discovery(explanation, (*discovery.rounds[:-1], reordered_round), law_count)
 
 
 def _put_first(round_: Round, chosen_sum: Sum) -> Round:
-    """The round with the chosen sum and its candidate first, the others in their order."""
+    """Move the chosen sum and its candidate to the front of the round; the others keep their order."""
     order = sorted(range(len(round_.sums)), key=lambda index: round_.sums[index] is not chosen_sum)
     return replace(
         round_,
@@ -100,14 +101,14 @@ def _put_first(round_: Round, chosen_sum: Sum) -> Round:
 
 
 def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
-    """Sentences on the checks that fail, some possibly repeated: extrapolation, stability, negative control, equally
-    good laws, coupling of the model, and the gain over the re-tuned model and over the rivals."""
+    """Yield a sentence for each check that fails, some possibly repeated: extrapolation, stability, negative control,
+    equally good laws, steep exponents, coupling, and the gain over the re-tuned model and over the rivals."""
     if not describe_held_out_kinds(context.full_measure.records):
         yield NO_OTHER_EXCITATION
     for round_index, round_ in enumerate(discovery.rounds):
         best_sum = round_.sums[0]
-        if best_sum.spread > LAW_STABLE and not is_confirmed_on_held_out(discovery.explanation):
-            yield f"its parameters differ by {100 * best_sum.spread:.0f} % from stretch to stretch"
+        if best_sum.factor_error > LAW_STABLE and not is_confirmed_on_held_out(discovery.explanation):
+            yield f"its parameters differ by {100 * best_sum.factor_error:.0f} % from stretch to stretch"
         removed_share, chance_share = round_.shares_above_noise
         if 1 - removed_share > LAW_PLACEBO * (1 - chance_share):
             yield (
@@ -117,8 +118,8 @@ def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[F
         yield from _check_rival_laws(context, discovery, round_index)
     for law in list_fitted_laws(discovery.explanation.after.fitted.hypothesis):
         yield from (STEEP_POWER.format(k) for k in (law.exponents if law else ()) if k > POWER_BOUNDS[1])
-    inputs = context.full_measure.records[0].recording.command.channels
-    if can_coupling_imitate(context.tuning, discovery.explanation.after.fitted, inputs):
+    command_channels = context.full_measure.records[0].recording.command.channels
+    if can_coupling_imitate(context.tuning, discovery.explanation.after.fitted, command_channels):
         yield COUPLING_EXPLAINS_HALF
     yield from _check_held_out_gain(
         context, discovery.explanation.after, (discovery.explanation.retuned, "the re-tuned model")
@@ -140,21 +141,21 @@ def is_confirmed_on_held_out(explanation: Explanation) -> bool:
 
 
 def _check_held_out_gain(
-    context: SearchContext, law: FittedCandidate, rival: tuple[FittedCandidate, str]
+    context: SearchContext, law: FittedCandidate, named_rival: tuple[FittedCandidate, str]
 ) -> Iterator[str]:
-    """A reason, as a sentence, where the gain on held-out data is not significant (bootstrap over stretches)."""
-    gain = estimate_held_out_gain(context.full_measure, rival[0], law)
+    """Yield a reason where the gain over a rival (fit and name) on held-out data is unknown or not significant."""
+    gain = estimate_held_out_gain(context.full_measure, named_rival[0], law)
     if gain is None:
         yield "too little data was held out to confirm it"
     elif gain.low <= 0:
         yield (
-            f"its gain on held-out data over {rival[1]} is not larger than its variation between stretches of the "
-            "recording"
+            f"its gain on held-out data over {named_rival[1]} is not larger than its variation between stretches of "
+            "the recording"
         )
 
 
 def _check_rival_laws(context: SearchContext, discovery: Discovery, round_index: int) -> Iterator[str]:
-    """A reason, as a sentence, for each law of other variables that fits as well as the best of the round, that
+    """Yield a reason, as a sentence, for each law of other variables that fits as well as the best of the round, that
     held-out data do not distinguish from it either, and whose prediction differs."""
     round_ = discovery.rounds[round_index]
     best_candidate = round_.fitted_candidates[0]
@@ -208,10 +209,10 @@ def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: 
 
 
 def describe_held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
-    """In words, how the held-out stretches differ from those in which laws are searched (stronger commands, axes driven
-    together, another kind of command); empty where they do not. A segment of which only the end is held out counts as
-    both; rest counts as neither."""
-    fitted_kinds: list[tuple[str, tuple[int, ...], float]] = []
+    """Describe how the held-out stretches differ from those in which laws are searched (stronger commands, axes driven
+    together, another kind of command); empty where they do not. A segment with samples of both roles counts as both,
+    one without a command as neither. Stronger: by the factor `LOUDER_RATIO`."""
+    fitted_segments: list[tuple[str, tuple[int, ...], float]] = []
     held_out_segments: list[tuple[str, tuple[int, ...], float]] = []
     for record in records:
         for segment in record.recording.segments:
@@ -222,50 +223,50 @@ def describe_held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
             if record.test[samples].any():
                 held_out_segments.append(description)
             if (record.fit | record.choose)[samples].any():
-                fitted_kinds.append(description)
-    if not fitted_kinds:
+                fitted_segments.append(description)
+    if not fitted_segments:
         return ()
-    kinds, axes = {kind for kind, _, _ in fitted_kinds}, {driven for _, driven, _ in fitted_kinds}
-    strongest = max(level for _, _, level in fitted_kinds)
+    fitted_kinds, fitted_axes = {kind for kind, _, _ in fitted_segments}, {axes for _, axes, _ in fitted_segments}
+    fitted_level = max(level for _, _, level in fitted_segments)
     differences = [
-        (any(level > LOUDER_RATIO * strongest for _, _, level in held_out_segments), "stronger commands"),
-        (any(driven not in axes and len(driven) > 1 for _, driven, _ in held_out_segments), "axes driven together"),
-        (any(kind not in kinds for kind, _, _ in held_out_segments), "another kind of command"),
+        (any(level > LOUDER_RATIO * fitted_level for _, _, level in held_out_segments), "stronger commands"),
+        (any(axes not in fitted_axes and len(axes) > 1 for _, axes, _ in held_out_segments), "axes driven together"),
+        (any(kind not in fitted_kinds for kind, _, _ in held_out_segments), "another kind of command"),
     ]
-    return tuple(phrase for applies, phrase in differences if applies)
+    return tuple(phrase for is_present, phrase in differences if is_present)
 
 
 def _describe_segment(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
-    """Kind of excitation, indices of the driven axes, and largest magnitude of the command (n, m), in its unit."""
-    driven = np.flatnonzero(np.abs(command).max(axis=0, initial=0.0) > 0)
-    return segment.kind, tuple(driven.tolist()), float(np.abs(command).max(initial=0.0))
+    """Return the kind of excitation, indices of the driven axes, and the largest magnitude of the command (n, m)."""
+    driven_axes = np.flatnonzero(np.abs(command).max(axis=0, initial=0.0) > 0)
+    return segment.kind, tuple(driven_axes.tolist()), float(np.abs(command).max(initial=0.0))
 
 
-def write_proof_sentence(
-    context: SearchContext, explanation: Explanation, rivals: Sequence[FittedCandidate], chosen_of: int = 1
+def describe_held_out_test(
+    context: SearchContext, explanation: Explanation, rivals: Sequence[FittedCandidate], law_count: int = 1
 ) -> str:
-    """One to three sentences: on which data a named law was tested, its error compared with the best law of the
-    catalogue, the number of equally good laws, and the range of motion within which it was tested."""
-    measure, final = context.full_measure, explanation.after
-    laws = [law for law in list_fitted_laws(final.fitted.hypothesis) if law is not None]
-    kinds = conjoin(describe_held_out_kinds(measure.records))
-    text = (
-        f"The formula was tested on {kinds}, to which nothing was fitted: "
-        f"{_format_held_out_error(context, explanation, final)}"
+    """Write one to three sentences: on which data a named law was tested, its error compared with the best law of the
+    catalogue, the number of equally good laws (law_count), and the range of motion within which it was tested."""
+    measure, named_law = context.full_measure, explanation.after
+    laws = [law for law in list_fitted_laws(named_law.fitted.hypothesis) if law is not None]
+    held_out_kinds = conjoin(describe_held_out_kinds(measure.records))
+    sentences = (
+        f"The formula was tested on {held_out_kinds}, to which nothing was fitted: "
+        f"{_format_held_out_error(context, explanation, named_law)}"
     )
     least_rival_share = min(
         (_compute_held_out_error_share(context, explanation, rival) for rival in rivals), default=None
     )
     if least_rival_share is not None:
-        text += f", that of the best law of the catalogue {100 * least_rival_share:.3g} %"
-    if chosen_of > 1:
-        text += f". Of {chosen_of} formulas that fitted equally well, it is the one that these data confirm"
+        sentences += f", that of the best law of the catalogue {100 * least_rival_share:.3g} %"
+    if law_count > 1:
+        sentences += f". Of {law_count} formulas that fitted equally well, it is the one that these data confirm"
     ranges = _format_ranges_of_motion(context, explanation, {name for law in laws for name in law.variables})
-    return f"{text}. Beyond {conjoin(ranges)} the formula is not tested." if ranges else f"{text}."
+    return f"{sentences}. Beyond {conjoin(ranges)} the formula is not tested." if ranges else f"{sentences}."
 
 
 def _format_held_out_error(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> str:
-    """Clause with the law's held-out rms error in per cent of that of the re-tuned model."""
+    """Format a clause with the law's held-out rms error in per cent of that of the re-tuned model."""
     return (
         f"there its error is {100 * _compute_held_out_error_share(context, explanation, law):.3g} % of the re-tuned "
         "model's error"
@@ -273,8 +274,8 @@ def _format_held_out_error(context: SearchContext, explanation: Explanation, law
 
 
 def _compute_held_out_error_share(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> float:
-    """Held-out rms error over the re-tuned model's, by the mean error power over the channels; NaN where too little was
-    held out."""
+    """Compute the held-out rms error over the re-tuned model's, by the mean error power over the channels; NaN where
+    too little was held out."""
     gain = estimate_held_out_gain(context.full_measure, explanation.retuned, law)
     return float("nan") if gain is None else float(np.sqrt(max(1 - gain.gain, 0.0)))
 
@@ -282,10 +283,10 @@ def _compute_held_out_error_share(context: SearchContext, explanation: Explanati
 def _format_ranges_of_motion(
     context: SearchContext, explanation: Explanation, signal_names: set[str]
 ) -> tuple[str, ...]:
-    """The largest position and speed of each axis that the law uses, held-out samples included, as text."""
+    """Format the largest position and speed of each axis that the law uses, held-out samples included, with unit."""
     measure, fitted = context.full_measure, explanation.after.fitted
-    model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
-    evidence = measure.evidence(model, placed, fitted.residuals)
+    model, placed_effects = context.tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
+    evidence = measure.evidence(model, placed_effects, fitted.residuals)
     letters = derive_axis_letters(measure.records[0].recording.command.channels)
     length_unit, time_unit = model.system.length, model.system.time
     ranges = []

@@ -1,9 +1,10 @@
-"""Errors of a model with effects against measurements, and the fit that minimises them. Begin at `choose_measure.py`.
+"""Errors of a model with effects against measurements, and the fit that minimises them.
 
-In this order: `choose_measure` makes an error measure (`free_simulation`, `windows`, or `predicted_force` of `forces`)
-by the rule of `error_measure_rule`; `error_measure` is their protocol, `whitened_measure` the form for clean
-recordings. `tuning` holds the free parameters of the model, `hypothesis` (`law_hypothesis`) those of added effects;
-`output_error` fits both by least squares, `evidence_from_residuals` converts its residuals to a missing force.
-`fit_score` and `standard_errors` give errors and standard errors. For impacts, `band_power` and `band_power_fit` take
-the place of measure and fit (`excited_segments` selects their data).
+`choose_measure` makes an error measure (protocol: `error_measure`): `free_simulation`, `windows`, or forces along the
+motion, by `error_measure_rule`; `whitened_measure` is the one for clean recordings -> `tuning` (free parameters of the
+model), `hypothesis` or `law_hypothesis` (those of added effects) -> `output_error` (fits both by least squares) ->
+`fit_score`, `standard_errors`; `evidence_from_residuals` converts residuals to a missing force. For impacts,
+`band_power` and `band_power_fit` take the place of measure and fit (data: `excited_segments`; all parameters together:
+`refine_band_power`). `prediction_error` gives the error of a model whose parameters are not fitted. Used by
+`localisation`, `search` and all later steps. Begin at `choose_measure.py`.
 """

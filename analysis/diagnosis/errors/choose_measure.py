@@ -124,14 +124,14 @@ def _build_force_measure(
     band_hz: float | None = None,
 ) -> MeasureChoice:
     """Build the error measure by force, with the end of its band among the remarks (except `UNTIMED`)."""
-    from analysis.diagnosis.forces.force_views import build_force_views
+    from analysis.diagnosis.forces.force_measure import build_predicted_force_measure
 
     model_effects = place_recorded_effects(model, records[0].recording)
-    force_views = build_force_views(records, model, floors, band_hz)
-    band_remark = "" if UNTIMED in remarks else f"The forces are compared up to {force_views.measure.band_hz:.3g} Hz."
+    force_measure = build_predicted_force_measure(records, model, floors, band_hz)
+    band_remark = "" if UNTIMED in remarks else f"The forces are compared up to {force_measure.measure.band_hz:.3g} Hz."
     return MeasureChoice(
-        replace(force_views.measure, model_effects=model_effects),
-        force_views.floors,
+        replace(force_measure.measure, model_effects=model_effects),
+        force_measure.floors,
         tuple(filter(None, (*remarks, band_remark))),
     )
 

@@ -90,7 +90,7 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"
     all_columns = regression.select_columns(())
-    force_power = max(sum(block.signal for block in regression.fit), 1e-300)
+    force_power = max(sum(block.centred_power for block in regression.fit), 1e-300)
     if not np.isfinite(motions[0].band_hz):
         return "position"
 

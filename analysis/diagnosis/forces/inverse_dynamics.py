@@ -4,8 +4,8 @@
 
 Where every coordinate is measured, q follows from y and the derivatives suffice; else the frequency response from y to
 u is used (`compute_inverse_response`). The straight line between the first and the last sample, which a Fourier
-transform cannot represent, is treated by itself in steady state. Used by the error measure by forces (`force_views`,
-`predicted_force`) and by `rigid_model`.
+transform cannot represent, is treated by itself in steady state. Used by the error measure by forces (`force_measure`,
+`predicted_force`), `rigid_model`, `search.short_recordings` and `confirm.balance_with_model`.
 """
 
 from dataclasses import dataclass
@@ -19,17 +19,22 @@ from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _NEAR_STATIC_HZ = 1e-6
-"""Frequency (Hz) at which the derivative of the inverse response at 0 Hz is computed."""
+"""Frequency (Hz) by which the derivative of the inverse response at 0 Hz is computed as a finite difference. By
+hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RequiredForce:
-    """Required force, N (N m), and motion of the driven axes within a band, SI; each (n, m)."""
+    """Required force, and motion of the driven axes within a band; each (n, m)."""
 
     force: FloatArray
+    """N (N m), as commands: means over one sample period around each sample."""
     axis_position: FloatArray
+    """m (rad), at the samples."""
     axis_velocity: FloatArray
+    """m/s (rad/s), at the samples."""
     axis_acceleration: FloatArray
+    """m/s² (rad/s²), at the samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +53,8 @@ class BandMotion:
 
 
 def compute_band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
-    """Position, velocity and acceleration below `band_hz`, at the samples and as means about them. position: (n, m),
-    finite."""
+    """Compute position, velocity and acceleration below `band_hz` (Hz), at the samples and as means over one sample
+    period around them. position: (n, m), finite."""
     m = position.shape[1]
 
     def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
@@ -69,9 +74,8 @@ def compute_band_motion(position: FloatArray, sample_rate_hz: float, band_hz: fl
 
 
 def compute_required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
-    """Required force, mean over one sample period around each sample, and motion of the axes at the samples. Actuator,
-    sensor and effects are not included. Raises numpy.linalg.LinAlgError where the first m outputs do not determine the
-    model's motion."""
+    """Compute the required force and the motion of the axes. Actuator, sensor and effects are not included. Raises
+    numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""
     if model.coordinates == model.inputs:
         return _compute_square_model_force(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
@@ -104,26 +108,26 @@ def compute_required_force(model: MechanicalModel, motion: BandMotion) -> Requir
 
 
 def _compute_square_model_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
-    """Required force of a model whose every coordinate is measured: the derivatives suffice, without another Fourier
-    transform."""
-    to_coordinates = np.linalg.inv(model.output[: model.inputs])
-    to_commands = np.linalg.inv(model.input)
+    """Compute the required force of a model with as many coordinates as commands, all measured: the derivatives
+    suffice, without another Fourier transform. Raises numpy.linalg.LinAlgError as `compute_required_force`."""
+    output_inverse = np.linalg.inv(model.output[: model.inputs])
+    input_inverse = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass
     force = sum(
         (
-            derivative @ (to_commands @ matrix @ to_coordinates).T
+            derivative @ (input_inverse @ matrix @ output_inverse).T
             for derivative, matrix in zip(motion.around_samples, matrices, strict=True)
         ),
         np.zeros_like(motion.position),
     )
-    to_axes = (compute_driven_axes(model).T @ to_coordinates).T
-    return RequiredForce(force, *(derivative @ to_axes for derivative in motion.at_samples))
+    outputs_to_axes = (compute_driven_axes(model).T @ output_inverse).T
+    return RequiredForce(force, *(derivative @ outputs_to_axes for derivative in motion.at_samples))
 
 
 def _compute_force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """(n, 4 m): required force, position, velocity and acceleration of the axes for the straight line between first and
-    last position, in steady state: y of constant slope needs the force G(0) y + G'(0) y' with the inverse response
-    G."""
+    """Compute (n, 4 m): required force, position, velocity and acceleration of the axes for the straight line between
+    first and last position, in steady state: y of constant slope needs the force G(0) y + G'(0) y' with the inverse
+    response G and its derivative G' by s = i omega."""
     m = model.inputs
     line = compute_end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz

@@ -9,7 +9,7 @@ one linear system,
 Solving it at each of many thousand lines is slow. The solution is a rational function of s whose poles are the model's
 transmission zeros, generalised eigenvalues of the matrix pencil (Emami-Naeini and Van Dooren 1982, Automatica 18:415).
 With the poles known, its partial fraction expansion is fitted to a few lines, and checked at others. Called by
-`force_views` and `inverse_dynamics`; the transmission zeros alone by `search.short_recordings`.
+`force_measure` and `inverse_dynamics`; the transmission zeros alone by `search.short_recordings`.
 
 Sizes: n coordinates q, m inputs u and as many outputs y, k transmission zeros with non-negative imaginary part.
 """

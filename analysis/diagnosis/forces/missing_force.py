@@ -7,7 +7,7 @@ and the model's transfer H from the m forces to the c channels, both in units of
 
 This f is the posterior mean of a white Gaussian force of variance s² (a latent force in the sense of Rogers and Friis,
 Mech. Syst. Signal Process. 2021). Starting values of effects (`evidence_from_residuals`), the screening of laws
-(`matched_filter`) and figures (`signature_curves`) are computed from it.
+(`matched_filter`), figures (`signature_curves`) and `localisation` are computed from it.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0
 """Length (s) of the zeros appended to the record: the discrete Fourier transform is periodic, and without them the
-motion at the record's end would wrap around to its start."""
+motion at the record's end would wrap around to its start. By hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,15 +77,15 @@ class AxisTransfer:
 
 
 def compute_axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
-    """Transfer functions of the linear mechanism, without effects and actuator; the sensor's low-pass acts on the
-    response. frequency_hz: (lines,)."""
-    steps = discretise_model(model, 1 / sample_rate_hz)
+    """Compute transfer functions of the linear mechanism, without effects and actuator; the sensor's low-pass acts on
+    the response. frequency_hz: (lines,)."""
+    discrete_model = discretise_model(model, 1 / sample_rate_hz)
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
-    output_matrix = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
-    responses = _compute_frequency_response(steps.transition, steps.by_axis_force, output_matrix, z)
+    output_matrix = np.vstack([discrete_model.motion[: 2 * m], discrete_model.response, discrete_model.position])
+    responses = _compute_frequency_response(discrete_model.transition, discrete_model.by_axis_force, output_matrix, z)
     # A force takes effect from the next sample on; its direct feedthrough is read one sample late.
-    response = responses[:, 2 * m : 2 * m + p] + steps.response_by_axis_force * (1 / z)[:, None, None]
+    response = responses[:, 2 * m : 2 * m + p] + discrete_model.response_by_axis_force * (1 / z)[:, None, None]
     if model.sensor.bandwidth_hz > 0:
         decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)
         response = response * ((1 - decay) / (1 - decay / z))[:, None, None]
@@ -93,10 +93,11 @@ def compute_axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequen
 
 
 def _compute_frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
-    """C (zI - A)^-1 B, (lines, rows, inputs); by the eigenvectors of A where they are well conditioned. z: (lines,)."""
-    poles, shapes = np.linalg.eig(A)
-    if np.linalg.cond(shapes) < _LARGEST_CONDITION:
-        output_modes, input_modes = C @ shapes, np.linalg.solve(shapes, B.astype(complex))
+    """Compute C (zI - A)^-1 B, (lines, rows, inputs); by the eigenvectors of A where they are well conditioned. z:
+    (lines,)."""
+    poles, eigenvectors = np.linalg.eig(A)
+    if np.linalg.cond(eigenvectors) < _LARGEST_CONDITION:
+        output_modes, input_modes = C @ eigenvectors, np.linalg.solve(eigenvectors, B.astype(complex))
         return np.asarray(
             np.einsum("rs,ls,sm->lrm", output_modes, 1 / (z[:, None] - poles), input_modes, optimize=True)
         )

@@ -1,10 +1,10 @@
 """Force error of a model: the applied force u less the force that the model requires along the measured motion q.
 
-    e = L (u + h) - L (M q'' + D q' + K q)        L: zero-phase low pass, see `force_views`
+    e = L (u + h) - L (M q'' + D q' + K q)        L: zero-phase low pass, see `force_measure`
 
 with the forces h of the effects along q (inverse dynamics). Because no simulation is needed, this error measure suits
 plants in closed loop and plants that drift. All forces are means over one sample period around each sample. Created by
-`force_views`.
+`force_measure`.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,7 +48,7 @@ class PredictedForce:
     unit: FloatArray
     """(m,): unit of a residual, N (N m)."""
     noise: FloatArray
-    """(m,): rms noise of the forces, N (N m): see `force_views`."""
+    """(m,): rms noise of the forces, N (N m): see `force_measure`."""
     band_hz: float
     """Upper end (Hz) of the band in which forces are compared; it begins at 0."""
     name: str = "predicted force"

@@ -17,7 +17,7 @@ import numpy as np
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.forces.force_views import build_force_views
+from analysis.diagnosis.forces.force_measure import build_predicted_force_measure
 from analysis.diagnosis.forces.inverse_dynamics import compute_required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
@@ -54,7 +54,7 @@ def fit_rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalMod
         raise MechanicalModelError(("neither positions nor velocities were measured",))
     floors = [estimate_noise_floor(record.recording) for record in records]
     for _ in range(_FIT_COUNT):
-        model = _fit_to_forces(model, build_force_views(records, model, floors).measure)
+        model = _fit_to_forces(model, build_predicted_force_measure(records, model, floors).measure)
     return model
 
 

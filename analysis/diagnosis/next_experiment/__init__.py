@@ -1,5 +1,6 @@
-"""Optimal design of the next experiment: which recording would discriminate between rivals.
+"""Optimal design of the next experiment: which recording would discriminate between rival explanations.
 
-`experiment_menu` lists the possible experiments, `choose_experiment` predicts how well each discriminates,
-`propose_experiment` formulates the result.
+`experiment_menu` (possible experiments, as commands to simulate) -> `choose_experiment` (predicts how well each
+discriminates) -> `propose_experiment` (runs both and returns the proposal). Used by `result.assemble_findings`, and by
+`study.evaluation.bank.follow_up`. Begin at `propose_experiment.py`.
 """

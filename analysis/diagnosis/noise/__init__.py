@@ -1,6 +1,7 @@
-"""The noise of each channel.
+"""Noise of each channel of a recording (rms and spectral density), against which the errors of a model are compared.
 
-`periods` finds what repeats; `repeat_noise` takes the noise from repeats, `quiet_noise` from stretches at rest,
-`channel_noise` from above the driven band, `rounding` from the steps of a converter. Begin at `noise_floor.py`, which
-chooses.
+`noise_floor` takes the first estimate that the data allow: `repeat_noise` (differences between repeated `periods`;
+`rounding` corrects for quantization), or `quiet_noise` (samples at rest, then spectral lines above the driven band).
+The result is a `channel_noise` for each signal. Used by `forces`, `errors`, `localisation` and `analysis.look`. Begin
+at `noise_floor.py`.
 """

@@ -1,7 +1,7 @@
 """Data classes of the noise of a signal's channels: rms, power spectral density, degrees of freedom of the estimates.
 
-Made by `repeat_noise`, `noise_floor` and `force_views`, read by the significance tests of `localisation`. Variances are
-in the channel's unit squared.
+Made by `repeat_noise`, `noise_floor` and `force_measure`, read by the significance tests of `localisation`. Variances
+are in the channel's unit squared.
 """
 
 from dataclasses import dataclass

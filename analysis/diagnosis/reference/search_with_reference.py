@@ -15,7 +15,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.reference.learn_model_error import LearnedError, add_learned_noise
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.no_prediction import is_without_prediction
+from analysis.diagnosis.search.no_prediction import has_no_predictive_power
 from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
@@ -142,7 +142,7 @@ def _search_whitened_residual(
             judgement=_judge_with_floor(plain_measure, explanation, True, learned.floor.margin_factor),
             remarks=(),
         )
-    is_named = result.judgement.named and not is_without_prediction(plain_measure, explanation.after)
+    is_named = result.judgement.named and not has_no_predictive_power(plain_measure, explanation.after)
     return replace(
         result,
         context=final_context,

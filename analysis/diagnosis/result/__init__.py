@@ -1,8 +1,9 @@
-"""The findings of a diagnosis and their wording.
+"""Findings of a diagnosis and their wording.
 
-In this order: `assemble_findings` puts a finished search into `findings`: the effects with their parameters
-(`named_effects`), the errors (`error_table`), the examination of the fits after the search (`examine_fits`:
-localisation, the curve of each effect, a black box) and the recording to make next (`propose_experiment`). `wording`
-puts the findings into sentences; `make_real_answer` makes the plain values of a real recording (`real_answer`). Begin
-at `assemble_findings.py`.
+`assemble_findings` makes the `findings` of a finished search: `error_table` (errors of the models), `examine_fits`
+(localisation, `curves` of the effects, `black_box`), `named_effects` and `unconfirmed_candidates`, `unit_doubt`.
+`residual_spectrum` is computed for the figures. `candidates` adds the results of force balances, `contrast_findings`
+those of a comparison with clean recordings. `wording` puts the findings into sentences, by `candidate_wording`,
+`ceiling_wording` (held-out errors), `impact_wording`, `plausibility` and `retuned_parameters`. Used by `diagnose`,
+`analysis.reports`, `analysis.figures` and `study.workflows.diagnosis`. Begin at `assemble_findings.py`.
 """

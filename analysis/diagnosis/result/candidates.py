@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from analysis.diagnosis.confirm.require_gain import CONSTANTS
+from analysis.diagnosis.confirm.require_gain import CONSTANT_EFFECTS
 from analysis.diagnosis.document import Candidate, Diagnosis, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.effect_words import get_noun, get_place
 from analysis.diagnosis.result.candidate_wording import REFINEMENT_REASON
@@ -107,9 +107,9 @@ def add_balances_with_fitted_model(
         for law in balance.laws
     ]
     unnamed_constants = {
-        f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANTS[effect.effect]].value
+        f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANT_EFFECTS[effect.effect]].value
         for effect in diagnosis.effects
-        if effect.effect in CONSTANTS and _find_matching_law(effect, judged_laws) is None
+        if effect.effect in CONSTANT_EFFECTS and _find_matching_law(effect, judged_laws) is None
     }
     effects = tuple(
         _add_balance_results(effect, _find_matching_law(effect, judged_laws))

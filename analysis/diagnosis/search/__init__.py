@@ -1,8 +1,9 @@
-"""The search for missing effects: forward selection by output-error fits, backward elimination, and the verdict.
+"""Search for missing effects: forward selection by output-error fits, backward elimination, and the verdict.
 
-Order of the data: `search_context` (what all fits share), `explain` (re-tuning, then effect after effect by
-`next_effect`): `starting_hypotheses`, `screening`, first fits on `short_recordings` where the drive repeats,
-`compare_candidates`, `no_prediction`, `parsimony`; then `identifiability` and `revise_selection` remove or exchange
-effects, and `verdict` judges. `guard` isolates crashes, `time_budget` limits the duration, `reference_recordings`
-gives gains on clean recordings, and `impacts` compares rattling play by `band_power_comparison`. Begin at `search.py`.
+`search` runs all steps on a `search_context` (state that all fits share): `explain` re-tunes the model and adds effect
+after effect by `next_effect` (`starting_hypotheses` -> `screening` -> first fits, on `short_recordings` where the
+excitation repeats -> `compare_candidates` -> `no_prediction`, `parsimony`) -> `revise_selection` and `identifiability`
+exchange or remove effects -> `verdict`. `impacts` and `second_effect_with_play` compare play with impacts by
+`band_power_comparison`; `reference_recordings` gives gains on clean recordings, `guard` isolates crashes, `time_budget`
+limits the duration. Used by `search_by_simulation`, `confirm`, `reference` and `discovery`. Begin at `search.py`.
 """

@@ -1,4 +1,4 @@
-"""Detects explanations without predictive power: the prediction is no better than a constant.
+"""Detects explanations without predictive power: the prediction is hardly better than a constant.
 
 An effect that stops the simulated device, or a low-pass filter that passes nothing, leaves the whole signal as
 residual. That can be a smaller error than that of a wrong prediction, although it explains nothing. Called by `search`,
@@ -20,42 +20,45 @@ _LEAST_RMS = 1e-300
 """Lower limit of an rms, so that its logarithm is finite."""
 
 
-def is_without_prediction(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether in every channel the residual is at least `NO_PREDICTION_SHARE` of the signal (rms), on the samples to
-    fit and to choose by."""
+def has_no_predictive_power(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
+    """Whether in every channel the rms residual is at least `NO_PREDICTION_SHARE` of the rms of the signal without its
+    mean, on the samples to fit and to choose by; false where a residual is NaN."""
     return bool(
         (_compute_residual_rms(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _compute_signal_rms(measure)).all()
     )
 
 
-def is_newest_without_prediction(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
+def leaves_no_predictive_power(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
     """Whether the newest effect leaves no predictive power in the channel where it reduces the error most, or in a
     channel whose sensor it acts on: a residual of at least `NO_PREDICTION_SHARE` of the signal and of
     `NO_PREDICTION_ERROR` times the noise. Such an effect only frees the model to fit the other channels."""
     base_rms, fitted_rms = _compute_residual_rms(measure, base), _compute_residual_rms(measure, fitted)
-    main_channel = int(np.argmax(np.log(np.maximum(base_rms, _LEAST_RMS)) - np.log(np.maximum(fitted_rms, _LEAST_RMS))))
+    most_improved_channel = int(
+        np.argmax(np.log(np.maximum(base_rms, _LEAST_RMS)) - np.log(np.maximum(fitted_rms, _LEAST_RMS)))
+    )
     claim = fitted.hypothesis.claims[-1]
     sensor_sites = claim.sites if find_place(claim.effect) == "sensor" else ()
     is_unpredicted = fitted_rms >= np.maximum(
         NO_PREDICTION_SHARE * _compute_signal_rms(measure), NO_PREDICTION_ERROR * measure.noise
     )
     return bool(
-        is_unpredicted[main_channel] or any(is_unpredicted[site] for site in sensor_sites if site < len(is_unpredicted))
+        is_unpredicted[most_improved_channel]
+        or any(is_unpredicted[site] for site in sensor_sites if site < len(is_unpredicted))
     )
 
 
 def _compute_residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
-    """(c,): rms residual, in each channel's own unit."""
+    """Compute (c,): rms residual, in each channel's own unit."""
     return np.asarray(
         compute_residual_rms(measure.records, fitted.residuals, _select_decision_samples(measure)) * measure.unit
     )
 
 
 def _compute_signal_rms(measure: ErrorMeasure) -> FloatArray:
-    """(c,): rms of the measured signal without its mean, in each channel's own unit."""
+    """Compute (c,): rms of the measured signal without its mean, in each channel's own unit."""
     return compute_signal_rms(measure.records, _select_decision_samples(measure))
 
 
 def _select_decision_samples(measure: ErrorMeasure) -> list[Mask]:
-    """Per record, the mask of the samples to fit and to choose by."""
+    """Select, per record, the mask of the samples to fit and to choose by."""
     return [record.fit | record.choose for record in measure.records]

@@ -3,7 +3,8 @@
 Forward selection chooses the first effect while that effect alone must explain the whole error, so that the choice may
 be a compromise. The first effect is therefore searched for again with the later effects kept; where another effect fits
 better, it replaces the first and becomes the last in the order. This is repeated until no replacement fits better, or
-every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3). Called by `search`.
+every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3). Called by `search`;
+`remove_effect` also by `identifiability`, `confirm.require_gain` and `reference.search_with_reference`.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,49 +45,58 @@ def remove_effect(context: SearchContext, explanation: Explanation, effect_index
             rounds=explanation.rounds[:effect_index],
             steps=earlier_steps,
         )
-    refitted = [_omit_effect(context, candidate, effect_index) for candidate in later_steps]
-    refitted[-1] = context.score_fit(refine(context, refitted[-1].fitted))
+    refitted_steps = [_omit_effect(context, candidate, effect_index) for candidate in later_steps]
+    refitted_steps[-1] = context.score_fit(refine(context, refitted_steps[-1].fitted))
     # Rivals of this stage were fitted without later effects, so they can be compared with a single later one only.
-    rivals = explanation.rounds[effect_index] if len(refitted) == 1 else ()
-    remaining_rivals = [candidate for candidate in rivals if candidate.newest != refitted[0].newest]
+    former_rivals = explanation.rounds[effect_index] if len(refitted_steps) == 1 else ()
+    remaining_rivals = [candidate for candidate in former_rivals if candidate.newest != refitted_steps[0].newest]
     rounds = (
         *explanation.rounds[:effect_index],
-        (refitted[0], *remaining_rivals),
+        (refitted_steps[0], *remaining_rivals),
         *explanation.rounds[effect_index + 2 :],
     )
     return replace(
-        explanation, after=context.with_test_score(refitted[-1]), rounds=rounds, steps=(*earlier_steps, *refitted)
+        explanation,
+        after=context.with_test_score(refitted_steps[-1]),
+        rounds=rounds,
+        steps=(*earlier_steps, *refitted_steps),
     )
 
 
 def remove_last_refitted(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Remove the last of several effects. The others are refitted from the values that they had with it, which may lead
-    to a smaller minimum of the cost than the one before it was added; the smaller of both is used."""
-    last_index, without_last = (
+    """Remove the last of at least two effects. The others are refitted from the values that they had with it, which may
+    lead to a smaller minimum of the cost than the one before it was added; the smaller of both is used."""
+    last_index, explanation_without_last = (
         len(explanation.steps) - 1,
         remove_effect(context, explanation, len(explanation.steps) - 1),
     )
-    refitted = context.score_fit(refine(context, _omit_effect(context, explanation.steps[-1], last_index).fitted))
-    if not refitted.fitted.cost < without_last.steps[-1].fitted.cost:
-        return without_last
+    refitted_candidate = context.score_fit(
+        refine(context, _omit_effect(context, explanation.steps[-1], last_index).fitted)
+    )
+    if not refitted_candidate.fitted.cost < explanation_without_last.steps[-1].fitted.cost:
+        return explanation_without_last
     # Rivals of the remaining last effect were compared at a worse minimum, so they are left out.
-    rounds = (*without_last.rounds[: last_index - 1], (refitted,))
+    rounds = (*explanation_without_last.rounds[: last_index - 1], (refitted_candidate,))
     return replace(
-        without_last, after=context.with_test_score(refitted), rounds=rounds, steps=(*without_last.steps[:-1], refitted)
+        explanation_without_last,
+        after=context.with_test_score(refitted_candidate),
+        rounds=rounds,
+        steps=(*explanation_without_last.steps[:-1], refitted_candidate),
     )
 
 
 def _omit_effect(context: SearchContext, candidate: FittedCandidate, effect_index: int) -> FittedCandidate:
-    """Return the candidate without its effect of this index, its other values unchanged and not refitted."""
+    """Remove the effect of this index from the candidate, its other values unchanged and not refitted."""
     reduced: Hypothesis = remove_claim(candidate.fitted.hypothesis, effect_index)
     return context.score_fit(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reduced))
 
 
-def drop_needless(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
-    """Drop the first effect without which the others fit as well: a later effect may have made it superfluous, and the
-    last may only have led the others out of a local minimum. Of three effects, also drop the one without which the
-    other two leave the smallest error, if that is as small as the noise (`as_good_as_noise`): no law is exact, and a
-    third effect may only fit the remaining error. Unchanged where every effect is needed, or no time is left."""
+def drop_unnecessary_effects(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
+    """Drop the first of at least two effects without which the others fit as well; of more than two, repeat. A later
+    effect may have made it superfluous, and the last may only have led the others out of a local minimum. Of more than
+    two effects without reference recordings, else drop the one without which the others leave the smallest error, if
+    that is as small as the noise (`as_good_as_noise`): no law is exact, and a third effect may only fit the remaining
+    error. Unchanged where every effect is needed, or no time is left."""
     sufficient_explanations, last_index = [], len(explanation.steps) - 1
     for effect_index in range(len(explanation.steps) if time_left() else 0):
         reduced = (
@@ -96,7 +106,7 @@ def drop_needless(context: SearchContext, explanation: Explanation, time_left: T
         )
         if np.isfinite(reduced.steps[-1].fitted.cost):
             if not is_worthwhile(reduced.steps[-1], explanation.steps[-1]):
-                return reduced if last_index < 2 else drop_needless(context, reduced, time_left)
+                return reduced if last_index < 2 else drop_unnecessary_effects(context, reduced, time_left)
             sufficient_explanations += (
                 [reduced] if last_index > 1 and context.references is None and as_good_as_noise(reduced) else []
             )
@@ -105,9 +115,10 @@ def drop_needless(context: SearchContext, explanation: Explanation, time_left: T
     return min(sufficient_explanations, key=lambda reduced: reduced.after.score.mean_log_error, default=explanation)
 
 
-def drop_unconfirmed(context: SearchContext, explanation: Explanation) -> Explanation:
+def drop_unconfirmed_effects(context: SearchContext, explanation: Explanation) -> Explanation:
     """Drop a last effect that was added to an explanation whose error was at most `EXPLAINED_ERROR` already, the error
-    of correct laws on a real device, if the held-out error is not smaller with it; repeat."""
+    of correct laws on a real device, if the held-out error is not smaller with it; repeat. The first effect stays, as
+    do all where nothing is held out or the simulation diverges."""
     while len(explanation.steps) > 1 and explanation.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
         if explanation.after.held_out_error < context.with_test_score(explanation.steps[-2]).held_out_error or np.isinf(
             explanation.after.held_out_error
@@ -117,9 +128,9 @@ def drop_unconfirmed(context: SearchContext, explanation: Explanation) -> Explan
     return explanation
 
 
-def drop_negligible(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Drop last effects that remove less than `LAST_EFFECT_SHARE` of the mismatch while the error stays above the noise
-    and the others are still worth naming."""
+def drop_negligible_effects(context: SearchContext, explanation: Explanation) -> Explanation:
+    """Drop last effects, but not the first, that remove less than `LAST_EFFECT_SHARE` of the mismatch, while the error
+    is above the noise and the others are still worth naming."""
     while len(explanation.steps) > 1 and not as_good_as_noise(explanation):
         if compute_step_shares(explanation.retuned, explanation.steps)[-1] >= LAST_EFFECT_SHARE:
             break
@@ -130,24 +141,26 @@ def drop_negligible(context: SearchContext, explanation: Explanation) -> Explana
     return explanation
 
 
-def exchange_effects(
+def exchange_first_effects(
     context: SearchContext,
     explanation: Explanation,
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget,
 ) -> Explanation:
-    """Exchange the first effect for one that fits better, at most once per effect. Unchanged where the error is at most
-    `EXPLAINED_ERROR`, where there is a single effect, where no other effect fits better, or where an exchange
-    crashes."""
-    limited = replace(context, map_=limit_map(context.map_, time_left))
+    """Exchange the first effect for one of the catalogue that fits better with the others, at most as often as there
+    are effects. Unchanged where the error is small (`has_small_error`), where effects may not be changed
+    (`_may_exchange`), where no other effect fits better, or where the comparison crashes."""
+    limited_context = replace(context, map_=limit_map(context.map_, time_left))
     for _ in explanation.steps:
         if not _may_exchange(context, explanation, time_left) or has_small_error(
             explanation.retuned, explanation.after
         ):
             break
         exchanged = _exchange_first(
-            limited, explanation, partial(_search_first_effect, limited, explanation, catalogue, progress)
+            limited_context,
+            explanation,
+            partial(_search_first_effect, limited_context, explanation, catalogue, progress),
         )
         if exchanged is None:
             break
@@ -158,12 +171,13 @@ def exchange_effects(
 def _search_first_effect(
     context: SearchContext, explanation: Explanation, catalogue: Sequence[Effect], progress: Progress
 ) -> tuple[Explanation, tuple[FittedCandidate, ...]]:
-    """Return the explanation without its first effect, and the candidates of the whole catalogue in its place."""
+    """Search the whole catalogue for candidates in place of the first effect. Returns the explanation without that
+    effect, and the candidates, the preferred one first."""
     remaining = remove_effect(context, explanation, 0)
     return remaining, find_next_effect(context, catalogue, remaining.steps[-1].fitted, _make_exchange_step(progress))
 
 
-def exchange_for_relatives(
+def exchange_first_for_relatives(
     context: SearchContext,
     explanation: Explanation,
     catalogue: Sequence[Effect],
@@ -180,28 +194,32 @@ def exchange_for_relatives(
     family = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
     if len(family) < 2 or not _may_exchange(context, explanation, time_left):
         return explanation
-    limited, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
+    limited_context, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
     sites = explanation.steps[0].fitted.hypothesis.claims[-1].sites
 
-    def compare() -> tuple[Explanation, tuple[FittedCandidate, ...]]:
-        base = _omit_effect(limited, last_step, 0).fitted
-        evidence = gather_evidence(limited.measure, limited.tuning, base)[0]
-        fits = find_first_fits(limited, family, base, evidence, _make_exchange_step(progress), sites)
-        improved = [law for law in fits if law.cost < last_step.fitted.cost]
-        current_fit = _move_first_to_end(limited, last_step)
-        compared = move_preferred_first([*compare_plausible_fits(limited, base, improved, evidence), current_fit])
+    def compare_relatives() -> tuple[Explanation, tuple[FittedCandidate, ...]]:
+        base = _omit_effect(limited_context, last_step, 0).fitted
+        evidence = gather_evidence(limited_context.measure, limited_context.tuning, base)[0]
+        first_fits = find_first_fits(limited_context, family, base, evidence, _make_exchange_step(progress), sites)
+        improved_fits = [fitted for fitted in first_fits if fitted.cost < last_step.fitted.cost]
+        current_candidate = _move_first_to_end(limited_context, last_step)
+        ranked_candidates = move_preferred_first(
+            [*compare_plausible_fits(limited_context, base, improved_fits, evidence), current_candidate]
+        )
         # The other effects are refitted only where the first effect is replaced.
-        return explanation if compared[0] is current_fit else remove_effect(limited, explanation, 0), compared
+        return explanation if ranked_candidates[0] is current_candidate else remove_effect(
+            limited_context, explanation, 0
+        ), ranked_candidates
 
-    return _exchange_first(context, explanation, compare) or explanation
+    return _exchange_first(context, explanation, compare_relatives) or explanation
 
 
 def _move_first_to_end(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
-    """Return the same fit with its first effect last in the order, to compare it with candidates in its place."""
-    hypothesis = first_alone = candidate.fitted.hypothesis
+    """Move the first effect of a fit to the end of the order, to compare the fit with candidates in its place."""
+    hypothesis = first_effect_alone = candidate.fitted.hypothesis
     for effect_index in reversed(range(1, len(hypothesis.claims))):
-        first_alone = remove_claim(first_alone, effect_index)
-    reordered = combine_hypotheses(remove_claim(hypothesis, 0), first_alone)
+        first_effect_alone = remove_claim(first_effect_alone, effect_index)
+    reordered = combine_hypotheses(remove_claim(hypothesis, 0), first_effect_alone)
     return context.score_fit(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reordered))
 
 
@@ -214,14 +232,14 @@ def _may_exchange(context: SearchContext, explanation: Explanation, time_left: T
 
 
 def _make_exchange_step(progress: Progress) -> Step:
-    """Return the step of the work that the progress display shows for an exchange."""
+    """Make the step of the work that the progress display shows for an exchange."""
     return Step("looking again for the first effect", 0.8, progress)
 
 
 def _exchange_first(
     context: SearchContext,
     explanation: Explanation,
-    compare: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
+    compare_replacements: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
 ) -> Explanation | None:
     """Replace the first effect by a candidate that fits better with the other effects, which is then last in the order;
     None where there is none, where time is out, or where the comparison crashes. compare: returns the explanation
@@ -229,19 +247,28 @@ def _exchange_first(
 
     def find_exchange() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
         try:
-            return compare()
+            return compare_replacements()
         except OutOfTimeError:
             return None
 
     comparison = context.guard.run(explanation.steps[-1].newest, "its exchange", find_exchange, None)
     if comparison is None:
         return None
-    remaining, compared = comparison
-    nameable = tuple(candidate for candidate in compared if candidate.newest not in context.excluded)
-    if not nameable or nameable[0] is not compared[0] or not is_worthwhile(explanation.steps[-1], nameable[0]):
+    remaining, ranked_candidates = comparison
+    nameable_candidates = tuple(
+        candidate for candidate in ranked_candidates if candidate.newest not in context.excluded
+    )
+    if (
+        not nameable_candidates
+        or nameable_candidates[0] is not ranked_candidates[0]
+        or not is_worthwhile(explanation.steps[-1], nameable_candidates[0])
+    ):
         return None
     # Rivals of the former first effect are not those of the effect that is first now.
-    rounds = (remaining.rounds[0][:1], *remaining.rounds[1 : len(remaining.steps)], nameable)
+    rounds = (remaining.rounds[0][:1], *remaining.rounds[1 : len(remaining.steps)], nameable_candidates)
     return replace(
-        remaining, after=context.with_test_score(nameable[0]), rounds=rounds, steps=(*remaining.steps, nameable[0])
+        remaining,
+        after=context.with_test_score(nameable_candidates[0]),
+        rounds=rounds,
+        steps=(*remaining.steps, nameable_candidates[0]),
     )

@@ -8,6 +8,7 @@ that minimises |e - S d - c s|² + |d0 + d|² within its bounds reduces this sum
     2 z'g - z'P z        P = [[S'S + I, S'c], [c'S, c'c]],   g = (S'e - d0, c'e)
 
 with d0 the deviations of the base (Draper and Smith, Applied Regression Analysis, 1998, ch. 6: extra sum of squares).
+Called by `next_effect` and `short_recordings`.
 """
 
 from collections.abc import Sequence
@@ -41,12 +42,13 @@ def screen(
     suggested: Sequence[Hypothesis],
     map_: Mapper,
 ) -> tuple[ScreenedHypothesis, ...]:
-    """The hypotheses, each combined with that of `base`, with their predicted costs, the lowest first. jacobian:
-    sensitivity to the model's own parameters at `base`."""
+    """Predict the cost of each suggested hypothesis, combined with that of `base`; the lowest first. jacobian:
+    sensitivity to the model's own parameters at `base`. map_: `map` or a parallel one, which calls one simulation per
+    hypothesis."""
     model = tuning.tune(base.deviations)
     errors = stack_fit_residuals(measure, base.residuals)
 
-    def predict(hypothesis: Hypothesis) -> ScreenedHypothesis:
+    def predict_cost(hypothesis: Hypothesis) -> ScreenedHypothesis:
         combined = combine_hypotheses(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
             changed_errors = stack_fit_residuals(measure, measure.residuals(model, combined.list_placed_effects()))
@@ -54,23 +56,31 @@ def screen(
             combined, _predict_cost(base, jacobian, errors, errors - changed_errors, tuning.bound)
         )
 
-    screened_hypotheses: list[ScreenedHypothesis] = list(map_(predict, suggested))  # type: ignore[arg-type]
+    screened_hypotheses: list[ScreenedHypothesis] = list(map_(predict_cost, suggested))  # type: ignore[arg-type]
     return tuple(sorted(screened_hypotheses, key=lambda screened: screened.cost))
 
 
-def _predict_cost(base: Fitted, jacobian: Sensitivity, errors: np.ndarray, change: np.ndarray, bound: float) -> float:
-    """Predicted `Fitted.cost`; infinite where the simulation diverged or the effect does not change it. errors, change:
-    (samples,), e and c of the module's equation. bound: of |d0 + d|, in standard deviations."""
+def _predict_cost(
+    base: Fitted, jacobian: Sensitivity, errors: np.ndarray, prediction_change: np.ndarray, bound: float
+) -> float:
+    """Predict `Fitted.cost`; infinite where the simulation diverged or the effect does not change the prediction.
+    errors, prediction_change: (samples,), e and c of the module's equation. bound: of each |d0 + d|, in standard
+    deviations; s is bounded by `WEAKEST_START` and `STRONGEST_START`."""
     with np.errstate(over="ignore", invalid="ignore"):  # a diverged simulation overflows
-        strength = float(change @ change)
-    if not (np.isfinite(strength) and strength > 0):
+        change_power = float(prediction_change @ prediction_change)
+    if not (np.isfinite(change_power) and change_power > 0):
         return np.inf
-    t = len(base.deviations)
-    cross = jacobian.multiply(change)
-    products = np.block([[jacobian.gram + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
-    gradient = np.concatenate([jacobian.multiply(errors) - base.deviations, [float(change @ errors)]])
-    low = np.concatenate([-bound - base.deviations, [WEAKEST_START]])
-    high = np.concatenate([bound - base.deviations, [STRONGEST_START]])
-    step = solve_bounded_step(products, gradient, low, high)
-    gain = 2 * float(step @ gradient) - float(step @ products @ step)
+    parameter_count = len(base.deviations)
+    cross_products = jacobian.multiply(prediction_change)
+    normal_matrix = np.block(
+        [
+            [jacobian.gram + np.eye(parameter_count), cross_products[:, None]],
+            [cross_products[None, :], np.array([[change_power]])],
+        ]
+    )
+    gradient = np.concatenate([jacobian.multiply(errors) - base.deviations, [float(prediction_change @ errors)]])
+    lower_bounds = np.concatenate([-bound - base.deviations, [WEAKEST_START]])
+    upper_bounds = np.concatenate([bound - base.deviations, [STRONGEST_START]])
+    step = solve_bounded_step(normal_matrix, gradient, lower_bounds, upper_bounds)
+    gain = 2 * float(step @ gradient) - float(step @ normal_matrix @ step)
     return base.cost - gain / len(errors)

@@ -32,14 +32,14 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, explain, is_worth_searching, start_explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
-from analysis.diagnosis.search.no_prediction import is_without_prediction
+from analysis.diagnosis.search.no_prediction import has_no_predictive_power
 from analysis.diagnosis.search.parsimony import has_far_smaller_error
 from analysis.diagnosis.search.revise_selection import (
-    drop_needless,
-    drop_negligible,
-    drop_unconfirmed,
-    exchange_effects,
-    exchange_for_relatives,
+    drop_negligible_effects,
+    drop_unconfirmed_effects,
+    drop_unnecessary_effects,
+    exchange_first_effects,
+    exchange_first_for_relatives,
 )
 from analysis.diagnosis.search.search_context import (
     FINER_PARTS,
@@ -79,9 +79,9 @@ def prune(context: SearchContext, explanation: Explanation, time_left: TimeBudge
     if explanation.statistic is not None or context.certain:
         return explanation
     if len(explanation.steps) > 1:
-        explanation = drop_unconfirmed(context, drop_needless(context, explanation, time_left))
+        explanation = drop_unconfirmed_effects(context, drop_unnecessary_effects(context, explanation, time_left))
     if context.references is None:
-        explanation = drop_negligible(context, explanation)
+        explanation = drop_negligible_effects(context, explanation)
     return keep_identifiable(context, explanation, time_left)
 
 
@@ -115,7 +115,7 @@ def search_effects(
     if is_explained and first_result.found.after.score.worst_channel <= EXPLAINED_ERROR:
         return first_result
     pair = add_effects(context, catalogue, single, progress, time_left, max_effects=2)
-    pair = exchange_for_relatives(context, pair, catalogue, progress, time_left)
+    pair = exchange_first_for_relatives(context, pair, catalogue, progress, time_left)
     pair_result = further.before_thirds(replace(first_result, found=pair, unconfirmed=()))
     if pair_result.found is not pair and pair_result.judgement.verdict == "explained":
         return pair_result
@@ -287,7 +287,7 @@ def _exchange_and_prune(
 ) -> Explanation:
     """Exchange and remove effects after forward selection; where the removal raises an exception, nothing is named."""
     unnamed = replace(initial, after=initial.retuned, steps=())
-    exchanged = exchange_effects(context, initial, catalogue, progress, time_left)
+    exchanged = exchange_first_effects(context, initial, catalogue, progress, time_left)
     newest = initial.steps[-1].newest if initial.steps else ""
     return context.guard.run(newest, "the final check", lambda: prune(context, exchanged, time_left), unnamed)
 
@@ -295,6 +295,6 @@ def _exchange_and_prune(
 def _judge_with_prediction(context: SearchContext, explanation: Explanation) -> Judgement:
     """Judge an explanation; "unexplained" where it names effects but predicts nothing (`no_prediction`)."""
     judgement = judge(explanation)
-    if judgement.named and is_without_prediction(context.full_measure, explanation.after):
+    if judgement.named and has_no_predictive_power(context.full_measure, explanation.after):
         return Judgement("unexplained", False)
     return judgement

@@ -2,5 +2,6 @@
 
 `delivered_cues` (intensity, spectrum and coupling of each trial) -> `cue_sensitivity` (d' that a cue alone would give)
 and `answers_on_delivery` (logistic regression of the answers on a cue) -> `cue_findings` (both together, tests
-corrected by Holm, warnings as sentences). Begin at `cue_findings.py`.
+corrected by Holm, warnings as sentences). Used by `study_analysis` and `analysis.reports.cue_section`. Begin at
+`cue_findings.py`.
 """

@@ -2,7 +2,7 @@
 
 Nothing is simulated: the laws are evaluated at the measured positions, velocities and accelerations, for a balance of
 forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m). Called by `analysis.diagnosis`:
-`force_views`, `predicted_force`, `balance_with_model` and `windows`.
+`force_measure`, `predicted_force`, `balance_with_model` and `windows`.
 """
 
 from collections.abc import Sequence

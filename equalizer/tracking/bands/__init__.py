@@ -1,6 +1,6 @@
 """Equalization in three frequency bands: rigid model (low), identified model (middle), one degree of freedom (high).
 
-Wanted acceleration -> `low_band` (by `rigid_model`), middle band (by `lqr`), `high_band` (with `stylus`) ->
+Reference acceleration -> `low_band` (by `rigid_model`), middle band (by `lqr`), `high_band` (with `stylus`) ->
 `banded_equalizer` (adds the forces) -> `banded_forces` (the result). `narrow_and_wide_models` does the same with a
-narrow and a wide model of a single place. Begin at `banded_equalizer.py`.
+narrow-band and a wide-band model of one place. Used by `study.workflows.equalizer`. Begin at `banded_equalizer.py`.
 """

@@ -2,5 +2,5 @@
 
 `effect_roles` (which effects can be compensated) -> `known_forces` and `law_compensation` (forces along a motion) ->
 `effect_compensation` (added to the feedforward) and `subtract_effects` (subtracted from a recording before a model is
-identified). Begin at `effect_compensation.py`.
+identified). Used by `study.workflows.equalizer`. Begin at `effect_compensation.py`.
 """

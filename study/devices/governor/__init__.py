@@ -1,5 +1,6 @@
-"""What keeps every force within its limits, for every caller.
+"""Force limits and fault detection of the safety layer, computed in every control tick of every device.
 
-Each tick: `plausibility` of the readings, `feedback` (spring and damper) within `confine`, then the caps of `govern`;
-compiled (`compiling`), its state in `cells`. `governor.py` is its face. Begin at `govern.py`.
+In each tick `govern` calls `plausibility` (checks of the readings) -> `feedback` (spring and damper), the stimulus,
+caps (`confine`) and slew limit -> `telemetry_row`. All is compiled by numba (`compiling`), with its state in arrays
+(`cells`); `governor` is the interface from Python. Used by `drive`, `safe` and the drivers. Begin at `govern.py`.
 """

@@ -105,8 +105,8 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
 
 @njit_inline
 def _compute_fade_gain(ticks: float, fade_ticks: float, raised_cosine: float) -> float:
-    """Compute the gain of a fade-in, from 0 at 0 ticks to 1 at `length` ticks: linear, or (1 - cos(pi ticks / length))
-    / 2 where raised_cosine is not 0."""
+    """Compute the gain of a fade-in, from 0 at 0 ticks to 1 at `fade_ticks` ticks: linear, or (1 - cos(pi ticks /
+    fade_ticks)) / 2 where raised_cosine is not 0."""
     if ticks >= fade_ticks:
         return 1.0
     if ticks <= 0:

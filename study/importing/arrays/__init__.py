@@ -1,2 +1,7 @@
-"""Contents of a foreign file: `csv_arrays`, `workbook_arrays`, `json_arrays`, `mat_arrays` and `npz_hdf5_arrays`
-(NPZ, NPY, HDF5) behind `read_arrays`; `table_marks` and `table_layout` say where the parts of a table are."""
+"""Arrays of a foreign file by name.
+
+`read_arrays` calls the reader of the format: `csv_arrays`, `workbook_arrays`, `json_arrays`, `mat_arrays` or
+`npz_hdf5_arrays` (NPZ, NPY, HDF5). Tables: `table_text` (encoding) -> `table_marks`, `table_layout` (delimiter, header,
+rows) -> `table_cells`, `time_stamps` (values). `array_groups` finds several runs in one file. Used by
+`study.importing.build_recording` and `study.importing.map_library`. Begin at `read_arrays.py`.
+"""

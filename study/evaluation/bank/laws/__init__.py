@@ -1,2 +1,5 @@
-"""A bank of concealed laws (terms outside the effect catalogue): `seal_laws`, `prove_laws` (answer and reveal),
-`write_law_proof`."""
+"""A bank of concealed laws (terms outside the effect catalogue), for a blind test of law discovery.
+
+`seal_laws` (draw and seal) -> `prove_laws` (diagnose in separate processes, reveal, score) -> `write_law_proof`. Used
+by `study.cli.prove` (`hapteq prove`). Begin at `prove_laws.py`.
+"""

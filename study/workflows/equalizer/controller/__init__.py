@@ -1,1 +1,5 @@
-"""A model's controller for loops in C and C++: the tables, and the C sources around them as they are shipped."""
+"""Export of a model's real-time controller as C sources, for control loops in C and C++.
+
+`export_controller` (`hapteq export-controller`) calls `c_source`, which inserts sizes and tables of numbers into the
+templates of this folder. Used by `study.cli.export_controller`. Begin at `export_controller.py`.
+"""

@@ -18,7 +18,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
 from analysis.diagnosis.confirm.laws_for_simulation import can_be_simulated, find_special_case, make_hypothesis
-from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
+from analysis.diagnosis.confirm.require_gain import MODEL_FITTED_REASON, withdraw_doubtful_names
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
@@ -201,11 +201,11 @@ def half_held_out_gain(monkeypatch):
 @pytest.mark.usefixtures("half_held_out_gain")
 @pytest.mark.parametrize("name", ["sensor_nonlinearity", "slew_limit", "transport_delay", "force_gain"])
 def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
-    seen = unname_doubtful_effects(make_search_result(name))
+    seen = withdraw_doubtful_names(make_search_result(name))
     assert seen.judgement == Judgement("unexplained", False)
     assert not seen.found.steps
     (told,) = seen.unconfirmed
-    assert (told.hypothesis.claims, told.gain, told.why_not) == ((name,), 0.5, ONLY_BESIDE_CALIBRATION)
+    assert (told.hypothesis.claims, told.gain, told.why_not) == ((name,), 0.5, MODEL_FITTED_REASON)
 
 
 @pytest.mark.parametrize(
@@ -237,12 +237,12 @@ def make_judged_law(name, place):
 def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(monkeypatch, predicts):
     monkeypatch.setattr(require_gain, "predicts_motion", lambda *_: predicts)
     seen = make_search_result("sensor_clipping")
-    assert (unname_doubtful_effects(seen) is seen) == predicts
+    assert (withdraw_doubtful_names(seen) is seen) == predicts
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     monkeypatch.setattr(require_gain, "estimate_held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
-    assert unname_doubtful_effects(make_search_result("slew_limit")).unconfirmed == ()
+    assert withdraw_doubtful_names(make_search_result("slew_limit")).unconfirmed == ()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws, may_approximate_law
 from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
-from analysis.diagnosis.discovery.discover import discover
+from analysis.diagnosis.discovery.discover import discover_laws
 from analysis.diagnosis.discovery.validation import is_shorter_and_as_good
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
@@ -84,7 +84,7 @@ def test_an_exponent_that_was_rounded_counts_as_a_number(hardening_context):
     context, _ = hardening_context
     cube, drag = make_hypothesis("hardening_stiffness", k3=CUBIC), make_hypothesis("quadratic_damping", coefficient=0.1)
     two = make_named_search(hardening_context, cube, drag)
-    found = discover(context, two, ignore_progress, always, 1)
+    found = discover_laws(context, two, ignore_progress, always, 1)
     assert len(found.explanation.after.fitted.hypothesis.parameters) < len(two.after.fitted.hypothesis.parameters) == 2
     assert not is_shorter_and_as_good(context, found, two.after)
 
@@ -111,7 +111,7 @@ def test_a_name_that_is_as_short_stays(hardening_context):
     cube = make_named_search(hardening_context, make_hypothesis("hardening_stiffness", k3=CUBIC))
     result = SearchResult(context, cube, judge(cube))
     assert LawSearch(ignore_progress, always).add_any(result) is result
-    found = discover(context, cube, ignore_progress, always, 1)
+    found = discover_laws(context, cube, ignore_progress, always, 1)
     assert not is_shorter_and_as_good(context, found, cube.after)
 
 
@@ -119,7 +119,7 @@ def test_a_name_that_is_as_short_stays(hardening_context):
 def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardening_context):
     context, _ = hardening_context
     names = make_named_search(hardening_context, make_hypothesis("quadratic_damping", coefficient=0.1))
-    found = discover(context, names, ignore_progress, always)
+    found = discover_laws(context, names, ignore_progress, always)
     begun = replace(found, rounds=tuple(replace(each, complete=False) for each in found.rounds))
     for discovery, is_named in ((found, True), (begun, False)):
         said = check_laws(SearchResult(context, names, judge(names)), discovery, always)
@@ -131,7 +131,8 @@ def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardening_context):
 def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardening_context):
     context, known = hardening_context
     kept = [
-        discover(context, known, ignore_progress, CountedBudget(questions)) for questions in (1, 50, 80, 160, 100_000)
+        discover_laws(context, known, ignore_progress, CountedBudget(questions))
+        for questions in (1, 50, 80, 160, 100_000)
     ]
     assert kept[0] is None
     assert all(each.complete for each in kept[-1].rounds)

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws
 from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
-from analysis.diagnosis.discovery.discover import Discovery, Round, discover
+from analysis.diagnosis.discovery.discover import Discovery, Round, discover_laws
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.validation import (
     STEEP_POWER,
@@ -37,7 +37,7 @@ def always():
 @pytest.fixture(scope="module")
 def search_result():
     context, known = arena_of(recorded((law("-p0*x**3", 4e5),), 3, plan=QUIET))
-    found = discover(context, known, ignore_progress, always)
+    found = discover_laws(context, known, ignore_progress, always)
     assert found is not None
     return context, known, found
 
@@ -72,11 +72,13 @@ def test_of_laws_that_fit_alike_the_one_that_the_louder_test_bears_out_is_chosen
     last = found.rounds[-1]
     cubic = last.sums[0].terms[0].shape
     order = [2, 1, 0]
-    turned = Round(tuple(last.fitted_candidates[k] for k in order), tuple(last.sums[k] for k in order), last.placebo)
+    turned = Round(
+        tuple(last.fitted_candidates[k] for k in order), tuple(last.sums[k] for k in order), last.chance_share
+    )
     wrong = context.with_test_score(turned.fitted_candidates[0])
     given = replace(found.explanation, after=wrong, steps=(wrong,))
     chosen = choose_on_held_out(context, Discovery(given, (turned,)))
-    assert chosen.chosen_of == 3
+    assert chosen.equally_good_count == 3
     assert turned.sums[0].terms[0].shape != cubic == chosen.rounds[-1].sums[0].terms[0].shape
     assert chosen.explanation.after.score.test.max() < wrong.score.test.max()
     assert chosen.explanation.steps[-1] is chosen.explanation.after
@@ -94,7 +96,7 @@ def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(search_result)
         for hypothesis in (alone, combine_hypotheses(alone, after.hypothesis))
     )
     rounds = (
-        Round((first,), (replace(found.rounds[0].sums[0], spread=1.0),), 0.5),
+        Round((first,), (replace(found.rounds[0].sums[0], factor_error=1.0),), 0.5),
         replace(found.rounds[0], fitted_candidates=(both,), sums=found.rounds[0].sums[:1]),
     )
     whole = replace(
@@ -122,7 +124,7 @@ def test_a_law_whose_round_is_not_known_is_named_by_no_check(search_result):
         context.measure, context.tuning, rounded.deviations, combine_hypotheses(rounded.hypothesis, alone)
     )
     both = context.with_test_score(context.score_fit(refine(context, start)))
-    rounds = (found.rounds[0], Round((both,), (replace(found.rounds[0].sums[0], spread=1.0),), 0.5))
+    rounds = (found.rounds[0], Round((both,), (replace(found.rounds[0].sums[0], factor_error=1.0),), 0.5))
     whole = replace(
         found.explanation, after=both, steps=(first, both), rounds=tuple(each.fitted_candidates for each in rounds)
     )
@@ -132,8 +134,8 @@ def test_a_law_whose_round_is_not_known_is_named_by_no_check(search_result):
 
 
 def test_shares_are_of_what_is_no_noise():
-    first = Sum(0, (), (), cross_validated=1.01, base_error=1.13, spread=0.2, model_shift=())
-    taken, by_chance = Round((), (first,), placebo=0.0076).shares_above_noise
+    first = Sum(0, (), (), cross_validated_error=1.01, base_error=1.13, factor_error=0.2, model_shift=())
+    taken, by_chance = Round((), (first,), chance_share=0.0076).shares_above_noise
     assert taken == pytest.approx(0.12 / 0.13)
     assert by_chance == pytest.approx(0.0076 * 1.13 / 0.13)
 
@@ -142,7 +144,7 @@ def test_shares_are_of_what_is_no_noise():
 def test_a_force_that_undoes_the_command_hides_no_law():
     """With mass, damping and stiffness shrinking alongside, it balances everything: it came first, and led nowhere."""
     context, known = arena_of(recorded((law("-p0*maximum(sign(-x - p1), 0)*vx", 4.0, 0.002),), 1))
-    found = discover(context, known, ignore_progress, always)
+    found = discover_laws(context, known, ignore_progress, always)
     assert found is not None
     drag = list_fitted_laws(found.explanation.after.fitted.hypothesis)[0]
     assert drag.expression == "p0*maximum(sign((-x) - p1), 0)*vx"

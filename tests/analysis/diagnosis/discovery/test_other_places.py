@@ -13,7 +13,7 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
     make_antisymmetric,
 )
 from analysis.diagnosis.discovery.convert_sum import convert_sum_to_hypothesis, convert_sum_to_law, list_fitted_laws
-from analysis.diagnosis.discovery.discover import discover
+from analysis.diagnosis.discovery.discover import discover_laws
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.matched_filter import build_views
@@ -46,9 +46,9 @@ def always():
     return True
 
 
-def discover_laws(recording, model=None):
+def search_for_laws(recording, model=None):
     context, known = arena_of(recording, model)
-    return context, discover(context, known, ignore_progress, always)
+    return context, discover_laws(context, known, ignore_progress, always)
 
 
 @pytest.mark.parametrize("seed", [1])
@@ -62,7 +62,7 @@ def discover_laws(recording, model=None):
     ],
 )
 def test_laws_of_commands_and_readings_are_found_where_they_act(true, shape, seed):
-    _, found = discover_laws(recorded((true,), seed))
+    _, found = search_for_laws(recorded((true,), seed))
     assert found is not None
     said = list_fitted_laws(found.explanation.after.fitted.hypothesis)
     assert len(said) == 1
@@ -82,7 +82,7 @@ def whirl_forces(size, sign=-1.0):
 
 @pytest.mark.slow
 def test_a_gyroscopic_pair_is_one_law_of_two_axes(seed=4):
-    _, found = discover_laws(recorded_on_axes(2, whirl_forces(0.6), seed), device(2))
+    _, found = search_for_laws(recorded_on_axes(2, whirl_forces(0.6), seed), device(2))
     assert found is not None
     laws = list_fitted_laws(found.explanation.after.fitted.hypothesis)
     assert [each and each.expression for each in laws] == ["p0*vy", "p0*vx"]
@@ -97,9 +97,9 @@ def test_a_pair_has_equal_halves_and_is_told_from_one_force_only_by_the_calibrat
     measure, tuning = context.measure, context.tuning
     fitted = evaluate_fit(measure, tuning, known.retuned.fitted.deviations, NO_EFFECTS)
     pairs = list(find_antisymmetric_pairs(build_views(measure, tuning, fitted)))
-    pair = min(pairs, key=lambda each: each.cross_validated)
+    pair = min(pairs, key=lambda each: each.cross_validated_error)
     assert pair.variables == ("vx", "vy")
-    assert pair.cross_validated - 1 < 0.1 * (pair.base_error - 1)
+    assert pair.cross_validated_error - 1 < 0.1 * (pair.base_error - 1)
     uneven = replace(pair, factors=(0.7,), partner=replace(pair.partner, factors=(-0.5,)))
     begun = evaluate_fit(measure, tuning, fitted.deviations, convert_sum_to_hypothesis(uneven, recording))
     even = make_antisymmetric(measure, tuning, begun)
@@ -147,7 +147,7 @@ def test_one_force_alone_may_always_be_half_the_models_own(seed=4):
 def test_a_coupled_damper_is_no_pair(seed=4):
     """Both axes push each other alike: a parameter of the model, whose tolerance allows it."""
     model = replace(device(2), tolerance=Tolerance(0.0003, 0.3, 0.8, 0.01))
-    assert discover_laws(recorded_on_axes(2, whirl_forces(0.6, sign=1.0), seed), model)[1] is None
+    assert search_for_laws(recorded_on_axes(2, whirl_forces(0.6, sign=1.0), seed), model)[1] is None
 
 
 def test_a_force_of_commands_alone_is_a_law_of_the_command():

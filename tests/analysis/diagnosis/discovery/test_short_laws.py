@@ -137,7 +137,7 @@ def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, leaves, begun, 
     monkeypatch.setattr(discover_module, "LAW_ALONE_LEAVES", leaves)
     monkeypatch.setattr(discover_module, "fit_sums", fit_sums)
     context, known = arena_of(recorded((CUBE, DRAG_2), seed))
-    assert discover_module.discover(context, known, lambda what, share: None, always, single_term=True) is None
+    assert discover_module.discover_laws(context, known, lambda what, share: None, always, single_term=True) is None
     assert bool(fits) == begun
 
 

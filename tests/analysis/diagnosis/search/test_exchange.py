@@ -11,10 +11,10 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
 from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile
 from analysis.diagnosis.search.revise_selection import (
-    drop_needless,
-    drop_unconfirmed,
-    exchange_effects,
-    exchange_for_relatives,
+    drop_unconfirmed_effects,
+    drop_unnecessary_effects,
+    exchange_first_effects,
+    exchange_first_for_relatives,
 )
 from analysis.diagnosis.search.search import prune
 from analysis.diagnosis.search.time_budget import CountedBudget, grant_time
@@ -76,20 +76,20 @@ CATALOGUE = [EFFECTS[name] for name in ("amplifier_lag", "sensor_lag", "force_sa
 @pytest.mark.slow
 def test_the_first_effect_is_looked_for_again_beside_the_second(saturated_lag, compromise):
     assert compromise.after.score.worst_channel > EXPLAINED_ERROR
-    found = exchange_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, grant_time)
+    found = exchange_first_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, grant_time)
     assert effect_names(found) == ["force_saturation", "sensor_lag"]
     assert found.after.score.worst_channel < EXPLAINED_ERROR
     assert len(found.rounds) == len(found.steps) == 2
 
 
 def test_without_time_or_a_better_effect_nothing_is_exchanged(saturated_lag, compromise):
-    assert exchange_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, lambda: False) is compromise
-    assert exchange_effects(saturated_lag, compromise, CATALOGUE[:2], ignore_progress, grant_time) is compromise
+    assert exchange_first_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, lambda: False) is compromise
+    assert exchange_first_effects(saturated_lag, compromise, CATALOGUE[:2], ignore_progress, grant_time) is compromise
 
 
 @pytest.mark.parametrize("asked", [1, 2, 3, 5, 8])
 def test_an_exchange_whose_time_ends_changes_nothing(saturated_lag, compromise, asked):
-    found = exchange_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, CountedBudget(asked))
+    found = exchange_first_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, CountedBudget(asked))
     assert found is compromise
 
 
@@ -97,14 +97,14 @@ def test_an_exchange_whose_time_ends_changes_nothing(saturated_lag, compromise, 
 def test_a_discarded_effect_is_no_rival_of_the_one_that_stays(saturated_lag, compromise):
     lag = explain_by(saturated_lag, claim("amplifier_lag", time_constant=3e-3)).steps
     rivals = replace(compromise, rounds=((*compromise.rounds[0], *lag), *compromise.rounds[1:]))
-    found = exchange_effects(saturated_lag, rivals, CATALOGUE, ignore_progress, grant_time)
+    found = exchange_first_effects(saturated_lag, rivals, CATALOGUE, ignore_progress, grant_time)
     assert [each.newest for each in found.rounds[0]] == [found.steps[0].newest]
 
 
 @pytest.mark.slow
 def test_an_effect_that_is_not_to_be_named_takes_no_place(saturated_lag, compromise):
     barred = replace(saturated_lag, excluded=frozenset({"force_saturation"}))
-    assert exchange_effects(barred, compromise, CATALOGUE, ignore_progress, grant_time) is compromise
+    assert exchange_first_effects(barred, compromise, CATALOGUE, ignore_progress, grant_time) is compromise
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(friction_
     plain = explain_by(friction_lag, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     assert plain.after.score.worst_channel > EXPLAINED_ERROR
     everything = list(EFFECTS.values())
-    found = exchange_for_relatives(friction_lag, plain, everything, ignore_progress, grant_time)
+    found = exchange_first_for_relatives(friction_lag, plain, everything, ignore_progress, grant_time)
     assert effect_names(found) == ["asymmetric_friction", "sensor_lag"]
     assert found.after.score.worst_channel < EXPLAINED_ERROR
     rubs = {"coulomb_friction", *(e.name for e in everything if "coulomb_friction" in e.simpler)}
@@ -144,14 +144,14 @@ def test_a_refinement_that_adds_little_takes_no_place(make_context):
     # The second effect is not the right one: what it leaves, a refinement of the first takes up in part.
     found = explain_by(context, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     assert found.after.score.worst_channel > EXPLAINED_ERROR
-    assert exchange_for_relatives(context, found, list(EFFECTS.values()), ignore_progress, grant_time) is found
+    assert exchange_first_for_relatives(context, found, list(EFFECTS.values()), ignore_progress, grant_time) is found
 
 
 @pytest.mark.slow
 def test_another_law_of_the_family_takes_the_place_of_one_that_it_does_not_refine(friction_lag):
     at_rest = claim("stribeck_friction", coulomb=0.07, static=0.09, speed=0.01)
     sticking = explain_by(friction_lag, at_rest, claim("sensor_lag", bandwidth=LAG_HZ))
-    found = exchange_for_relatives(friction_lag, sticking, list(EFFECTS.values()), ignore_progress, grant_time)
+    found = exchange_first_for_relatives(friction_lag, sticking, list(EFFECTS.values()), ignore_progress, grant_time)
     assert effect_names(found) == ["asymmetric_friction", "sensor_lag"]
     assert found.after.score.worst_channel < EXPLAINED_ERROR
 
@@ -160,7 +160,7 @@ def test_another_law_of_the_family_takes_the_place_of_one_that_it_does_not_refin
 def test_a_law_without_refinements_stays(friction_lag):
     plain = explain_by(friction_lag, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     none = [EFFECTS[name] for name in ("viscous_damping", "sensor_lag")]
-    assert exchange_for_relatives(friction_lag, plain, none, ignore_progress, grant_time) is plain
+    assert exchange_first_for_relatives(friction_lag, plain, none, ignore_progress, grant_time) is plain
 
 
 @pytest.mark.slow
@@ -192,7 +192,7 @@ def test_rivals_are_kept_only_where_they_were_compared(saturated_lag):
 def test_of_three_goes_the_one_without_which_two_fit_as_well_as_laws_of_real_devices_do(saturated_lag, place):
     claims = [claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ)]
     claims.insert(place, claim("viscous_damping", damping=0.01))
-    left = drop_needless(saturated_lag, explain_by(saturated_lag, *claims), grant_time)
+    left = drop_unnecessary_effects(saturated_lag, explain_by(saturated_lag, *claims), grant_time)
     assert effect_names(left) == ["force_saturation", "sensor_lag"]
 
 
@@ -210,7 +210,7 @@ def three_effects(make_context, k3):
 def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(make_context):
     context, found = three_effects(make_context, 1e5)
     assert not has_small_error(found.retuned, found.steps[1])
-    assert effect_names(drop_needless(context, found, grant_time)) == effect_names(found)
+    assert effect_names(drop_unnecessary_effects(context, found, grant_time)) == effect_names(found)
 
 
 @pytest.mark.slow
@@ -219,13 +219,13 @@ def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_
     two = found.steps[1]
     assert two.score.worst_channel > EXPLAINED_ERROR
     assert is_worthwhile(two, found.steps[2])
-    assert effect_names(drop_needless(context, found, grant_time)) == ["force_saturation", "sensor_lag"]
+    assert effect_names(drop_unnecessary_effects(context, found, grant_time)) == ["force_saturation", "sensor_lag"]
     # So it is not looked for, but in samples that were opened: few among many.
     assert not is_worth_searching(context, found, two)
     assert is_worth_searching(replace(context, has_opened_samples=True), found, two)
     # Nor is one of the two exchanged.
     pair = replace(found, after=context.with_test_score(two), steps=found.steps[:2], rounds=found.rounds[:2])
-    assert exchange_effects(context, pair, list(EFFECTS.values()), ignore_progress, grant_time) is pair
+    assert exchange_first_effects(context, pair, list(EFFECTS.values()), ignore_progress, grant_time) is pair
 
 
 def test_a_second_effect_is_looked_for_where_more_than_noise_is_left(saturated_lag):
@@ -246,12 +246,12 @@ def test_a_small_second_effect_goes_unless_held_out_samples_confirm_it(saturated
     found = explain_by(saturated_lag, claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ))
     first, second = found.steps
     small = replace(found, steps=(with_error(first, 1.10), second))
-    assert effect_names(drop_unconfirmed(saturated_lag, small)) == ["force_saturation", "sensor_lag"]
+    assert effect_names(drop_unconfirmed_effects(saturated_lag, small)) == ["force_saturation", "sensor_lag"]
     worse = replace(small.after, score=replace(small.after.score, test=np.full(2, 1e3)))
-    assert effect_names(drop_unconfirmed(saturated_lag, replace(small, after=worse))) == ["force_saturation"]
+    assert effect_names(drop_unconfirmed_effects(saturated_lag, replace(small, after=worse))) == ["force_saturation"]
     # One that was found in a large remainder stays: other rules judge it.
     large = replace(found, steps=(with_error(first, 3.0), second), after=worse)
-    assert drop_unconfirmed(saturated_lag, large) is large
+    assert drop_unconfirmed_effects(saturated_lag, large) is large
 
 
 @pytest.mark.slow
@@ -281,7 +281,7 @@ def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(satur
     )
     found = replace(helped, steps=(helped.steps[0], stuck, helped.steps[2]))
     assert is_worthwhile(stuck, helped.steps[2])
-    left = drop_needless(saturated_lag, found, grant_time)
+    left = drop_unnecessary_effects(saturated_lag, found, grant_time)
     assert effect_names(left) == ["force_saturation", "sensor_lag"]
     assert left.after.score.worst_channel < EXPLAINED_ERROR
     assert [each.newest for each in left.rounds[-1]] == ["sensor_lag"]
@@ -294,4 +294,4 @@ def test_a_refinement_beside_a_wrong_second_must_gain_as_much_as_in_any_step(mak
     context = make_context((rubs, PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ}), hardens))
     # Refinements take up a fifth of what the third effect leaves.
     found = explain_by(context, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
-    assert exchange_for_relatives(context, found, list(EFFECTS.values()), ignore_progress, grant_time) is found
+    assert exchange_first_for_relatives(context, found, list(EFFECTS.values()), ignore_progress, grant_time) is found

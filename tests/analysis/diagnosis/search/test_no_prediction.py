@@ -6,7 +6,7 @@ import pytest
 from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.search.no_prediction import is_newest_without_prediction, is_without_prediction
+from analysis.diagnosis.search.no_prediction import has_no_predictive_power, leaves_no_predictive_power
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -19,12 +19,12 @@ GAIN = next(effect for effect in CATALOGUE if effect.name == "force_gain")
 def test_a_force_that_never_reaches_the_device_predicts_nothing(make_context, gain, nothing):
     context = make_context()
     held = make_claim_hypothesis(Claim(GAIN, "one", (0,)), [{"gain": gain}])
-    assert is_without_prediction(context.full_measure, _make_candidate(context, held)) is nothing
+    assert has_no_predictive_power(context.full_measure, _make_candidate(context, held)) is nothing
 
 
 def test_a_model_as_it_is_foresees_something(make_context):
     context = make_context()
-    assert not is_without_prediction(context.full_measure, _make_candidate(context, NO_EFFECTS))
+    assert not has_no_predictive_power(context.full_measure, _make_candidate(context, NO_EFFECTS))
 
 
 def _make_candidate(context, hypothesis):
@@ -38,7 +38,7 @@ def test_where_noise_is_as_large_as_the_signal_a_foreseen_course_is_asked_for_al
     shuffled = replace(record, measured=np.random.default_rng(1).permutation(record.measured))
     measure = replace(context.full_measure, records=(shuffled,), noise=shuffled.measured.std(axis=0))
     held = make_claim_hypothesis(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
-    assert is_without_prediction(measure, _make_candidate(replace(context, full_measure=measure), held))
+    assert has_no_predictive_power(measure, _make_candidate(replace(context, full_measure=measure), held))
 
 
 def test_a_low_pass_far_below_the_band_silences_its_channel(make_context):
@@ -61,7 +61,7 @@ def test_a_claim_that_silences_a_channel_predicts_nothing_even_if_another_channe
         make_claim_hypothesis(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}]),
     )
     wrenched = replace(lag, residuals=tuple(residual * [1.1, 1e6] for residual in lag.residuals))
-    assert is_newest_without_prediction(context.full_measure, wrenched, lag)
+    assert leaves_no_predictive_power(context.full_measure, wrenched, lag)
 
 
 def test_a_low_pass_of_the_device_itself_silences_no_channel(make_context):
@@ -71,6 +71,6 @@ def test_a_low_pass_of_the_device_itself_silences_no_channel(make_context):
 
 def _predicts_nothing(measure, tuning, bandwidth):
     lag = make_claim_hypothesis(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
-    return is_newest_without_prediction(
+    return leaves_no_predictive_power(
         measure, *(evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), each) for each in (NO_EFFECTS, lag))
     )

@@ -68,8 +68,8 @@ MUTATIONS = {
         "return 2.0 * state[STIMULUS_GAIN], state[SPRING_GAIN]", "",
     ),
     "a fade with corners": (
-        govern, "return 0.5 - 0.5 * math.cos(math.pi * ticks / length)",
-        "return 0.0 if ticks < 0.5 * length else 1.0", "",
+        govern, "return 0.5 - 0.5 * math.cos(math.pi * ticks / fade_ticks)",
+        "return 0.0 if ticks < 0.5 * fade_ticks else 1.0", "",
     ),
     "nothing confined last": (
         govern, "        confine(force, settings[TOTAL_CAP])\n        for i", "        for i", "total",

@@ -1,4 +1,4 @@
-"""Error measure by forces along the measured motion: choice of the frequency band, and noise of the forces in it.
+"""Build the error measure by forces along the measured motion: choose its frequency band, compute the forces' noise.
 
 Theory of operation. With the motion q measured, the force that a model misses follows without simulation (inverse
 dynamics): the model's force M a + D v + K q + (effects along q) is compared with the actuator's force, both low-pass
@@ -26,35 +26,37 @@ from equalizer.signals.band_limited import compute_low_pass_gain, filter_low_pas
 from equalizer.signals.signal import FloatArray, Signal
 
 ACTUATOR_ERROR = 0.01
-"""Relative uncertainty of an actuator's force at best; it counts as noise. By hand."""
+"""Least uncertainty of an actuator's force, relative to its rms; it is added to the noise. By hand."""
 NOISE_SHARE = 0.02
 """Largest force noise due to the motion's noise, relative to the force's rms; differentiation amplifies it. By hand."""
 WIDEST_BAND, NARROWEST_BAND = 0.2, 0.002
 """Largest and smallest end of the band, relative to the sample rate. By hand."""
 TRIED_BANDS = 24
-"""Number of ends that are tried between them, in a geometric series."""
+"""Number of ends that are tried down to the narrowest band, in a geometric series. By hand."""
 BAND_OVER_MEDIAN = 10.0
 """Largest end of the band, relative to the frequency below which half of the force's power lies: far above it there is
 noise alone. By hand."""
 ASSUMED_NOISE = 1e-4
-"""Noise of the motion relative to its rms, assumed where it is not known. By hand."""
+"""Root of the motion's noise density relative to the motion's standard deviation, assumed where it is not known. By
+hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceViews:
+class ForceMeasure:
     """The error measure by predicted forces with the noise of its forces."""
 
     measure: PredictedForce
+    """Compares the forces in N (N m)."""
     floors: tuple[NoiseFloor, ...]
     """Noise of the forces, per record."""
 
 
-def build_force_views(
+def build_predicted_force_measure(
     records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
-) -> ForceViews:
-    """The error measure by forces along the measured motion, with its noise. records: with motion, see `has_motion`.
-    floors: noise of their signals. band_hz: end of the band; None = by the noise. Raises numpy.linalg.LinAlgError where
-    the measured outputs do not determine the model's motion."""
+) -> ForceMeasure:
+    """Build the error measure by forces along the measured motion, with its noise. records: at least one, with motion
+    (`has_motion`). floors: noise of their signals. band_hz: end of the band in Hz; None = by the noise. Raises
+    numpy.linalg.LinAlgError where the measured outputs do not determine the model's motion."""
     motions = [
         choose_measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)
     ]
@@ -63,20 +65,20 @@ def build_force_views(
         for record in records
     ]
     band_hz = band_hz or _choose_band_hz(records, motions, applied_forces, floors, model)
-    views, floors_of_views = [], []
+    force_records, force_floors = [], []
     for record, motion, force, floor in zip(records, motions, applied_forces, floors, strict=True):
-        view = _build_view(record, force, band_hz)
-        views.append(view)
-        floors_of_views.append(_compute_force_noise(model, motion, floor, band_hz))
-    forces = np.vstack([view.measured for view in views])
+        force_record = _build_force_record(record, force, band_hz)
+        force_records.append(force_record)
+        force_floors.append(_compute_force_noise(model, motion, floor, band_hz))
+    forces = np.vstack([force_record.measured for force_record in force_records])
     # An unsuitable model overestimates the noise, so it is limited to the strongest force; that of an idle axis may be
     # less than the noise.
-    noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in floors_of_views]), np.std(forces, axis=0).max())
+    noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in force_floors]), np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, ACTUATOR_ERROR * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz
     band_motions = tuple(compute_band_motion(motion.position, rate_hz, band_hz) for motion in motions)
-    measure = PredictedForce(tuple(views), band_motions, noise, noise, band_hz)
-    return ForceViews(measure, tuple(floors_of_views))
+    measure = PredictedForce(tuple(force_records), band_motions, noise, noise, band_hz)
+    return ForceMeasure(measure, tuple(force_floors))
 
 
 def _choose_band_hz(
@@ -86,7 +88,9 @@ def _choose_band_hz(
     floors: Sequence[NoiseFloor],
     model: MechanicalModel,
 ) -> float:
-    """End in Hz of the widest band in which noise stays below `NOISE_SHARE` of the force in the quietest record."""
+    """Choose the end in Hz of the widest tried band in which the rms noise of the record with the least noise is at
+    most `NOISE_SHARE` of the largest rms force of any record, without its mean; the narrowest band where there is
+    none."""
     rate_hz = records[0].recording.sample_rate_hz
     force_power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in applied_forces)
     widest_share = (
@@ -105,26 +109,26 @@ def _choose_band_hz(
 
 
 def _compute_median_hz(force: FloatArray, rate_hz: float) -> float:
-    """The frequency in Hz below which half of the power lies."""
+    """Compute the frequency in Hz below which half of the power of a force (n, m), without its mean, lies."""
     power = (np.abs(np.fft.rfft(force - force.mean(axis=0), axis=0)) ** 2).sum(axis=1)
     return float(np.searchsorted(np.cumsum(power), power.sum() / 2)) * rate_hz / len(force)
 
 
-def _build_view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
-    """The record with the filtered force of its actuators as the response, without the samples at its ends. force:
-    (n, m) in N."""
+def _build_force_record(record: Observed, force: FloatArray, band_hz: float) -> Observed:
+    """Build the record with the filtered force of its actuators as the response; the samples at its ends, at most an
+    eighth each, have no role. force: (n, m), N (N m). band_hz: end of the band in Hz."""
     recording = record.recording
     rate_hz, command = recording.sample_rate_hz, recording.command
-    filtered = filter_low_pass(force, rate_hz, band_hz, delay_s=0.5 / rate_hz)
-    signal = Signal(filtered, rate_hz, command.quantity, command.unit, command.channels)
-    view = replace(recording, response=signal, position=None)
-    edge_samples = min(count_edge_samples(rate_hz, band_hz), len(filtered) // 8)
-    is_undistorted = np.zeros(len(filtered), dtype=np.bool_)
-    is_undistorted[edge_samples : len(filtered) - edge_samples] = True
+    filtered_force = filter_low_pass(force, rate_hz, band_hz, delay_s=0.5 / rate_hz)
+    force_signal = Signal(filtered_force, rate_hz, command.quantity, command.unit, command.channels)
+    force_recording = replace(recording, response=force_signal, position=None)
+    edge_samples = min(count_edge_samples(rate_hz, band_hz), len(filtered_force) // 8)
+    is_undistorted = np.zeros(len(filtered_force), dtype=np.bool_)
+    is_undistorted[edge_samples : len(filtered_force) - edge_samples] = True
     return Observed(
-        view,
+        force_recording,
         record.command,
-        signal.samples,
+        force_signal.samples,
         record.fit & is_undistorted,
         record.choose & is_undistorted,
         record.test & is_undistorted,
@@ -134,12 +138,15 @@ def _build_view(record: Observed, force: FloatArray, band_hz: float) -> Observed
 def _compute_force_noise(
     model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float
 ) -> NoiseFloor:
-    """Noise of the force along the motion, from the motion's noise through the model's inverse response."""
-    frequency_hz, m = floor.frequency_hz, model.inputs
+    """Compute the noise of the force along the motion, from the motion's noise through the model's inverse response up
+    to `band_hz` (Hz). Frequencies below 1e-3 Hz (by hand) count as 1e-3 Hz."""
+    frequency_hz, input_count = floor.frequency_hz, model.inputs
     pass_gain = compute_low_pass_gain(frequency_hz, band_hz)[:, None, None]
-    gain = np.abs(pass_gain * compute_inverse_response(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
+    power_gain = (
+        np.abs(pass_gain * compute_inverse_response(model, np.maximum(frequency_hz, 1e-3))[:, :input_count]) ** 2
+    )
     assumed_density = (ASSUMED_NOISE * np.std(motion.position, axis=0)) ** 2
-    density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, assumed_density))
-    freedom = np.full(m, float(np.max(floor.response.freedom, initial=1.0)))
-    noise = ChannelNoise(np.sqrt(density.mean(axis=0)), density, freedom, np.zeros(m))
-    return NoiseFloor(floor.method, frequency_hz, noise, None, floor.remarks)
+    density = np.einsum("lij,lj->li", power_gain, np.where(np.isfinite(motion.noise), motion.noise, assumed_density))
+    degrees_of_freedom = np.full(input_count, float(np.max(floor.response.freedom, initial=1.0)))
+    force_noise = ChannelNoise(np.sqrt(density.mean(axis=0)), density, degrees_of_freedom, np.zeros(input_count))
+    return NoiseFloor(floor.method, frequency_hz, force_noise, None, floor.remarks)
