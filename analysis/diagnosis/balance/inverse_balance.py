@@ -24,7 +24,7 @@ from analysis.diagnosis.balance.blocks import (
     sum_products,
 )
 from analysis.diagnosis.balance.command_laws import CommandLaw
-from analysis.diagnosis.balance.judge_laws import select_test_blocks
+from analysis.diagnosis.balance.judged_law import select_test_blocks
 from analysis.diagnosis.balance.structures import StructureSearch
 from analysis.diagnosis.settings import STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask

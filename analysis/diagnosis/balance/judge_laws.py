@@ -10,9 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.free_laws import FREE_LAWS
-from analysis.diagnosis.balance.judged_law import FRICTIONS, JudgedLaw, compute_force_ratio, find_family, list_simpler
+from analysis.diagnosis.balance.judged_law import (
+    FRICTIONS,
+    SIMULATED_AS,
+    JudgedLaw,
+    compute_force_ratio,
+    find_family,
+    list_simpler,
+    select_test_blocks,
+)
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import (
@@ -32,11 +39,9 @@ from analysis.diagnosis.settings import (
     LARGEST_LAW_FORCE,
     LAW_OF_CEILING,
     LAW_OF_SIGNAL,
-    LEAST_JUDGED_BLOCKS,
     NAMED_OF_CEILING,
     RIVAL_STAYS_BEHIND,
     SECOND_OF_FAMILY,
-    STILL_SHARE,
 )
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
@@ -46,8 +51,6 @@ WEAK_GAINS = ("its gain is too small to be named", "its gain varies too much fro
 """Objections: to a second law of a family; to a further law whose gain is not above, or above `FURTHER_LAW_GAIN`."""
 CONDITION_LAWS = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws that depend on a recorded condition. They may form a class, although they belong to different families."""
-SIMULATED_AS = {"drifting_friction": "coulomb_friction"}
-"""Laws without a simulation, each with the law that is simulated in its place and forms a class with it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,28 +137,6 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
         family = [prior for prior in checked if prior.named and find_family(prior.law.effect) & {law.law.effect}]
         checked.append(replace(law, objection=SIMILAR) if law.named and family and law.gain < SECOND_OF_FAMILY else law)
     return tuple(checked)
-
-
-def select_test_blocks(regression: Regression) -> tuple[Block, ...]:
-    """Select the blocks for tests: the held-out ones if enough and moving; else, by cross-validation, the fit blocks if
-    motion is in several or held-out ones are few; else none, as a single movement cannot test a law."""
-    if len(regression.test) >= LEAST_JUDGED_BLOCKS and has_held_out_motion(regression):
-        return regression.test
-    fit_speeds = _measure_speeds(regression, regression.fit)
-    moves_often = float(fit_speeds.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(fit_speeds @ fit_speeds)
-    return regression.fit if moves_often or len(regression.test) < LEAST_JUDGED_BLOCKS else ()
-
-
-def has_held_out_motion(regression: Regression) -> bool:
-    """Whether the mean square speed in the held-out blocks, at least one, is `STILL_SHARE` or more of the fitted."""
-    fit_speed, test_speed = (_measure_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
-    return bool(test_speed >= STILL_SHARE * fit_speed)
-
-
-def _measure_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
-    """Compute the mean square speed of the driven channel in each block, (blocks,), relative to its scale."""
-    speed = len(regression.motions[0].channels) + regression.base_terms.driven_channel
-    return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
 
 
 def _sum_power(regression: Regression) -> float:

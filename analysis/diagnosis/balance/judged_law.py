@@ -1,4 +1,4 @@
-"""A law of a force balance with the result of its test on held-out blocks of samples.
+"""A law of a force balance with the result of its test on held-out blocks of samples, and the choice of these blocks.
 
 The test compares two sums of squared force errors E over these blocks: of the chosen laws, and of the same laws without
 this one. Its gain is 1 - E(with it) / E(without it); the lower bound of the gain is from a bootstrap over blocks
@@ -10,11 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.free_laws import FREE_LAWS, FREE_POSITION_LAWS, FREE_SPEED_LAWS
 from analysis.diagnosis.balance.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.settings import LEAST_JUDGED_BLOCKS, STILL_SHARE
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
+from equalizer.signals.signal import FloatArray
 
 NO_COLUMN = -1
 """Value of `JudgedLaw.place` for a law of the command: it changes the force itself and has no column."""
@@ -23,6 +26,8 @@ FRICTIONS = {
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
 }  # fmt: skip
 """Laws of dry friction, whose forces are similar where the recorded motion does not vary."""
+SIMULATED_AS = {"drifting_friction": "coulomb_friction"}
+"""Laws without a simulation, each with the law that is simulated in its place and forms a class with it."""
 FAMILIES = (
     FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
@@ -112,3 +117,25 @@ def list_simpler(effect: str) -> tuple[str, ...]:
 def find_family(effect: str) -> set[str]:
     """Find the family in `FAMILIES` that contains an effect; the effect alone where none does."""
     return next((family for family in FAMILIES if effect in family), {effect})
+
+
+def select_test_blocks(regression: Regression) -> tuple[Block, ...]:
+    """Select the blocks for tests: the held-out ones if enough and moving; else, by cross-validation, the fit blocks if
+    motion is in several or held-out ones are few; else none, as a single movement cannot test a law."""
+    if len(regression.test) >= LEAST_JUDGED_BLOCKS and has_held_out_motion(regression):
+        return regression.test
+    fit_speeds = _measure_speeds(regression, regression.fit)
+    moves_often = float(fit_speeds.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(fit_speeds @ fit_speeds)
+    return regression.fit if moves_often or len(regression.test) < LEAST_JUDGED_BLOCKS else ()
+
+
+def has_held_out_motion(regression: Regression) -> bool:
+    """Whether the mean square speed in the held-out blocks, at least one, is `STILL_SHARE` or more of the fitted."""
+    fit_speed, test_speed = (_measure_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
+    return bool(test_speed >= STILL_SHARE * fit_speed)
+
+
+def _measure_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
+    """Compute the mean square speed of the driven channel in each block, (blocks,), relative to its scale."""
+    speed = len(regression.motions[0].channels) + regression.base_terms.driven_channel
+    return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])

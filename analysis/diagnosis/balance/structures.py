@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.judged_law import SIMULATED_AS
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, measure_scales
 from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.model_base import ModelBase, build_regression_with_model, can_laws_explain
@@ -88,7 +89,7 @@ def search_structures(
     laws = [
         law
         for law in make_laws(motions, rotational)
-        if law.effect not in excluded and (law.key, law.numbers) not in fixed
+        if excluded.isdisjoint((law.effect, SIMULATED_AS.get(law.effect))) and (law.key, law.numbers) not in fixed
     ]
     if isinstance(base, ModelBase):
         regression = build_regression_with_model(motions, axis, laws, base)

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import SIMULATED_AS, Balance
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import SIMULATED_AS
 from analysis.diagnosis.confirm.balance_with_model import find_balances_with_model
 from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.blocks import Block, compute_squared_error, select_products
-from analysis.diagnosis.balance.judge_laws import has_held_out_motion
+from analysis.diagnosis.balance.judged_law import has_held_out_motion
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, build_regression, compute_signal_power
 from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, LEAST_TEST_BLOCKS

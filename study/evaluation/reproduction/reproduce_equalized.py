@@ -85,22 +85,24 @@ def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playba
     centre_driver = make_single_model_driver(models.centre)
     frictionless_driver = make_single_model_driver(models.frictionless)
     return {
-        "plain": PlaybackRow("Not equalized, centre", drive_without_equalizer),
+        "unequalized": PlaybackRow("Not equalized, centre", drive_without_equalizer),
         "equalized": PlaybackRow("Equalized, centre", centre_driver),
-        "edge_plain": PlaybackRow("Not equalized, edge", drive_without_equalizer, EDGE),
+        "edge_unequalized": PlaybackRow("Not equalized, edge", drive_without_equalizer, EDGE),
         "edge": PlaybackRow("Edge, model of the centre", centre_driver, EDGE),
         "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended), EDGE),
-        "broad_plain": PlaybackRow(
+        "multisine_unequalized": PlaybackRow(
             "Not equalized, centre, all frequencies", drive_without_equalizer, signal="multisine"
         ),
-        "broad": PlaybackRow("Equalized, centre, all frequencies", centre_driver, signal="multisine"),
-        "edge_broad": PlaybackRow(
+        "multisine": PlaybackRow("Equalized, centre, all frequencies", centre_driver, signal="multisine"),
+        "edge_multisine": PlaybackRow(
             "Edge, models blended (ours), all frequencies", make_blending_driver(blended), EDGE, signal="multisine"
         ),
-        "slick_plain": PlaybackRow(
+        "frictionless_unequalized": PlaybackRow(
             "Not equalized, centre, without friction", drive_without_equalizer, device=FRICTIONLESS
         ),
-        "slick": PlaybackRow("Equalized, centre, without friction", frictionless_driver, device=FRICTIONLESS),
+        "frictionless_equalized": PlaybackRow(
+            "Equalized, centre, without friction", frictionless_driver, device=FRICTIONLESS
+        ),
         "frictionless": PlaybackRow(
             "Equalized, centre, all frequencies, without friction",
             frictionless_driver,

@@ -256,12 +256,10 @@ def _choose_model(
     if inputs.simulated:
         return FirstModel(_identify_twin(fit_progress), (TWIN_REMARK,))
     # Imported here: a given model needs no fit of a first one.
-    from analysis.diagnosis.balance.free_laws import FREE_LAWS
     from study.workflows.diagnosis.fit_without_model import fit_first_model, fit_linear_model
 
     if clean is None:
-        excluded = (*plan.excluded_effects, *(() if plan.discovery else FREE_LAWS))
-        return fit_first_model(inputs, excluded, time_budget_and_guard, fit_progress)
+        return fit_first_model(inputs, plan.excluded_effects, time_budget_and_guard, fit_progress, plan.discovery)
     step = "fitting a linear model, as none was given"
     on_progress(step, READ_SHARE)
     return FirstModel(*fit_linear_model(clean, lambda share: fit_progress(step, share), "the clean recordings"))

@@ -7,6 +7,7 @@ with a remedy. Called by `diagnose_recordings` and `study.evaluation.real`.
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from analysis.diagnosis.balance.free_laws import FREE_LAWS
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fit_without_model
@@ -26,16 +27,18 @@ def fit_first_model(
     excluded_effects: Sequence[str],
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
+    discovery: bool = True,
 ) -> FirstModel:
     """Fit a first model by force balance or, if that crashes or gives no model, a linear one to the spectra.
-    excluded_effects: names of effects that are left out. bounds: function that tells whether time is left, and the
-    guard that catches crashes. on_progress: called with the step's name and its completed share. Raises StudyError for
-    unsuitable recordings."""
+    excluded_effects: names of effects that are left out. discovery: whether laws outside the catalogue are tried.
+    bounds: function that tells whether time is left, and the guard that catches crashes. on_progress: called with the
+    step's name and its completed share. Raises StudyError for unsuitable recordings."""
     time_left, guard = bounds
+    excluded = (*excluded_effects, *(() if discovery else FREE_LAWS))
 
     def fit_by_balance() -> FirstModel | None:
         return fit_without_model.fit_first_model(
-            diagnosis_input.recordings, excluded_effects, time_left, on_progress, map_forked
+            diagnosis_input.recordings, excluded, time_left, on_progress, map_forked
         )
 
     with _translate_refusals():

@@ -20,9 +20,9 @@ from study.evaluation.bank.proof_folder import ProofFolder
 
 write_text = sealing.write_text
 def die(path, text):
-    if path.name == sealing.SETTINGS or sys.argv[2] == "after":
+    if path.name == sealing.SETTINGS_FILE or sys.argv[2] == "after":
         write_text(path, text)
-    if path.name != sealing.SETTINGS:
+    if path.name != sealing.SETTINGS_FILE:
         os.kill(os.getpid(), signal.SIGKILL)
 sealing.write_text = die
 (drawn,) = sealing.list_drawable_cases(sealing.BankPlan(51_401, 1, brief=True))

@@ -41,8 +41,8 @@ def test_fresh_motion_lies_with_the_label(sealed):
         fresh_motions_path(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"]
     )
     assert len(found) == 2
-    assert set(truth["axes"]) == set(found[0].added)
-    assert len(found[0].columns["t"]) == len(found[0].added[truth["axes"][0]])
+    assert set(truth["axes"]) == set(found[0].contributions)
+    assert len(found[0].signals["t"]) == len(found[0].contributions[truth["axes"][0]])
 
 
 def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
