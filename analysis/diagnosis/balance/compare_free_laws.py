@@ -1,10 +1,10 @@
 """Compare laws outside the catalogue (`free_laws`) with the sum of laws that a force balance chose.
 
 A law outside the catalogue is tried alone, in place of each law of the chosen sum, and in addition to it. Its nonlinear
-parameters are refined in the most promising sums. If the best of them leaves at most 1 - `FREE_LAW_GAIN` of the
-cross-validated squared error of the chosen sum, significantly, the sum with the fewest parameters at about the same
-error replaces it. It is then judged on held-out data like any other, with the catalogue's laws as rivals. Called by
-`balances`.
+parameters are refined in the most promising sums. If the best of them is significantly better than the chosen sum, and
+leaves at most 1 - `FREE_LAW_GAIN` of its cross-validated squared error (of the linear balance's where no law of the sum
+can be named), the sum with the fewest parameters at about the same error replaces it. It is then judged on held-out
+data like any other, with the catalogue's laws as rivals. Called by `balances`.
 """
 
 from dataclasses import replace
@@ -45,11 +45,12 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
         extended, sums = _list_sums(append_laws(regression, free_laws), balance.chosen)
     except np.linalg.LinAlgError:
         return balance
-    chosen_error = balance.chosen.error
+    # A catalogue sum of which nothing can be named is no explanation: the linear balance is then the reference.
+    reference_error = (balance.chosen if balance.named else balance.search.linear).error
     best = min(sums, key=lambda s: s.error, default=balance.chosen)
-    if best.error > (1 - FREE_LAW_GAIN) * chosen_error or not improves_significantly(balance.chosen, best):
+    if best.error > (1 - FREE_LAW_GAIN) * reference_error or not improves_significantly(balance.chosen, best):
         return balance
-    improved = [s for s in sums if s.error <= best.error + PLAINER_LEAVES * (chosen_error - best.error)]
+    improved = [s for s in sums if s.error <= best.error + PLAINER_LEAVES * (balance.chosen.error - best.error)]
     simplest = min(improved, key=lambda s: (count_parameters(extended, s.laws), s.error))
     search = replace(balance.search, regression=extended, best=simplest, ranked=(*balance.search.ranked, *sums))
     judged = judge_structure(search, simplest)

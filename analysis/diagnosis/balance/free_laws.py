@@ -7,7 +7,8 @@ resists the motion is
     power_of_speed           w sgn(v) |v|^p         power_of_position        w sgn(q) |q|^p
     even_power_of_speed      w |v|^p                even_power_of_position   w |q|^p
     saturating_damping       w tanh(v / s)          exponential_spring       w exp(q / s)
-    damping_beyond_speed     w sgn(v) max(|v| - s, 0)
+    damping_beyond_speed     w sgn(v) max(|v| - s, 0)   contact_beyond_position  w max(q - c, 0) or w max(c - q, 0)
+    falling_friction         w sgn(v) exp(-(v / s)^2)
     product_of_position_and_speed   w g(q, v), for each g in `PRODUCTS`
     inverse_distance         w / (q - c)^n, n = 1 or 2, with c outside the travel
 
@@ -19,12 +20,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Columns, Formula, Law, NonlinearParameters, Scales
+from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
+from analysis.diagnosis.balance.law import Columns, Formula, Law, NonlinearParameters, Scales, smooth_sign
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.signals.signal import FloatArray
 
-FREE_SPEED_LAWS = {"power_of_speed", "even_power_of_speed", "saturating_damping", "damping_beyond_speed"}
-FREE_POSITION_LAWS = {"power_of_position", "even_power_of_position", "exponential_spring", "inverse_distance"}
+FREE_SPEED_LAWS = {"power_of_speed", "even_power_of_speed", "saturating_damping", "damping_beyond_speed",
+                   "falling_friction"}  # fmt: skip
+FREE_POSITION_LAWS = {"power_of_position", "even_power_of_position", "exponential_spring", "inverse_distance",
+                      "contact_beyond_position"}  # fmt: skip
 FREE_LAWS = frozenset({*FREE_SPEED_LAWS, *FREE_POSITION_LAWS, "product_of_position_and_speed"})
 """Names of all laws of this file; a diagnosis reports their formulas as `discovered_law`."""
 POWERS, POWER_BOUNDS = (0.3, 0.6, 1.5, 2.0, 3.0, 4.5), ((0.05, 6.0),)
@@ -35,15 +39,20 @@ TRAVEL_SHARES = (0.1, 0.3, 1.0)
 """Tried scales of a position and distances beyond the ends of the travel, relative to the travel."""
 LARGEST_EXPONENT = 30.0
 """Largest |q / s| of an exponential: beyond it, the column is one spike at the end of the travel."""
-PRODUCTS: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
-    "q*v": lambda q, v: q * v,
-    "abs(q)*v": lambda q, v: np.abs(q) * v,
-    "q**2*v": lambda q, v: q**2 * v,
-    "q*v**2": lambda q, v: q * v**2,
-    "q*abs(v)": lambda q, v: q * np.abs(v),
-    "abs(q)*abs(v)*v": lambda q, v: np.abs(q) * np.abs(v) * v,
+STOP_SHARES = (0.05, 0.15, 0.3, 0.5)
+"""Tried begins of a contact: distances from either end of the travel, relative to the travel."""
+PRODUCTS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
+    "q*v": lambda q, v, _: q * v,
+    "abs(q)*v": lambda q, v, _: np.abs(q) * v,
+    "q**2*v": lambda q, v, _: q**2 * v,
+    "q*v**2": lambda q, v, _: q * v**2,
+    "q*abs(v)": lambda q, v, _: q * np.abs(v),
+    "abs(q)*abs(v)*v": lambda q, v, _: np.abs(q) * np.abs(v) * v,
+    "q*sign(v)": lambda q, _, sign: q * sign,
+    "abs(q)*sign(v)": lambda q, _, sign: np.abs(q) * sign,
+    "q**2*sign(v)": lambda q, _, sign: q**2 * sign,
 }
-"""Products of position and speed, by their formula."""
+"""Products of position q and velocity v, or the smoothed sign of v, by their formula."""
 
 
 def make_free_laws(channel: int, scales: Scales) -> Iterator[Law]:
@@ -54,11 +63,12 @@ def make_free_laws(channel: int, scales: Scales) -> Iterator[Law]:
     if scales.turns or not scales.travel > 0:
         return
     yield from _make_position_laws(channel, scales)
+    yield from _make_contact_laws(channel, scales)
     if np.isfinite(scales.band_hz):
         for text, compute in PRODUCTS.items():
             yield Law(
-                "product_of_position_and_speed", channel, (), _make_product_columns(channel, compute), _read_weight,
-                formula=_make_formula(f"-p0*{text}"),
+                "product_of_position_and_speed", channel, (), _make_product_columns(channel, compute, scales.speed),
+                _read_weight, formula=_make_formula(f"-p0*{text}"),
             )  # fmt: skip
 
 
@@ -82,6 +92,11 @@ def _make_speed_laws(c: int, speed: float) -> Iterator[Law]:
             "damping_beyond_speed", c, (share * speed,), lambda m, n: _cut_dead_zone(m.velocity[:, [c]], n[0]),
             _read_weight, bounds=((1e-2 * speed, 3 * speed),),
             formula=_make_formula("-p0*sign(v)*maximum(abs(v) - p1, 0)"),
+        )  # fmt: skip
+        yield Law(
+            "falling_friction", c, (share * speed,),
+            lambda m, n: np.sign(m.velocity[:, [c]]) * np.exp(-((m.velocity[:, [c]] / n[0]) ** 2)), _read_weight,
+            bounds=((1e-3 * speed, 3 * speed),), formula=_make_formula("-p0*sign(v)*exp(-(v/p1)**2)"),
         )  # fmt: skip
 
 
@@ -115,6 +130,22 @@ def _make_position_laws(c: int, scales: Scales) -> Iterator[Law]:
                 )  # fmt: skip
 
 
+def _make_contact_laws(c: int, scales: Scales) -> Iterator[Law]:
+    """Make the springs that act beyond a position, in either direction."""
+    bounds = ((scales.low, scales.high),)
+    for distance in (share * scales.travel for share in STOP_SHARES):
+        yield Law(
+            "contact_beyond_position", c, (scales.high - distance,),
+            lambda m, n: np.maximum(m.position[:, [c]] - n[0], 0.0), _read_weight, bounds=bounds,
+            formula=_make_formula("-p0*maximum(q - p1, 0)"),
+        )  # fmt: skip
+        yield Law(
+            "contact_beyond_position", c, (scales.low + distance,),
+            lambda m, n: -np.maximum(n[0] - m.position[:, [c]], 0.0), _read_weight, bounds=bounds,
+            formula=_make_formula("p0*maximum(p1 - q, 0)"),
+        )  # fmt: skip
+
+
 def _raise_with_sign(signal: FloatArray, power: float) -> FloatArray:
     """sgn(u) |u|^power, elementwise."""
     return np.asarray(np.sign(signal) * np.abs(signal) ** power)
@@ -129,9 +160,13 @@ def _order(first: float, second: float) -> tuple[float, float]:
     return min(first, second), max(first, second)
 
 
-def _make_product_columns(c: int, compute: Callable[[FloatArray, FloatArray], FloatArray]) -> Columns:
-    """Make the function for the column (n, 1) of a product of position and velocity."""
-    return lambda m, _: compute(m.position[:, [c]], m.velocity[:, [c]])
+def _make_product_columns(
+    c: int, compute: Callable[[FloatArray, FloatArray, FloatArray], FloatArray], speed: float
+) -> Columns:
+    """Make the function for the column (n, 1) of a product of position and velocity. speed: rms, for the width of the
+    smoothed sign."""
+    width = LEAST_WIDTH_SHARE * speed
+    return lambda m, _: compute(m.position[:, [c]], m.velocity[:, [c]], smooth_sign(m.velocity[:, [c]], width))
 
 
 def _make_inverse_columns(c: int, power: int) -> Columns:
