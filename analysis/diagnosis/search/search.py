@@ -12,10 +12,9 @@ Called by `search_by_simulation`; with reference recordings of the intact device
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), a part
    of them is opened, that is, used to fit and to choose by, and the search repeated: all but the loudest segments; else
    the first half of each stretch, or every other of more parts. The part still held out must confirm what this finds.
-5. Where the catalogue leaves a mismatch, `FurtherSearches` is called (laws outside it, `discovery`): before a second
-   effect, because one law that explains everything is a shorter description than two effects; before a third, which
-   takes longer than laws; and at the end. An early law that leaves a part of the mismatch is kept where the rest of the
-   search names nothing. Rattling play (`impacts`), whose waveform no sum of effects predicts, comes before it.
+5. Where the catalogue leaves a mismatch, `FurtherSearches` is called (rattling play, `impacts`, then laws outside the
+   catalogue, `discovery`): before a second effect, because one law that explains everything is a shorter description
+   than two; before a third, which takes longer than laws; and at the end (`_choose_early_or_full`).
 6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
    repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device has absorbed missing
    physics as a bias. The new result is used if it explains what the first does not, or with fewer effects.
@@ -148,11 +147,12 @@ def repeat_with_wider_bound(
 
 
 def _choose_early_or_full(early: SearchResult, full: SearchResult) -> SearchResult:
-    """Choose the full search's result; or the early result by a law, where the full search names nothing, or where time
-    ran out and the effects that it names leave a far larger error than that law."""
+    """Choose the full search's result, with the early search's candidates where it lists none; or the early result by a
+    law, where the full search names nothing, or where time ran out and its effects leave a far larger error."""
     is_timed_out = full.found.ended_early
     if not early.judgement.named:
-        return replace(full, unconfirmed=(*early.unconfirmed, *full.unconfirmed)) if is_timed_out else full
+        lost = early.unconfirmed if is_timed_out or not full.unconfirmed else ()
+        return replace(full, unconfirmed=(*lost, *full.unconfirmed))
     if full.judgement.named and not (is_timed_out and has_far_smaller_error(early.found.after, full.found.after)):
         return full
     return replace(early, remarks=(OUT_OF_TIME, *early.remarks)) if is_timed_out else early
