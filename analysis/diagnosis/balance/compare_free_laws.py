@@ -38,11 +38,11 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
         return balance
     channel = regression.base_terms.driven_channel
     scales = replace(measure_scales(regression.motions, channel, False), turns=is_freely_turning(regression))
-    free_laws = [law for law in make_free_laws(channel, scales) if law.effect not in excluded]
-    if not free_laws:
+    tried_laws = [law for law in make_free_laws(channel, scales) if law.effect not in excluded]
+    if not tried_laws:
         return balance
     try:
-        extended, sums = _list_sums(append_laws(regression, free_laws), balance.chosen)
+        extended, sums = _list_sums(append_laws(regression, tried_laws), balance.chosen)
     except np.linalg.LinAlgError:
         return balance
     # A catalogue sum of which nothing can be named is no explanation: the linear balance is then the reference.
@@ -54,8 +54,10 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
     simplest = min(improved, key=lambda s: (count_parameters(extended, s.laws), s.error))
     search = replace(balance.search, regression=extended, best=simplest, ranked=(*balance.search.ranked, *sums))
     judged = judge_structure(search, simplest)
-    is_better = bool(judged.named) or (not balance.named and any(law.gain_low > 0 for law in judged.laws))
-    return judged if is_better else balance
+    free_laws = [law for law in judged.laws if law.is_free and law.gain_low > 0]
+    # Without a name, too, a law is a candidate only where it halves the error on the held-out samples.
+    halves_error = judged.error <= np.sqrt(1 - FREE_LAW_GAIN) * balance.linear and not balance.named
+    return judged if free_laws and (halves_error or any(law.named for law in free_laws)) else balance
 
 
 def _list_sums(regression: Regression, chosen: Structure) -> tuple[Regression, list[Structure]]:
