@@ -41,7 +41,12 @@ def find_balances(
         if any(balance.named or not balance.tested for balance in balances) or not time_left():
             break
         balances = balance_selected_motions(select, records, motions, excluded, time_left, map_) or balances
-    return tuple(compare_with_free_laws(balance, excluded) if time_left() else balance for balance in balances)
+    is_imposed = any(recording.meta.get("imposed") for recording in recordings)
+    compared = [compare_with_free_laws(balance, excluded) if time_left() else balance for balance in balances]
+    return tuple(
+        balance if balance is given or is_imposed else withdraw_ambiguous_names(balance)
+        for balance, given in zip(compared, balances, strict=True)
+    )
 
 
 MotionSelector = Callable[[Sequence[Observed], Sequence[Motion]], Sequence[Motion]]

@@ -15,9 +15,10 @@ from analysis.diagnosis.balance.free_laws import FREE_LAWS, make_free_laws
 from analysis.diagnosis.balance.judge_laws import Balance, judge_structure
 from analysis.diagnosis.balance.law import measure_scales
 from analysis.diagnosis.balance.linear_part import is_freely_turning
-from analysis.diagnosis.balance.regression import Regression, append_laws
+from analysis.diagnosis.balance.regression import Regression, append_laws, fit_all_laws
 from analysis.diagnosis.balance.structures import (
     Structure,
+    add_further_laws,
     count_parameters,
     fit_values,
     improves_significantly,
@@ -26,7 +27,7 @@ from analysis.diagnosis.balance.structures import (
 from analysis.diagnosis.settings import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_LEAVES
 
 MOST_COMPARED_SUMS = 12
-"""Number of sums whose nonlinear parameters are refined. Chosen: there are nine free laws."""
+"""Number of sums whose nonlinear parameters are refined. Chosen: there are eleven free laws."""
 
 
 def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balance:
@@ -52,9 +53,12 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
         return balance
     improved = [s for s in sums if s.error <= best.error + PLAINER_LEAVES * (balance.chosen.error - best.error)]
     simplest = min(improved, key=lambda s: (count_parameters(extended, s.laws), s.error))
-    search = replace(balance.search, regression=extended, best=simplest, ranked=(*balance.search.ranked, *sums))
+    search = replace(balance.search, regression=extended, best=best, ranked=(*balance.search.ranked, *sums))
+    least_error = fit_all_laws(extended, range(extended.columns[0].shape[1]))[0]
+    while (larger := add_further_laws(search, simplest, least_error)) is not None:
+        simplest = larger
     judged = judge_structure(search, simplest)
-    free_laws = [law for law in judged.laws if law.is_free and law.gain_low > 0]
+    free_laws = [law for law in judged.laws if law.is_free and law.gain_low > 0 and law.gain >= FREE_LAW_GAIN]
     # Without a name, too, a law is a candidate only where it halves the error on the held-out samples.
     halves_error = judged.error <= np.sqrt(1 - FREE_LAW_GAIN) * balance.linear and not balance.named
     return judged if free_laws and (halves_error or any(law.named for law in free_laws)) else balance

@@ -1,6 +1,6 @@
 """Laws without a name in the catalogue as terms of the force balance: powers, saturation, products and attraction.
 
-`balances` adds them to the laws of the catalogue only where a first search named nothing. With position q and velocity
+`compare_free_laws` compares them with the sum of catalogue laws that was chosen before. With position q and velocity
 v of the driven axis, weight w, and nonlinear parameters p (exponent), s (scale) and c (position), the force that
 resists the motion is
 
@@ -21,7 +21,15 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
-from analysis.diagnosis.balance.law import Columns, Formula, Law, NonlinearParameters, Scales, smooth_sign
+from analysis.diagnosis.balance.law import (
+    Columns,
+    Formula,
+    Law,
+    NonlinearParameters,
+    Scales,
+    WeightConverter,
+    smooth_sign,
+)
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.signals.signal import FloatArray
 
@@ -119,31 +127,39 @@ def _make_position_laws(c: int, scales: Scales) -> Iterator[Law]:
                 bounds=(_order(0.3 * scale, 3 * scale),), formula=_make_formula("-p0*exp(q/p1)"),
             )  # fmt: skip
     for share in TRAVEL_SHARES:
-        distance = share * scales.travel
-        for place, side in ((scales.high + distance, 1), (scales.low - distance, -1)):
-            end = scales.high if side > 0 else scales.low
-            bounds = (_order(end + 0.02 * side * scales.travel, end + 3 * side * scales.travel),)
+        for end, side in ((scales.high, 1.0), (scales.low, -1.0)):
             for power in (1, 2):
                 yield Law(
-                    "inverse_distance", c, (place,), _make_inverse_columns(c, power), _read_weight, bounds=bounds,
+                    "inverse_distance", c, (share * scales.travel,), _make_inverse_columns(c, end, side, power),
+                    _make_position_reader(end, side), bounds=((0.02 * scales.travel, 3 * scales.travel),),
                     formula=_make_formula(f"-p0/(q - p1)**{power}"),
                 )  # fmt: skip
 
 
 def _make_contact_laws(c: int, scales: Scales) -> Iterator[Law]:
-    """Make the springs that act beyond a position, in either direction."""
-    bounds = ((scales.low, scales.high),)
-    for distance in (share * scales.travel for share in STOP_SHARES):
-        yield Law(
-            "contact_beyond_position", c, (scales.high - distance,),
-            lambda m, n: np.maximum(m.position[:, [c]] - n[0], 0.0), _read_weight, bounds=bounds,
-            formula=_make_formula("-p0*maximum(q - p1, 0)"),
-        )  # fmt: skip
-        yield Law(
-            "contact_beyond_position", c, (scales.low + distance,),
-            lambda m, n: -np.maximum(n[0] - m.position[:, [c]], 0.0), _read_weight, bounds=bounds,
-            formula=_make_formula("p0*maximum(p1 - q, 0)"),
-        )  # fmt: skip
+    """Make the springs that act beyond a position, in either direction. Their nonlinear parameter is the depth of the
+    contact at the end of the travel."""
+    for depth in (share * scales.travel for share in STOP_SHARES):
+        for end, side, text in (
+            (scales.high, 1.0, "-p0*maximum(q - p1, 0)"), (scales.low, -1.0, "p0*maximum(p1 - q, 0)")
+        ):  # fmt: skip
+            yield Law(
+                "contact_beyond_position", c, (depth,), _make_contact_columns(c, end, side),
+                _make_position_reader(end, -side), bounds=((0.01 * scales.travel, 0.8 * scales.travel),),
+                formula=_make_formula(text),
+            )  # fmt: skip
+
+
+def _make_contact_columns(c: int, end: float, side: float) -> Columns:
+    """Make the function for the column (n, 1) of a contact towards `side` whose depth at the end of the travel is
+    n[0]."""
+    return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - end) + n[0], 0.0)
+
+
+def _make_position_reader(end: float, side: float) -> WeightConverter:
+    """Make the function that converts the weight and a distance from the end of the travel to p0 and the position p1.
+    Distances are refined by factors, which would change a position near zero too little and one far off too much."""
+    return lambda w, n, mass: {"p0": float(w[0]), "p1": end + side * n[0]}
 
 
 def _raise_with_sign(signal: FloatArray, power: float) -> FloatArray:
@@ -169,11 +185,12 @@ def _make_product_columns(
     return lambda m, _: compute(m.position[:, [c]], m.velocity[:, [c]], smooth_sign(m.velocity[:, [c]], width))
 
 
-def _make_inverse_columns(c: int, power: int) -> Columns:
-    """Make the function for the column (n, 1) of an attraction to a position outside the travel."""
+def _make_inverse_columns(c: int, end: float, side: float, power: int) -> Columns:
+    """Make the function for the column (n, 1) of an attraction to a position at the distance n[0] beyond an end of the
+    travel."""
 
     def compute_columns(m: Motion, n: NonlinearParameters) -> FloatArray:
-        return np.asarray(1.0 / (m.position[:, [c]] - n[0]) ** power)
+        return np.asarray(1.0 / (m.position[:, [c]] - (end + side * n[0])) ** power)
 
     return compute_columns
 

@@ -205,6 +205,8 @@ def _find_equivalents(
     for index, law in enumerate(regression.laws):
         if law.effect == tested_law.effect or law.linear or (tested_law.linear and not law.linear):
             continue
+        if law.effect in FREE_LAWS and tested_law.effect not in FREE_LAWS:
+            continue  # a formula without a name is no reason to withdraw a name
         laws = (*other_laws, index)
         if any(regression.laws[k].key == law.key for k in other_laws) or fit_values(regression, laws)[-1] is None:
             continue
@@ -220,7 +222,9 @@ def _find_equivalents(
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
         is_richer = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
         limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * decrease
-        if tested_law.effect in FREE_LAWS:  # it must leave 1 - FREE_LAW_GAIN of the squared error of any other law
+        if (
+            tested_law.effect in FREE_LAWS
+        ):  # rivals of a strong law leave less than four times as much
             limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
         if float(increases.sum()) <= limit:
             equivalents.append((float(increases.sum()), effect))
@@ -249,7 +253,8 @@ def _find_objection(
     other_families = [effect for effect in equivalents if effect not in family]
     rivals = [effect for effect in equivalents if law.effect not in list_simpler(effect)]
     if other_families or (len(rivals) >= LARGEST_CLASS and not {law.effect, *rivals} <= FRICTIONS):
-        return f"these data cannot distinguish it from {', '.join(other_families or equivalents)}"
+        rival_names = ("another formula" if name in FREE_LAWS else name for name in other_families or equivalents)
+        return f"these data cannot distinguish it from {', '.join(dict.fromkeys(rival_names))}"
     is_simulated = law.formula is not None or not {law.effect, SIMULATED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
     return "" if is_simulated else "hapteq cannot simulate it yet"
 

@@ -262,12 +262,12 @@ def choose_simplest_structure(search: StructureSearch) -> Structure:
         candidates, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=search.linear
     )
     least_error = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
-    while (extended := _add_further_laws(search, simplest, least_error)) is not None:
+    while (extended := add_further_laws(search, simplest, least_error)) is not None:
         simplest = extended
     return simplest
 
 
-def _add_further_laws(search: StructureSearch, base: Structure, least_error: float) -> Structure | None:
+def add_further_laws(search: StructureSearch, base: Structure, least_error: float) -> Structure | None:
     """The structure with further laws that explain most of what all laws (least_error) could; None without any."""
     allowed = base.error - max(FURTHER_LAW_OF_REST * (base.error - least_error), FURTHER_LAW_OF_ALL * base.error)
     extensions = [

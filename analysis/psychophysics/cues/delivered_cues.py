@@ -172,5 +172,7 @@ _RATIO_FUNCTIONS: dict[Cue, Callable[[Trial], float | None]] = {
 
 
 def _convert_to_db(amplitudes: list[float]) -> FloatArray:
-    """Convert amplitudes, ratios or levels to dB, 20 log10; NaN for NaN."""
-    return 20.0 * np.log10(np.array(amplitudes, dtype=np.float64))
+    """Convert amplitudes, ratios or levels to dB, 20 log10; NaN for NaN, and for values that are not positive, which
+    only a damaged log holds."""
+    values = np.array(amplitudes, dtype=np.float64)
+    return 20.0 * np.log10(np.where(values > 0, values, np.nan))

@@ -27,6 +27,10 @@ def resist(kind, q, v):
         return 12.0 * np.sign(v) * max(abs(v) - 0.2, 0.0)
     if kind == 5:
         return 0.004 / (q - 0.06) ** 2
+    if kind == 6:
+        return 6000.0 * q * q * v + 0.4 * np.tanh(v / 1e-3)
+    if kind == 7:
+        return 1.2 * np.tanh(v / 1e-3) + 1000.0 * q * q * v
     return 0.0
 
 
@@ -66,12 +70,24 @@ def find_law(kind, seed):
         (2, 21, ("vx", "x"), (6000.0,)),
         pytest.param(3, 22, ("x",), (0.3, 0.012), marks=pytest.mark.slow),
         pytest.param(4, 22, ("vx",), (12.0, 0.2), marks=pytest.mark.slow),
+        pytest.param(5, 21, ("x",), (0.004, 0.06), marks=pytest.mark.slow),
     ],
 )
 def test_an_invented_law_is_recovered(kind, seed, variables, numbers):
     found_variables, found_numbers = find_law(kind, seed)
     assert found_variables == variables
     assert found_numbers[: len(numbers)] == pytest.approx(numbers, rel=0.05)
+
+
+def test_friction_is_named_in_addition_to_a_free_law(find_balance):
+    balance = find_balance(record(6, 23))[0]
+    named = {law.law.effect: law.formula and law.formula.text for law in balance.named}
+    assert named == {"product_of_position_and_speed": "-p0*q**2*v", "coulomb_friction": None}
+
+
+def test_no_formula_withdraws_the_name_of_friction(find_balance):
+    balance = find_balance(record(7, 24))[0]
+    assert "coulomb_friction" in {law.law.effect for law in balance.named}
 
 
 @pytest.mark.parametrize("seed", [31, pytest.param(32, marks=pytest.mark.slow)])

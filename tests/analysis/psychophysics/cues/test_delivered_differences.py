@@ -7,7 +7,7 @@ import pytest
 
 from analysis.psychophysics.cues.cue_findings import compute_cue_findings, make_cue_warnings
 from analysis.psychophysics.cues.cue_sensitivity import INTERNAL_NOISE_DB, fit_same_level_difference
-from analysis.psychophysics.cues.delivered_cues import Cue, find_cue_gaps, select_delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, _convert_to_db, find_cue_gaps, select_delivered_trials
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 from tests.slow_instances import slow
@@ -172,3 +172,7 @@ def test_the_report_and_the_document_name_the_planted_mismatch(simulate_study, p
     assert pages[3.0].count(said) == 2 and "intensity at 25 Hz" in pages[3.0]
     assert said not in pages[0.1]
     assert "Delivery varied too little within a direction to test" in pages[0.1]
+
+
+def test_a_level_that_is_not_positive_has_no_decibels():
+    assert np.array_equal(_convert_to_db([1.0, -0.4, 0.0, np.nan]), [0.0, np.nan, np.nan, np.nan], equal_nan=True)
