@@ -222,9 +222,7 @@ def _find_equivalents(
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
         is_richer = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
         limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * decrease
-        if (
-            tested_law.effect in FREE_LAWS
-        ):  # rivals of a strong law leave less than four times as much
+        if tested_law.effect in FREE_LAWS:  # rivals of a strong law leave less than four times as much
             limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
         if float(increases.sum()) <= limit:
             equivalents.append((float(increases.sum()), effect))
