@@ -127,6 +127,8 @@ EFFECT = Effect(
     source="Brogliato, Nonsmooth Mechanics, chapter 2",
     signature="nothing is missing until the axis comes near its farthest positions; then a force pushes back, and odd "
     "and even harmonics appear",
+    # `side` is no fitted parameter: starts set it where the position's sign does not give it. `opposite` is 0 for no
+    # second stop and 1 for one as stiff; its upper bound was chosen.
     parameters=(
         Parameter("position", -1e3, 1e3, none=None, scale="signed"),
         Parameter("stiffness", 1e-6, 1e12, none=0.0),

@@ -35,11 +35,11 @@ def suggest_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRa
     delay at the end is at least one row, and rates whose delays differ from it by up to half a row there."""
     rates = []
     for compared in _select_device_bases(compared_bases):
-        for runs_on in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
-            rate, last_time = _estimate_clock_rate(compared, runs_on)
+        for from_file_start in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
+            rate, last_time = _estimate_clock_rate(compared, from_file_start)
             if abs(rate) * last_time >= 1:
                 rates += [
-                    ClockRate(rate + offset / last_time, LATE_STEP / last_time, runs_on)
+                    ClockRate(rate + offset / last_time, LATE_STEP / last_time, from_file_start)
                     for offset in _list_row_offsets()
                 ]
     return tuple(rates)
@@ -77,11 +77,12 @@ def _estimate_delay_rows(compared: ComparedBase) -> float:
     return delay if 1 <= delay < max_lag else 0.0
 
 
-def _estimate_clock_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, float]:
+def _estimate_clock_rate(compared: ComparedBase, from_file_start: bool) -> tuple[float, float]:
     """The relative clock rate along whose delays the cross-correlations of short blocks have the largest sum (a Radon
     transform of their peaks), and the time of the last block, in rows. The rate is 0 where the largest sum is at either
-    end of the range. runs_on: whether the clock's time is counted from the beginning of the file; else of each part."""
-    times, correlations = _correlate_blocks(compared, runs_on)
+    end of the range. from_file_start: whether the clock's time is counted from the beginning of the file; else of each
+    part."""
+    times, correlations = _correlate_blocks(compared, from_file_start)
     if not correlations.size:
         return 0.0, 0.0
     last_time, max_lag = float(times.max()), correlations.shape[1] // 2
@@ -98,13 +99,14 @@ def _estimate_clock_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, 
     return (float(rates[best]) if 0 < best < len(rates) - 1 else 0.0), last_time
 
 
-def _correlate_blocks(compared: ComparedBase, runs_on: bool) -> tuple[FloatArray, FloatArray]:
+def _correlate_blocks(compared: ComparedBase, from_file_start: bool) -> tuple[FloatArray, FloatArray]:
     """Times of blocks (b,) in rows, and correlation coefficients at each lag (b, 2 max_lag + 1) between the
     contribution of a block's responses and that of all commands of its part. Empty where all parts are too short.
-    runs_on: as in `ClockRate`."""
+    from_file_start: as in `ClockRate`: whether times are counted from the start of the file, else of each part."""
     history = compared.base.order if isinstance(compared.base, AutoregressiveBase) else 0
     starts = [
-        history + (part.start / (part.rate_hz * compared.row_s) if runs_on else 0.0) for part in compared.faulty.parts
+        history + (part.start / (part.rate_hz * compared.row_s) if from_file_start else 0.0)
+        for part in compared.faulty.parts
     ]
     row_count = sum(len(rows) for rows in compared.faulty.rows)
     max_lag = int(

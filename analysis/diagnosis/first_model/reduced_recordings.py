@@ -52,7 +52,7 @@ def _reduce_recording(
         for part_index, (start, stop) in enumerate(parts, first_part):
             motion = regression.motions[part_index]
             remaining_force = motion.force[:, axis] - _compute_other_linear_force(balance, motion)
-            # Below the band of an integrated motion there is no motion to balance the force.
+            # Order 2: the response is an acceleration. Below the band of its integrals no motion balances the force.
             command[start:stop, axis] = (
                 motion.filter_to_band(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
             )
@@ -76,10 +76,11 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     weights = regression.fit_weights(
         regression.select_columns([*linear_laws, *(judged_law.law_index for judged_law in balance.named)])
     )
-    # The constant force of the base stays in the command, for the later fit.
+    # The constant force, the last column of the base, stays in the command, for the later fit.
     weights = np.delete(weights, regression.base - 1)
     motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // motion_count]
     columns = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
+    # Columns come in groups (accelerations, velocities, positions) with one column per motion, then the linear laws.
     has_other_motions = motion_count > motion.force.shape[1]
     is_subtracted = [
         k >= regression.matrices or (has_other_motions and k % motion_count != regression.base_terms.driven_channel)

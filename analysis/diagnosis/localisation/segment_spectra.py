@@ -46,7 +46,7 @@ class SegmentSpectrum:
     mean: ComplexArray
     """Mean over the periods, less the response to the command's silent lines."""
     error: FloatArray
-    """Variance of the mean, that of the subtracted response included."""
+    """Variance of the mean in squared units of the channel, that of the subtracted response included."""
     spread: FloatArray
     """Variance of one period, from the differences between periods; equal to `floor` where there is one period."""
     floor: FloatArray

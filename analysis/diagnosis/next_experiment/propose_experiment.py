@@ -32,7 +32,7 @@ class Proposal:
     """The named effect, then its rivals."""
     axis: int
     level: float
-    """Level of the menu's commands."""
+    """Level of the proposed commands, in the commands' unit."""
     chosen: ExperimentSet
 
     @property
@@ -99,5 +99,6 @@ def _compute_recorded_information(context: SearchContext, candidate: FittedCandi
     columns = np.vstack([compute_sensitivity(context, fitted.deviations, fitted.hypothesis).columns, effect_columns])
     information = columns @ columns.T
     t = len(fitted.deviations)
+    # The calibration's prior: deviations are in its standard deviations, so that each has the information 1.
     information[:t, :t] += np.eye(t)
     return np.asarray(information)

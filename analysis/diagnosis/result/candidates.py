@@ -1,9 +1,10 @@
 """Adds the results of force balances to a diagnosis: classes of effects, shares, candidates, and balance errors.
 
 A class holds effects that the data cannot distinguish; a candidate is a law that was found but is not confirmed. Gains
-are fractions of the squared force error on held-out data (`judged_law`). `diagnose` calls the two entry points:
+are fractions of the squared force error on held-out data (`judged_law`). `diagnose` calls
 `add_balances_with_given_model` where the user gave a model, `add_balances_with_fitted_model` where the model was fitted
-to the same recordings. channels: names of the commands, in the order of the balances.
+to the same recordings, and in both cases `collect_balance_errors`; for a fitted model `describe_linear_terms`, too.
+channels: names of the commands, in the order of the balances.
 """
 
 import re
