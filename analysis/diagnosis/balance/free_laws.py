@@ -93,7 +93,7 @@ def _make_speed_laws(c: int, speed: float) -> Iterator[Law]:
         )  # fmt: skip
     for share in SPEED_SHARES:
         yield Law(
-            "saturating_damping", c, (share * speed,), lambda m, n: np.tanh(m.velocity[:, [c]] / n[0]), _read_weight,
+            "saturating_damping", c, (share * speed,), lambda m, n: smooth_sign(m.velocity[:, [c]], n[0]), _read_weight,
             bounds=((1e-3 * speed, 3 * speed),), formula=_make_formula("-p0*tanh(v/p1)"),
         )  # fmt: skip
         yield Law(
@@ -124,7 +124,8 @@ def _make_position_laws(c: int, scales: Scales) -> Iterator[Law]:
         if largest < LARGEST_EXPONENT * abs(scale):
             yield Law(
                 "exponential_spring", c, (scale,), lambda m, n: np.exp(m.position[:, [c]] / n[0]), _read_weight,
-                bounds=(_order(0.3 * scale, 3 * scale),), formula=_make_formula("-p0*exp(q/p1)"),
+                bounds=((min(0.3 * scale, 3 * scale), max(0.3 * scale, 3 * scale)),),
+                formula=_make_formula("-p0*exp(q/p1)"),
             )  # fmt: skip
     for share in TRAVEL_SHARES:
         for end, side in ((scales.high, 1.0), (scales.low, -1.0)):
@@ -170,10 +171,6 @@ def _raise_with_sign(signal: FloatArray, power: float) -> FloatArray:
 def _cut_dead_zone(signal: FloatArray, width: float) -> FloatArray:
     """sgn(u) max(|u| - width, 0), elementwise."""
     return np.asarray(np.sign(signal) * np.maximum(np.abs(signal) - width, 0.0))
-
-
-def _order(first: float, second: float) -> tuple[float, float]:
-    return min(first, second), max(first, second)
 
 
 def _make_product_columns(
