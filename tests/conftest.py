@@ -68,16 +68,18 @@ def summer_and_winter(monkeypatch) -> Iterator[None]:
 
 PAUSES = PauseMeter()
 IN_PROCESS = tuple(
-    f"tests/study/devices/{room}/"
-    for room in (
-        "hung_driver",
-        "drive",
-        "safe",
-        "governor",
-        "loop_process",
-        "accelerometer",
-        "replay",
-        "force_dimension",
+    f"tests/study/devices/{part}"
+    for part in (
+        "test_",
+        "hung_driver/",
+        "drive/",
+        "safe/",
+        "governor/",
+        "loop_process/",
+        "accelerometer/",
+        "replay/",
+        "telemetry/",
+        "force_dimension/",
     )
 )
 """Tests here run the haptic loop or a sensor's board in the tests' own process, or must give a loop signs of life."""

@@ -62,22 +62,24 @@ class ReadingRequests:
     """Requests for a reading while nothing moves, one at a time: callers that request one before it is taken share
     it."""
 
-    def __init__(self, clock: Clock, wake: Callable[[], None]) -> None:
-        """clock: of the drive; wake: makes the loop's thread check `is_pending`."""
+    def __init__(self, clock: Clock, wake: Callable[[], None], timeout_s: float = READING_TIMEOUT_S) -> None:
+        """clock: of the drive; wake: makes the loop's thread check `is_pending`; timeout_s: longest wait of a
+        caller."""
         self._clock = clock
         self._wake = wake
+        self._timeout_s = timeout_s
         self._request_lock = threading.Lock()
         self._request: _Request | None = None
 
     def request_reading(self) -> bool:
-        """Wait for a reading, at most `READING_TIMEOUT_S`. Returns False where none was taken in time; at once for a
+        """Wait for a reading, at most for the timeout. Returns False where none was taken in time; at once for a
         request that is still pending after its deadline: a driver that hangs delays only the first caller."""
         with self._request_lock:
             request = self._request
             if request is None or request.taken.is_set():
-                self._request = request = _Request(self._clock.now_s() + READING_TIMEOUT_S)
+                self._request = request = _Request(self._clock.now_s() + self._timeout_s)
         self._wake()
-        return request.taken.wait(min(READING_TIMEOUT_S, max(0.0, request.deadline_s - self._clock.now_s())))
+        return request.taken.wait(min(self._timeout_s, max(0.0, request.deadline_s - self._clock.now_s())))
 
     @property
     def is_pending(self) -> bool:

@@ -198,6 +198,9 @@ def test_buttons_of_a_simulation_that_fail_are_no_reading(rigs):
         assert device.look().position_m is None
 
 
+PATIENT_S = 60.0
+
+
 class StillClock(RealClock):
     def __init__(self) -> None:
         self.seconds = 0.0
@@ -207,14 +210,14 @@ class StillClock(RealClock):
 
 
 def test_concurrent_requests_get_the_same_reading():
-    clock, served = StillClock(), []
-    glances = ReadingRequests(clock, wake=lambda: None)
+    served, requested = [], threading.Semaphore(0)
+    # A machine may pause a thread for longer than a caller waits: the long timeout leaves that out of this test.
+    glances = ReadingRequests(StillClock(), wake=requested.release, timeout_s=PATIENT_S)
     askers = [threading.Thread(target=lambda: served.append(glances.request_reading())) for _ in range(2)]
     for asker in askers:
         asker.start()
-    while not glances.is_pending:
-        time.sleep(0.001)
-    time.sleep(0.02)
+    for _ in askers:
+        assert requested.acquire(timeout=PATIENT_S)
     glances.mark_taken()
     for asker in askers:
         asker.join()
@@ -223,10 +226,11 @@ def test_concurrent_requests_get_the_same_reading():
 
 
 def test_a_late_request_is_not_waited_for_again_until_it_is_served():
+    timeout_s = 2.0
     clock = StillClock()
-    glances = ReadingRequests(clock, wake=lambda: None)
-    assert not glances.request_reading()
-    clock.seconds = 1.0
-    assert seconds_for(glances.request_reading) < 0.05
+    glances = ReadingRequests(clock, wake=lambda: None, timeout_s=timeout_s)
+    assert seconds_for(glances.request_reading) > timeout_s * 0.9
+    clock.seconds = 2 * timeout_s
+    assert seconds_for(glances.request_reading) < timeout_s / 2
     glances.mark_taken()
-    assert seconds_for(glances.request_reading) > READING_TIMEOUT_S * 0.9
+    assert seconds_for(glances.request_reading) > timeout_s * 0.9
