@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from analysis.diagnosis.first_model.choose_structure import choose_structure as first_structure
     from analysis.diagnosis.result.findings import Findings as Findings
     from analysis.figures.diagnosis.diagnosis_pictures import draw_diagnosis_pictures as diagnosis_pictures
-    from analysis.figures.study_pictures import study_pictures as study_pictures
+    from analysis.figures.study_pictures import draw_study_pictures as study_pictures
     from analysis.look.overview import make_overview as overview
     from analysis.psychophysics.study_analysis import StudyAnalysis as StudyAnalysis
     from analysis.psychophysics.study_analysis import analyse_study as analyse_study
@@ -41,7 +41,7 @@ _HOME = {
     "diagnosis_pictures": "analysis.figures.diagnosis.diagnosis_pictures:draw_diagnosis_pictures",
     "first_structure": "analysis.diagnosis.first_model.choose_structure:choose_structure",
     "overview": "analysis.look.overview:make_overview",
-    "study_pictures": "analysis.figures.study_pictures:study_pictures",
+    "study_pictures": "analysis.figures.study_pictures:draw_study_pictures",
 }
 """Exported name -> "module:name". Imported at first access, because importing a module may take seconds."""
 

@@ -17,15 +17,15 @@ _UNIT_REPLACEMENTS = (
 
 MISSING = "–"
 """Text for a missing number (en dash)."""
-_MAX_LISTED = 12
-"""Largest number of items that a sentence lists."""
+_MAX_LISTED_ITEMS = 12
+"""Largest number of items that a sentence lists. Chosen."""
 
 
 def typeset(formatted: str) -> str:
     """Replace the hyphen of a formatted number by the minus sign (U+2212), and remove it from a zero.
 
     To be applied to every number in text for users that can be negative. Files for programs, and text that may be
-    copied into a command, keep the ASCII "-".
+    copied into a command, keep the ASCII "-". Raises ValueError for text that is no number.
     """
     return formatted.replace("-", "−") if float(formatted) else formatted.replace("-", "")
 
@@ -36,14 +36,14 @@ def format_number(value: float | None, digits: int = 2) -> str:
 
 
 def format_signed(value: float, digits: int = 2) -> str:
-    """Format a number with its sign, also where it is positive."""
+    """Format a number with `digits` decimals and its sign, "+" where it is positive; zero has "+" or no sign."""
     return typeset(f"{value:+.{digits}f}")
 
 
-def mark_cut(value: float | None, cut: bool, digits: int = 2) -> str:
+def mark_cut(value: float | None, is_cut: bool, digits: int = 2) -> str:
     """Format a threshold, followed by "cut" where the largest permitted level (cap) limited it, so that it is censored;
     a dash for None."""
-    return f"{format_number(value, digits)} cut" if cut and value is not None else format_number(value, digits)
+    return f"{format_number(value, digits)} cut" if is_cut and value is not None else format_number(value, digits)
 
 
 def format_count(value: int | None) -> str:
@@ -71,18 +71,18 @@ def format_f_text(df_first: int | None, df_second: int | None, f: float | None) 
 
 def conjoin(items: Sequence[str]) -> str:
     """Join the items to a list in words, "a, b and c"; of more than 12, the first 12 "and n more"."""
-    if len(items) > _MAX_LISTED:
-        return f"{', '.join(items[:_MAX_LISTED])} and {len(items) - _MAX_LISTED} more"
+    if len(items) > _MAX_LISTED_ITEMS:
+        return f"{', '.join(items[:_MAX_LISTED_ITEMS])} and {len(items) - _MAX_LISTED_ITEMS} more"
     return " and ".join((", ".join(items[:-1]), items[-1])) if len(items) > 1 else "".join(items)
 
 
 def capitalise(sentence: str) -> str:
-    """The sentence with its first character in upper case and all others unchanged, unlike `str.capitalize`."""
+    """Convert the first character to upper case; all others stay unchanged, unlike by `str.capitalize`."""
     return sentence[:1].upper() + sentence[1:]
 
 
 def format_sentence(text: str) -> str:
-    """The text with a capital first letter and exactly one full stop at the end."""
+    """Capitalise the first letter, and end the text with exactly one full stop."""
     return f"{capitalise(text).rstrip('.')}."
 
 
@@ -93,7 +93,7 @@ def begin_sentence(sentence: str) -> str:
 
 
 def end_sentence(sentence: str) -> str:
-    """The sentence with a full stop added, unless it ends with . ! or ?, or is empty."""
+    """Add a full stop to the sentence, unless it ends with . ! or ?, or is empty."""
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from protocols.document.loading import load_protocol as load_protocol
     from protocols.procedure.schedule import schedule_runs as planned_runs
     from protocols.procedure.staircase import begin_staircase as begin_staircase
-    from protocols.procedure.staircase import level_n as staircase_level_n
+    from protocols.procedure.staircase import compute_level_n as staircase_level_n
     from protocols.procedure.staircase import step as step_staircase
     from protocols.trial import Trial as Trial
 
@@ -38,7 +38,7 @@ _HOME = {
     "dump_protocol": "protocols.document.dumping:dump_protocol",
     "load_protocol": "protocols.document.loading:load_protocol",
     "planned_runs": "protocols.procedure.schedule:schedule_runs",
-    "staircase_level_n": "protocols.procedure.staircase:level_n",
+    "staircase_level_n": "protocols.procedure.staircase:compute_level_n",
     "step_staircase": "protocols.procedure.staircase:step",
 }
 """Module and name of each exported object, imported at first use, because importing a module may take seconds."""

@@ -66,8 +66,8 @@ analysis counts them."""
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One presentation, one row of `trials.csv`. None: the value does not exist, or not yet. Runs, trials and
-    attempts are numbered from 0."""
+    """One presentation, one row of `trials.csv`. None: the value does not exist, or not yet. Runs of a session, trials
+    of a run and attempts of a trial are numbered from 0. Amplitudes are peak values."""
 
     subject: str
     session: str
@@ -77,17 +77,26 @@ class Trial:
     phase: Phase
     frequency_hz: float
     level_n: float
+    """Commanded amplitude of the stimulus (N)."""
     direction_shown: int
+    """Number on the screen, 1 or 2, of the direction; in detection of the interval with the stimulus."""
     answer: int | None
+    """Number that the participant answered, 1 or 2."""
     correct: bool | None
+    """Whether answer and direction_shown are equal."""
     reversal: bool
+    """Whether the answer made a reversal of the staircase."""
     response_time_s: float | None
     """Response time (s) from the start of the stimulus, its fade-in included; in detection from the end of the second
     interval."""
     delivered_mps2: float | None
+    """Amplitude of the acceleration along the played direction, at the stimulus frequency."""
     off_axis_mps2: float | None
+    """Amplitude of the acceleration across that direction, at the stimulus frequency."""
     displacement_mm: float | None
+    """Amplitude of the displacement along the direction: delivered acceleration over (2 pi f)²."""
     missed_ticks: int | None
+    """Number of ticks of the control loop that were not run in time."""
     felt: bool | None
     """True: a device moved the participant's hand. False: a person answered while no device moved. None: a simulated
     participant."""

@@ -1,6 +1,6 @@
 """Open and read regular files only; for a pipe, a device or a folder an error is raised at once, without blocking.
 
-Called by all modules that read files which a user may name.
+Called by the modules that read files which a user may name: tables, documents, logs, HDF5 files.
 """
 
 import errno
@@ -71,6 +71,7 @@ def _require_regular(status: os.stat_result) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not stat.S_ISREG(status.st_mode):
         reason = next(
-            (words for is_kind, words in _SPECIAL_FILE_TESTS if is_kind(status.st_mode)), "it is no regular file"
+            (special_reason for is_kind, special_reason in _SPECIAL_FILE_TESTS if is_kind(status.st_mode)),
+            "it is no regular file",
         )
         raise RefusedFileError(errno.EINVAL, reason)

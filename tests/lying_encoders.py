@@ -10,7 +10,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceSettings, Fault
-from study.devices.drive.runner import _TICK
+from study.devices.drive.runner import _TICK_TYPE
 from study.devices.governor import cells
 from study.devices.governor.govern import MATRIX_TYPE, VECTOR_TYPE
 from study.devices.governor.governor import Governor
@@ -123,7 +123,7 @@ _ARRAYS = (
     VECTOR_TYPE,
     MATRIX_TYPE,
 )
-_compiled = njit(types.int64(types.FunctionType(_TICK.signature), *_ARRAYS), error_model="numpy")(_play)
+_compiled = njit(types.int64(types.FunctionType(_TICK_TYPE.signature), *_ARRAYS), error_model="numpy")(_play)
 
 
 def draw(rng: np.random.Generator, lie: str, ticks: int) -> Hold:

@@ -22,8 +22,8 @@ STROKES_BELOW_HZ = 1.0
 stimulus of a study has 5 Hz."""
 
 MISSED_LIMIT = 0.02
-"""Largest share of missing samples (missed ticks of the control loop): the limit of a trial in the shipped
-protocols."""
+"""Largest share of missing samples (missed ticks of the control loop) of a signal: the `missed_ticks_limit` of the
+shipped protocols."""
 
 
 class NotMeasurableError(ValueError):

@@ -27,7 +27,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 IntArray = npt.NDArray[np.int64]
 
-AXES = "xyz"
+AXES = "xyz"  # names of the axes, by index
 FIRST_PROBES = 2
 """Number of reference probes at each level, before anything is compared: their differences give the noise."""
 PENALTY_PER_PARAMETER = 8.0
@@ -40,13 +40,13 @@ deviates from the law, the ratio of grip to gain is 1.2 to 1.7 when the hand's i
 DELAY_ITERATIONS = 3
 """Gauss-Newton steps for the delay, of which the response is a nonlinear function."""
 Z_LIMIT = 4.0
-"""Standard errors beyond which a change is significant."""
+"""Standard errors beyond which a change is significant; chosen by hand, against false alarms."""
 
 CAUSES = {"friction": ("friction",), "grip": ("mass", "damping", "stiffness"), "gain": ("gain",), "delay": ("delay",)}
 PARAMETERS = ("friction", "mass", "damping", "stiffness", "gain", "delay")
 PARAMETER_UNITS = {"friction": "N", "mass": "kg", "damping": "N s/m", "stiffness": "N/m", "gain": "", "delay": "s"}
 LEAST_CHANGE = {"friction": 0.03, "mass": 0.01, "damping": 0.5, "stiffness": 15.0, "gain": 0.03, "delay": 3e-4}
-"""Least reported changes, in the unit of each parameter: 3 % of a stimulus of 1 N, a tenth of a light grip, 0.3 ms."""
+"""Least reported changes, in `PARAMETER_UNITS`: 3 % of a stimulus of 1 N or of the gain, a tenth of a light grip."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ class TimedProbe:
 
     time_s: float
     """Time since the session began."""
-    level_n: float
+    level_n: float  # amplitude of the excitation, N
     lines: ProbeLines
 
 
@@ -68,10 +68,9 @@ class Drift:
     parameter: str
     """friction, mass, damping, stiffness, gain or delay"""
     axis: str  # x, y or z; empty for a delay
-    time_s: float
-    change: float
-    error: float
-    """Standard error of the change."""
+    time_s: float  # of that probe, since the session began
+    change: float  # since the first probes, in `unit`
+    error: float  # standard error of the change
     initial_value: float | None
     """Initial value of the friction (N); None for other parameters, of which only the change is known."""
     rivals: tuple[str, ...] = ()
@@ -84,11 +83,11 @@ class Drift:
 
 
 def find_drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str] = tuple(CAUSES)) -> tuple[Drift, ...]:
-    """Find the significant changes from the first probes of each level to its newest one. Empty where a level has no
-    probe after its `FIRST_PROBES`. probes: by rising time. period: samples. causes: of `CAUSES`; without a hand no
-    grip."""
-    levels = sorted({probe.level_n for probe in probes})
-    probes_by_level = {level: [probe for probe in probes if probe.level_n == level] for level in levels}
+    """Find the significant changes from the first probes of each level to its newest one. Empty without probes, or
+    where a level has none after its `FIRST_PROBES`. probes: by rising time. period: in samples. causes: of `CAUSES`; no
+    grip without a hand."""
+    levels_n = sorted({probe.level_n for probe in probes})
+    probes_by_level = {level_n: [probe for probe in probes if probe.level_n == level_n] for level_n in levels_n}
     if not probes or min(len(level_probes) for level_probes in probes_by_level.values()) < FIRST_PROBES + 1:
         return ()
     first_probes = [probe for level_probes in probes_by_level.values() for probe in level_probes[:FIRST_PROBES]]
@@ -110,7 +109,7 @@ def find_drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str]
 
 
 def _estimate_delay(comparison: _Comparison, time_s: float) -> Drift:
-    """A delay as the only cause, with its standard error; its `change` is 0."""
+    """Estimate the standard error of a delay that is the only cause; the `change` of the result is 0."""
     standard_error_s = float(_fit_causes(comparison, ("delay",))[2][0])
     return Drift("delay", "delay", "", time_s, 0.0, standard_error_s, None)
 
@@ -130,7 +129,8 @@ class _Comparison:
 def _compare_probes(
     probes: Sequence[TimedProbe], shapes: ComplexArray, levels_n: FloatArray, delay_s: float
 ) -> _Comparison:
-    """Regression of the newest probes on the first ones, which come before. shapes: see `compute_friction_spectra`."""
+    """Build the regression. probes: the first ones of all levels, then the newest one of each. shapes: of friction, by
+    `compute_friction_spectra`. delay_s: added delay of the newest probes that was found before and is removed."""
     line_indices, axes = np.nonzero(probes[0].lines.driven)
     w = 2 * np.pi * probes[0].lines.frequency_hz[line_indices]
     acceleration = np.array([probe.lines.acceleration_mps2[line_indices] for probe in probes])
@@ -144,7 +144,7 @@ def _compare_probes(
     first_indices = {level: np.flatnonzero(levels_n[:first_count] == level) for level in set(levels_n.tolist())}
 
     def average_first(values: ComplexArray, requested_levels_n: FloatArray) -> ComplexArray:
-        """Mean over the first probes of each requested level; linear in responses to the same force."""
+        """Average the first probes of each requested level: responses to the same force."""
         return np.array([values[first_indices[level]].mean(axis=0) for level in requested_levels_n])
 
     newest = slice(first_count, None)
@@ -176,8 +176,8 @@ def _compute_columns(
     axes: IntArray,
     products: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> dict[tuple[str, int], ComplexArray]:
-    """Change of the difference per unit of each parameter, (probes, lines), by parameter and axis. The delay is common
-    to all axes and stored as axis 0."""
+    """Compute the difference per unit of each parameter, (probes, lines), by parameter and axis; of the delay, common
+    to all axes, as axis 0. products: numerators for motion and friction, denominator A0_j A_j."""
     motion_product, friction_product, product = products
     columns: dict[tuple[str, int], ComplexArray] = {("delay", 0): 1j * w * apparent_mass}
     for axis in range(3):
@@ -193,8 +193,8 @@ def _compute_columns(
 def _estimate_first_friction(
     apparent_mass: ComplexArray, shapes: ComplexArray, driven: tuple[ComplexArray, IntArray], count: int
 ) -> tuple[FloatArray, ComplexArray]:
-    """Friction (N) along each axis at the first probes, and its shapes, (probes, lines, axes), with the break-away that
-    fits best: the level-dependent part of the apparent mass is fitted, its mean over the levels is subtracted."""
+    """Estimate the friction (N) of each axis at the `count` first probes, and its shapes (probes, lines, axes), with
+    the break-away length that best fits the apparent mass less its mean over the levels."""
     driven_acceleration, axes = driven
     apparent_mass = apparent_mass[:count]
     best_fit = (np.inf, np.zeros(3), shapes[0])
@@ -216,11 +216,11 @@ def _estimate_first_friction(
 
 
 def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ...]) -> Iterator[Drift]:
-    """The significant changes of the parameters of the best set of causes."""
+    """Select the set of at most `MAX_CAUSES` causes with the least cost, and yield its significant changes."""
     equation_count = 2 * len(comparison.difference)
-    # The misfit that all causes together leave beyond the noise raises every standard error.
+    # Reduced chi-squared of all causes together, at least 1: it multiplies the variances of all estimates.
     inflation = max(1.0, _fit_causes(comparison, causes)[0] / max(1, equation_count - len(_list_parameters(causes))))
-    misfit = {
+    misfits = {
         cause_set: _fit_causes(comparison, cause_set)[0]
         for cause_count in range(MAX_CAUSES + 1)
         for cause_set in combinations(causes, cause_count)
@@ -228,14 +228,14 @@ def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ..
 
     def compute_cost(cause_set: tuple[str, ...]) -> float:
         # Squared misfit while that is at the noise level, else its logarithm, as of a noise of unknown variance.
-        scaled_misfit = misfit[cause_set] / inflation
+        scaled_misfit = misfits[cause_set] / inflation
         return PENALTY_PER_PARAMETER * len(_list_parameters(cause_set)) + (
             equation_count * float(np.log(scaled_misfit / equation_count))
             if scaled_misfit > equation_count
             else scaled_misfit - equation_count
         )
 
-    best_causes = min(misfit, key=compute_cost)
+    best_causes = min(misfits, key=compute_cost)
     _, values, errors = _fit_causes(comparison, best_causes)
     for (parameter, axis), value, error in zip(_list_parameters(best_causes), values, errors, strict=True):
         inflated_error = float(error * np.sqrt(inflation))
@@ -251,12 +251,12 @@ def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ..
                 float(value),
                 inflated_error,
                 initial_n,
-                _find_rivals(cause, best_causes, misfit),
+                _find_rivals(cause, best_causes, misfits),
             )
 
 
-def _find_rivals(cause: str, best_causes: tuple[str, ...], misfit: dict[tuple[str, ...], float]) -> tuple[str, ...]:
-    """Causes that, in place of this one, leave less than `RIVAL_RATIO` times its squared misfit."""
+def _find_rivals(cause: str, best_causes: tuple[str, ...], misfits: dict[tuple[str, ...], float]) -> tuple[str, ...]:
+    """Find the causes that, in place of this one, leave less than `RIVAL_RATIO` times its squared misfit."""
     alternatives = {
         candidate: tuple(
             kept_cause
@@ -269,12 +269,12 @@ def _find_rivals(cause: str, best_causes: tuple[str, ...], misfit: dict[tuple[st
     return tuple(
         candidate
         for candidate, cause_set in alternatives.items()
-        if misfit.get(cause_set, np.inf) < RIVAL_RATIO * misfit[best_causes]
+        if misfits.get(cause_set, np.inf) < RIVAL_RATIO * misfits[best_causes]
     )
 
 
 def _fit_causes(comparison: _Comparison, causes: tuple[str, ...]) -> tuple[float, FloatArray, FloatArray]:
-    """Squared misfit over noise, the fitted parameters, and their standard errors."""
+    """Compute the squared misfit over the noise, the fitted parameters, and their standard errors."""
     y = _stack_real_imaginary(comparison.difference) * np.sqrt(2)  # each part has half of the noise's power
     parameters = _list_parameters(causes)
     if not parameters:
@@ -289,12 +289,12 @@ def _fit_causes(comparison: _Comparison, causes: tuple[str, ...]) -> tuple[float
 
 
 def _list_parameters(causes: tuple[str, ...]) -> tuple[tuple[str, int], ...]:
-    """Parameters of these causes with their axes; a delay is common to all axes."""
+    """List the parameters of these causes with their axes; a delay, common to all axes, with axis 0."""
     parameters = [parameter for cause in causes for parameter in CAUSES[cause]]
     return tuple((parameter, axis) for parameter in parameters for axis in range(1 if parameter == "delay" else 3))
 
 
 def _stack_real_imaginary(values: ComplexArray) -> FloatArray:
-    """(2 n,): real parts of n values of any shape, then their imaginary parts."""
-    flat = values.ravel()
-    return np.concatenate([flat.real, flat.imag])
+    """Stack (2 n,): real parts of n values of any shape, then their imaginary parts."""
+    flattened = values.ravel()
+    return np.concatenate([flattened.real, flattened.imag])

@@ -42,7 +42,7 @@ from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.search_by_simulation import SearchOutcome, make_search_context, search_by_simulation
-from analysis.diagnosis.settings import FAULT_BEYOND
+from analysis.diagnosis.settings import FAULT_GAIN_FACTOR
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -62,10 +62,11 @@ def diagnose(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """Findings about the physics that the model lacks. recordings: of one device, with the same channels, units and
-    rate; not checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description
-    of the current step and the share that is done, 0 to 1. Raises IncomparableRecordingsError where clean recordings
-    cannot be compared."""
+    """Diagnose the physics that the model lacks. recordings: of one device, with the same channels, units and rate; not
+    checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description of the
+    current step and the completed fraction, 0 to 1 (a rough
+    estimate). Raises IncomparableRecordingsError where clean recordings cannot be
+    compared."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("testing laws in the force balance", 0.0)
@@ -90,7 +91,7 @@ def _diagnose_by_balance(
     progress: Progress,
     balances: "tuple[Balance, ...]",
 ) -> Findings | None:
-    """Findings with the laws that the force balances name; None where they name none, or simulations confirm none."""
+    """Diagnose the laws that the force balances name; None where they name none, or simulations confirm none."""
     # Imported on demand, to shorten the start of the program: a diagnosis with a given model does not need them.
     from analysis.diagnosis.confirm.confirm_laws import has_open_parameter, search_by_balance
     from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measures
@@ -98,8 +99,8 @@ def _diagnose_by_balance(
     for measure_index, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
         progress("fitting the named laws", 0.2 + 0.3 * measure_index)
         context = make_search_context(recordings[0], fitting, settings, map_)
-        repeats = all(floor.method == "repeats" for floor in fitting.chosen.floors)
-        search_laws = partial(search_by_balance, context, balances, repeats)
+        noise_known = all(floor.method == "repeats" for floor in fitting.chosen.floors)
+        search_laws = partial(search_by_balance, context, balances, noise_known)
         result = settings.guard.run(BALANCE, "the fit of its laws", search_laws, None)
         if result is not None and not (fitting.narrow and has_open_parameter(result)):
             return _assemble(recordings, settings, fitting, SearchOutcome(result, ModelErrorFloor()), balances)
@@ -114,7 +115,7 @@ def _diagnose_by_model(
     progress: Progress,
     balances: "tuple[Balance, ...]" = (),
 ) -> Findings:
-    """Findings by a search with simulations of the model. balances: force balances, where the model was fitted to the
+    """Diagnose by a search with simulations of the model. balances: force balances, where the model was fitted to the
     recordings."""
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and balances:
@@ -140,13 +141,13 @@ def _diagnose_with_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """Findings by comparison with the clean recordings, or by a search with simulations of a given model.
+    """Diagnose by comparison with the clean recordings, or by a search with simulations of a given model.
 
     The search is used where the model predicts the clean recordings well or the noise is known from repeats, unless the
     comparison contradicts its result; otherwise where the comparison names no fault.
     """
     # Imported on demand: only some diagnoses have clean recordings.
-    from analysis.diagnosis.reference.compare_with_reference import find_contrast, noise_is_from_repeats, predicts_clean
+    from analysis.diagnosis.reference.compare_with_reference import find_contrast, is_noise_from_repeats, predicts_clean
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
     from analysis.diagnosis.result.contrast_findings import add_contrast
 
@@ -155,7 +156,7 @@ def _diagnose_with_clean(
     contrast = find_contrast(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if is_too_short_to_name(recordings):
         contrast = contrast.withdraw_name(TOO_SHORT_TO_NAME)
-    if not settings.fitted and (noise_is_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
+    if not settings.fitted and (is_noise_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
         findings_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
         diagnosis_by_model = findings_by_model.diagnosis
         names = frozenset(name for effect in diagnosis_by_model.effects for name in (effect.effect, *effect.class_))
@@ -171,13 +172,13 @@ def _diagnose_with_clean(
         ModelErrorFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     )
     findings = _assemble(recordings, settings, fitting, SearchOutcome(given_result, floor), ())
-    return add_contrast(findings, contrast, recordings[0], FAULT_BEYOND)
+    return add_contrast(findings, contrast, recordings[0], FAULT_GAIN_FACTOR)
 
 
 def _evaluate_given_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchResult:
-    """Error of the given model without effects, as a search result that names nothing."""
+    """Evaluate the given model without effects, as a search result that names nothing."""
     context = make_search_context(recordings[0], fitting, settings, map_)
     given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     candidate = context.with_test_score(context.score_fit(given_fit))
@@ -192,7 +193,7 @@ def _search_with_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings | None:
-    """Findings by a search with clean recordings as the floor of the model error. tested_effects: effects that the
+    """Diagnose by a search with clean recordings as the floor of the model error. tested_effects: effects that the
     comparison tested and did not find; the search leaves them out. None where it names no effect, or cannot be done."""
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
     search_settings = replace(settings, without=(*settings.without, *tested_effects))
@@ -211,7 +212,7 @@ def _search_with_clean(
 def _compute_balances(
     recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper
 ) -> "tuple[Balance, ...]":
-    """Force balances of the recordings, one per command; none where the guard caught a crash."""
+    """Compute the force balances of the recordings, one per command; none where the guard caught a crash."""
     # Imported on demand: a diagnosis with a given model computes its balances in `decide_with_model`.
     from analysis.diagnosis.balance.balances import find_balances
     from analysis.diagnosis.balance.free_laws import FREE_LAWS
@@ -224,9 +225,9 @@ def _compute_balances(
 def _judge_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, outcome: SearchOutcome, settings: DiagnosisSettings
 ) -> "tuple[SearchOutcome, tuple[Balance, ...]]":
-    """The outcome after the decision by held-out gain, and the force balances with the model as their base. The outcome
-    is unchanged, without balances, where nothing remains unexplained, or where a statistic of the response such as band
-    power was compared."""
+    """Decide by held-out gain which effects of an outcome are named; also returns the force balances with the model as
+    their base. The outcome is unchanged, without balances, where nothing remains unexplained, or where a statistic of
+    the response such as band power was compared."""
     result = outcome.result
     if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
         return outcome, ()
@@ -234,8 +235,8 @@ def _judge_with_model(
     from analysis.diagnosis.confirm.decide_with_model import ResultWithModel, decide_with_model
 
     decide = partial(decide_with_model, recordings, fitting, result, settings.time_left)
-    decided = settings.guard.run(BALANCE, "its weighing", decide, ResultWithModel(result))
-    return replace(outcome, result=decided.result), decided.balances
+    decision = settings.guard.run(BALANCE, "its weighing", decide, ResultWithModel(result))
+    return replace(outcome, result=decision.result), decision.balances
 
 
 def _assemble(
@@ -245,7 +246,8 @@ def _assemble(
     outcome: SearchOutcome,
     balances: "Sequence[Balance]",
 ) -> Findings:
-    """The findings from the outcome of a search: named effects, candidates, maps of states, errors, remarks."""
+    """Assemble the findings from the outcome of a search: named effects, candidates, maps of states, errors,
+    remarks."""
     result, names = outcome.result, name_parts(recordings, settings.names)
     explanation = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
     findings = assemble_findings(replace(result, found=explanation), fitting.chosen.floors, names, outcome.floor)
@@ -255,8 +257,8 @@ def _assemble(
         diagnosis = add_balances_with_fitted_model(findings.diagnosis, balances, channels, unconfirmed)
     else:
         diagnosis = add_balances_with_given_model(findings.diagnosis, balances, unconfirmed, channels)
-    draw_maps = partial(compute_state_maps, diagnosis, balances, findings.evidence, recordings[0])
-    maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its making", draw_maps, ())
+    compute_maps = partial(compute_state_maps, diagnosis, balances, findings.evidence, recordings[0])
+    maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its making", compute_maps, ())
     guard_remarks = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear_remarks = describe_linear_terms(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
     remarks = tuple(

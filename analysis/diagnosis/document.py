@@ -2,8 +2,8 @@
 
 The data classes define the fields and check that they agree (a verdict with its effects, an effect with the
 vocabulary). Shares and probabilities are from 0 to 1; errors are root mean square over the channels, normalised to the
-signal. The docstrings of the data classes are published as descriptions in the JSON Schema.
-`study.store.formats.diagnosis_file` reads and writes the file.
+signal. The docstrings of the data classes are published as descriptions in the JSON Schema. `result.assemble_findings`
+makes the document; `study.store.formats.diagnosis_file` reads and writes the file.
 """
 
 import json
@@ -16,8 +16,8 @@ from equalizer.laws.law import ActsOn, Law, parse_law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, Place
 from equalizer.signals.listed_problems import ListedProblemsError
 
-FORMAT, VERSION = "hapteq-diagnosis", 1
-STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
+FORMAT, VERSION = "hapteq-diagnosis", 1  # of the file
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)  # no unknown keys, NaN or infinity
 
 Verdict = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained"]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -39,7 +39,7 @@ class FoundLaw:
     expression: Annotated[str, Field(description="Formula in the language of laws (docs/formats.md), in SI.")]
     variables: Annotated[tuple[str, ...], Field(description="Signals that the formula uses.")]
     acts_on: Annotated[ActsOn, Field(description="force: the law is added to it; command, response: replaced by it.")]
-    axis: str
+    axis: str  # axis or channel on which it acts
 
     @model_validator(mode="after")
     def _require_valid_expression(self) -> Self:
@@ -55,8 +55,8 @@ class FoundLaw:
 class Mismatch:
     """Part of the recording where model and device differ by more than repeats differ."""
 
-    output: str
-    input: str
+    output: str  # channel of the response
+    input: str  # channels of the command, joined by +
     band_hz: tuple[float, float]
     amplitude: float | None
     """Level of the excitation, in the unit of the command; null where all levels are taken together."""
@@ -67,7 +67,7 @@ class Mismatch:
 
     @model_validator(mode="after")
     def _require_rising_band(self) -> Self:
-        """ValueError where the limits of the band are negative or do not rise."""
+        """Raise ValueError where the limits of the band are negative or do not rise."""
         if not 0 <= self.band_hz[0] < self.band_hz[1]:
             raise ValueError(f"band_hz must rise from 0 or more, not {list(self.band_hz)}")
         return self
@@ -83,7 +83,7 @@ class Estimate:
 
     @model_validator(mode="after")
     def _require_rising_interval(self) -> Self:
-        """ValueError where the lower limit of the interval is above the upper one."""
+        """Raise ValueError where the lower limit of the interval is above the upper one."""
         if self.ci95 is not None and self.ci95[0] > self.ci95[1]:
             raise ValueError(f"ci95 must rise, not {list(self.ci95)}")
         return self
@@ -96,7 +96,7 @@ class Rival:
     effect: EffectWord
     probability: Share
     inseparable: Annotated[bool, Field(description="Whether these data cannot distinguish it from the named effect.")]
-    why_not: str
+    why_not: str  # reason, as a clause
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -125,7 +125,8 @@ class NamedEffect:
 
     @model_validator(mode="after")
     def _require_vocabulary_entry(self) -> Self:
-        """ValueError where the effect lacks its law or main parameter, or contradicts its entry in the vocabulary."""
+        """Raise ValueError where the effect lacks its law or main parameter, or contradicts its entry in the
+        vocabulary."""
         if self.law is None and self.effect == DISCOVERED_LAW:
             raise ValueError(f"{DISCOVERED_LAW} lacks its law")
         if self.law is not None and self.effect in EFFECTS_BY_NAME:
@@ -166,9 +167,9 @@ class Candidate:
 class Errors:
     """Errors of one record: given model, re-tuned, with the named effects, and noise known from repeats."""
 
-    before: Rms
-    retuned: Rms
-    after: Rms
+    before: Rms  # of the given model
+    retuned: Rms  # of the re-tuned model
+    after: Rms  # of the model with the named effects
     noise: Rms
 
 
@@ -184,8 +185,8 @@ class Fit:
 class NextExperiment:
     """Recording that would distinguish the rivals."""
 
-    command: str
-    splits: tuple[str, ...]
+    command: str  # description of the command to play
+    splits: tuple[str, ...]  # effects that it distinguishes
     why: str
 
 
@@ -213,7 +214,7 @@ class Diagnosis:
 
     @model_validator(mode="after")
     def _require_consistent_verdict(self) -> Self:
-        """ValueError where the verdict contradicts the effects, the remainder or the mismatch."""
+        """Raise ValueError where the verdict contradicts the effects, the remainder or the mismatch."""
         named = self.verdict in ("explained", "partly_explained")
         if named != bool(self.effects):
             raise ValueError(
@@ -233,7 +234,7 @@ class Diagnosis:
 
 
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The diagnosis as JSON values, without format and version. Empty optional entries are left out."""
+    """Convert the diagnosis to JSON values, without format and version. Empty optional entries are left out."""
     document: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
     effects, candidates = document["effects"], document["candidates"]
     optional_entries = [(effect, optional_key) for effect in effects for optional_key in ("class", "held_out_gain")]
@@ -260,12 +261,12 @@ def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
 
 
 def build_diagnosis_schema() -> dict[str, Any]:
-    """JSON Schema of what `diagnosis_to_json` gives."""
+    """Build the JSON Schema of what `diagnosis_to_json` returns."""
     return _ADAPTER.json_schema(mode="serialization")
 
 
 def _list_inseparable(effect: NamedEffect) -> tuple[str, ...]:
-    """Names of the rivals that the data cannot distinguish from the effect."""
+    """List the names of the rivals that the data cannot distinguish from the effect."""
     return tuple(rival.effect for rival in effect.rivals if rival.inseparable)
 
 
@@ -274,7 +275,7 @@ _PYDANTIC_MESSAGES = {"unexpected_keyword_argument": "this key is unknown", "mis
 
 
 def _format_problem(entry_path: tuple[str | int, ...], message: str) -> str:
-    """The message after the path of the entry; without a path for the whole document."""
+    """Format a message after the path of its entry; without a path for the whole document."""
     joined_path = ".".join(str(key) for key in entry_path)
     text = message.removeprefix("Value error, ")
     return f"{joined_path}: {text}" if joined_path else text
@@ -284,7 +285,7 @@ _ADAPTER: TypeAdapter[Diagnosis] = TypeAdapter(Diagnosis)
 
 
 def make_found_law(law: Law) -> FoundLaw:
-    """A law as an entry of the document: formula with values, variables, what it acts on, and axis."""
+    """Convert a law to an entry of the document: formula with values, variables, what it acts on, and axis."""
     return FoundLaw(law.text, law.variables, law.acts_on, law.axis)
 
 

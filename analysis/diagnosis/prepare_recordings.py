@@ -1,9 +1,10 @@
-"""Prepares recordings for the comparison with a model; the same for recordings from files and from arrays.
+"""Prepare recordings for the comparison with a model, whether they come from files or from arrays.
 
-In this order: segments are found where a recording states none, commands and responses are brought into the form that a
-force balance needs (only where no model says what they are), motions become force-driven, short gaps in commands are
-interpolated and long ones cut out; then unsuitable recordings are refused, and constant positions are left out. Used
-by `diagnose_values` and `diagnosis_input`.
+In this order: segments are found where a recording states none; commands and responses are brought into the form that a
+force balance needs (only where no model was given); recordings with an imposed motion become force-driven; short gaps
+in commands are interpolated and long ones cut out; unsuitable recordings are refused; positions and conditions that not
+all recordings contain are removed, then constant positions. Called by `diagnose_values`, `diagnosis_input`,
+`clean_recordings` and `study.evaluation.real.diagnose_real`.
 """
 
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, find_runs
 
 CONSTANT_RANGE = 1e-9
-"""Range of a signal over its largest magnitude, below which changes are rounding errors."""
+"""Range of a signal over its largest magnitude, up to which changes count as rounding errors. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,58 +38,65 @@ class PreparedRecordings:
 def prepare_recordings(
     recordings: Sequence[Recording], names: Sequence[str], without_model: bool, accept_short: bool | None = None
 ) -> PreparedRecordings:
-    """Prepare recordings. recordings: with the same channels, units and rate, in the order of names. without_model:
-    convert them to one motion per force (no model was given). accept_short: few cycles or samples are a remark instead
-    of a refusal; None = the value of without_model. Raises NothingToDiagnose for unsuitable recordings."""
-    segmented = [find_segments(recording) for recording in recordings]
-    found_repeats = [(name, text) for name, (_, text) in zip(names, segmented, strict=True) if text]
-    repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in found_repeats)
-    with_segments = tuple(recording for recording, _ in segmented)
-    force_recordings: tuple[Recording, ...] = with_segments
+    """Prepare recordings by all steps of the module docstring. recordings: with the same channels, units and rate, in
+    the order of names. without_model: whether to convert them to one motion per force (no model was given).
+    accept_short: whether few cycles or samples are a remark instead of a refusal; None = the value of without_model.
+    Raises NothingToDiagnose for unsuitable recordings."""
+    segment_results = [find_segments(recording) for recording in recordings]
+    repeat_texts = [(name, text) for name, (_, text) in zip(names, segment_results, strict=True) if text]
+    repeat_remarks = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in repeat_texts)
+    segmented_recordings = tuple(recording for recording, _ in segment_results)
+    force_recordings: tuple[Recording, ...] = segmented_recordings
     omission_remarks: tuple[str, ...] = ()
     if without_model:
         # Imported here: a given model says which motion each force drives.
         from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 
-        force_recordings, omission_remarks = convert_to_driven_motions(with_segments)
-    driven, gaps = bridge_gaps(convert_all_to_force_driven(force_recordings), names)
-    compared = prepare_comparison(driven, names, without_model if accept_short is None else accept_short)
-    return PreparedRecordings(compared.recordings, (*repeats, *omission_remarks, *gaps, *compared.remarks))
+        force_recordings, omission_remarks = convert_to_driven_motions(segmented_recordings)
+    force_driven, gap_remarks = bridge_gaps(convert_all_to_force_driven(force_recordings), names)
+    prepared = prepare_comparison(force_driven, names, without_model if accept_short is None else accept_short)
+    return PreparedRecordings(
+        prepared.recordings, (*repeat_remarks, *omission_remarks, *gap_remarks, *prepared.remarks)
+    )
 
 
 def prepare_comparison(recordings: Sequence[Recording], names: Sequence[str], accept_short: bool) -> PreparedRecordings:
-    """Only the last two steps (refusal, constant positions), for recordings that are prepared already, such as the
-    trials of a session. Raises NothingToDiagnose for unsuitable recordings."""
+    """Prepare recordings by the last steps only (from the refusal on), for recordings that are prepared already, such
+    as the trials of a session. Raises NothingToDiagnose for unsuitable recordings."""
     require_different(recordings, names)
-    weaknesses = tuple(
+    weakness_remarks = tuple(
         f"{begin_sentence(problem)}." for problem in require_usable_data(recordings, names, accept_short)
     )
-    common = keep_common_signals(recordings)
-    usable = _drop_constant_position(common.recordings)
-    return PreparedRecordings(usable.recordings, (*weaknesses, *common.remarks, *usable.remarks))
+    with_common_signals = keep_common_signals(recordings)
+    with_varying_position = _drop_constant_position(with_common_signals.recordings)
+    return PreparedRecordings(
+        with_varying_position.recordings,
+        (*weakness_remarks, *with_common_signals.remarks, *with_varying_position.remarks),
+    )
 
 
 def keep_common_signals(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings with their positions and conditions; where these are not the same in all, without them and with a
-    remark."""
-    common = _keep_common_conditions(recordings)
-    kinds = {
+    """Remove positions, or conditions, whose channels or units are not the same in all recordings, with a remark."""
+    with_common_conditions = _keep_common_conditions(recordings)
+    position_kinds = {
         None if recording.position is None else (recording.position.channels, recording.position.units)
         for recording in recordings
     }
-    if len(kinds) < 2:
-        return common
-    without_position = _remove_position(common.recordings, "Only some recordings hold the same position channels")
-    return replace(without_position, remarks=(*common.remarks, *without_position.remarks))
+    if len(position_kinds) < 2:
+        return with_common_conditions
+    without_position = _remove_position(
+        with_common_conditions.recordings, "Only some recordings hold the same position channels"
+    )
+    return replace(without_position, remarks=(*with_common_conditions.remarks, *without_position.remarks))
 
 
 def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings with their conditions; where these are not the same in all, without them and with a remark."""
-    conditions = [
+    """Remove the conditions where their channels or units are not the same in all recordings, with a remark."""
+    condition_kinds = [
         None if recording.condition is None else (recording.condition.channels, recording.condition.units)
         for recording in recordings
     ]
-    if len(set(conditions)) < 2:
+    if len(set(condition_kinds)) < 2:
         return PreparedRecordings(tuple(recordings))
     return PreparedRecordings(
         tuple(replace(recording, condition=None) for recording in recordings),
@@ -100,23 +108,28 @@ def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordin
 
 
 def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """The recordings, without positions where one never changes: its errors cannot be normalised to its signal."""
-    positions = [position.position for position in recordings if position.position is not None]
+    """Remove the positions of all recordings where a channel never changes in any of them, with a remark: its errors
+    cannot be normalised to its signal. Gaps (NaN) count as the channel's median."""
+    positions = [recording.position for recording in recordings if recording.position is not None]
     if not positions:
         return PreparedRecordings(tuple(recordings))
-    samples = np.vstack([position.samples for position in positions])
-    filled = np.where(np.isfinite(samples), samples, np.nanmedian(samples, axis=0))
-    is_constant = np.ptp(filled, axis=0) <= CONSTANT_RANGE * np.abs(filled).max(axis=0)
-    constant_channels = [name for name, constant in zip(positions[0].channels, is_constant, strict=True) if constant]
+    samples = np.vstack([recording.samples for recording in positions])
+    filled_samples = np.where(np.isfinite(samples), samples, np.nanmedian(samples, axis=0))
+    is_constant = np.ptp(filled_samples, axis=0) <= CONSTANT_RANGE * np.abs(filled_samples).max(axis=0)
+    constant_channels = [
+        name
+        for name, is_channel_constant in zip(positions[0].channels, is_constant, strict=True)
+        if is_channel_constant
+    ]
     if not constant_channels:
         return PreparedRecordings(tuple(recordings))
     return _remove_position(recordings, f"Position {conjoin(constant_channels)} never changes")
 
 
 def _remove_position(recordings: Sequence[Recording], reason: str) -> PreparedRecordings:
-    """The recordings without positions, and a remark. reason: begins the remark."""
-    reduced = tuple(replace(recording, position=None) for recording in recordings)
-    return PreparedRecordings(reduced, (f"{reason}: the position was left out of the comparison.",))
+    """Remove the positions of all recordings, with a remark. reason: begins the remark."""
+    reduced_recordings = tuple(replace(recording, position=None) for recording in recordings)
+    return PreparedRecordings(reduced_recordings, (f"{reason}: the position was left out of the comparison.",))
 
 
 Stretch = tuple[int, int]
@@ -124,71 +137,78 @@ Stretch = tuple[int, int]
 
 
 def bridge_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """The recordings with gaps (NaN) in their commands interpolated or cut out, and a sentence for each that was
+    """Interpolate gaps (NaN) in the commands or cut them out; returns the recordings, and a sentence for each that was
     changed. A recording of which less than `LEAST_GAPLESS_SHARE` of the known samples would remain is not changed."""
-    bridged = [_bridge_or_cut(recording, name) for recording, name in zip(recordings, names, strict=True)]
-    return tuple(changed for changed, _ in bridged), tuple(remark for _, remark in bridged if remark)
+    bridged_recordings = [
+        _bridge_or_cut_gaps(recording, name) for recording, name in zip(recordings, names, strict=True)
+    ]
+    return tuple(bridged_recording for bridged_recording, _ in bridged_recordings), tuple(
+        remark for _, remark in bridged_recordings if remark
+    )
 
 
-def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
-    """See `bridge_gaps`. The parts between gaps that were cut out are noted in the recording's meta data."""
-    missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
-    if not missing.any() or missing.all():
+def _bridge_or_cut_gaps(recording: Recording, name: str) -> tuple[Recording, str]:
+    """Interpolate or cut out the gaps of one recording (`bridge_gaps`); returns it, and a sentence or "". The parts
+    between gaps that were cut out are stored in the recording's meta as `parts`."""
+    is_missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
+    if not is_missing.any() or is_missing.all():
         return recording, ""
-    gaps = find_runs(missing)
-    interpolated = _interpolate(recording.command.samples)
-    wide = [gap for gap in gaps if not _can_bridge(recording.command.samples, gap[1] - gap[0])]
-    narrow = [gap for gap in gaps if gap not in wide]
-    parts = [part for stretch in find_parts(recording) for part in _list_stretches_between(stretch, wide)]
-    if sum(stop - start for start, stop in parts) < LEAST_GAPLESS_SHARE * int((~missing).sum()):
+    all_gaps = find_runs(is_missing)
+    interpolated_samples = _interpolate_gaps(recording.command.samples)
+    wide_gaps = [gap for gap in all_gaps if not _can_bridge(recording.command.samples, gap[1] - gap[0])]
+    narrow_gaps = [gap for gap in all_gaps if gap not in wide_gaps]
+    parts = [part for stretch in find_parts(recording) for part in _list_stretches_between_gaps(stretch, wide_gaps)]
+    if sum(stop - start for start, stop in parts) < LEAST_GAPLESS_SHARE * int((~is_missing).sum()):
         return recording, ""
-    changed_recording = replace(recording, command=replace(recording.command, samples=interpolated))
-    if wide:
-        stretches = [{"start": start, "stop": stop} for start, stop in parts]
-        changed_recording = replace(changed_recording, meta={**recording.meta, "parts": stretches})
+    changed_recording = replace(recording, command=replace(recording.command, samples=interpolated_samples))
+    if wide_gaps:
+        part_entries = [{"start": start, "stop": stop} for start, stop in parts]
+        changed_recording = replace(changed_recording, meta={**recording.meta, "parts": part_entries})
     texts = [
-        f"{len(kind)} gap{'s' if len(kind) != 1 else ''} ({sum(end - onset for onset, end in kind)} samples) {action}"
-        for kind, action in (
+        f"{len(gaps)} gap{'s' if len(gaps) != 1 else ''} ({sum(end - onset for onset, end in gaps)} samples) {action}"
+        for gaps, action in (
             (
-                narrow,
+                narrow_gaps,
                 "interpolated linearly, because the command hardly deviates from a straight line over so short a time",
             ),
-            (wide, f"cut out, so that {len(parts)} parts are compared separately"),
+            (wide_gaps, f"cut out, so that {len(parts)} parts are compared separately"),
         )
-        if kind
+        if gaps
     ]
     return changed_recording, f"{name} has gaps in the command: {', '.join(texts)}."
 
 
-def _can_bridge(samples: FloatArray, gap: int) -> bool:
-    """Whether a gap of so many samples may be interpolated: straight lines over that length differ from the known
-    command by at most `BRIDGED_GAP_ERROR` of its standard deviation (rms)."""
-    lead_samples, lag_samples = (gap + 1) // 2, (gap + 2) // 2
-    middle = samples[lead_samples : len(samples) - lag_samples]
-    if not len(middle):
+def _can_bridge(samples: FloatArray, gap_samples: int) -> bool:
+    """Whether a gap of gap_samples samples may be interpolated: straight lines over that length differ from the known
+    command by an rms of at most `BRIDGED_GAP_ERROR` of its standard deviation, in every channel. samples: (n, m)."""
+    lead_samples, lag_samples = (gap_samples + 1) // 2, (gap_samples + 2) // 2
+    middle_samples = samples[lead_samples : len(samples) - lag_samples]
+    if not len(middle_samples):
         return False
-    share = lag_samples / (lead_samples + lag_samples)
-    straight_line = share * samples[: len(middle)] + (1 - share) * samples[lead_samples + lag_samples :]
-    errors, spread = middle - straight_line, np.nanstd(samples, axis=0)
+    lag_share = lag_samples / (lead_samples + lag_samples)
+    straight_line = lag_share * samples[: len(middle_samples)] + (1 - lag_share) * samples[lead_samples + lag_samples :]
+    errors, command_deviations = middle_samples - straight_line, np.nanstd(samples, axis=0)
     is_known = np.isfinite(errors).all(axis=1)
-    rms_errors = np.sqrt(np.mean(errors[is_known] ** 2, axis=0)) if is_known.any() else np.full_like(spread, np.inf)
-    return bool(np.all(rms_errors <= BRIDGED_GAP_ERROR * spread))
+    rms_errors = (
+        np.sqrt(np.mean(errors[is_known] ** 2, axis=0)) if is_known.any() else np.full_like(command_deviations, np.inf)
+    )
+    return bool(np.all(rms_errors <= BRIDGED_GAP_ERROR * command_deviations))
 
 
-def _list_stretches_between(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretch]:
-    """The stretches between gaps that are long enough to be compared."""
-    position, stretches = stretch[0], []
+def _list_stretches_between_gaps(stretch: Stretch, gaps: Sequence[Stretch]) -> list[Stretch]:
+    """List the stretches between gaps that have at least `LEAST_SAMPLES` samples."""
+    stretch_start, stretches = stretch[0], []
     for start, stop in (*gaps, (stretch[1], stretch[1])):
-        stretches.append((position, min(max(start, position), stretch[1])))
-        position = max(stop, position)
+        stretches.append((stretch_start, min(max(start, stretch_start), stretch[1])))
+        stretch_start = max(stop, stretch_start)
     return [(start, stop) for start, stop in stretches if stop - start >= LEAST_SAMPLES]
 
 
-def _interpolate(samples: FloatArray) -> FloatArray:
-    """Samples (n, m) with NaN replaced by linear interpolation, channel by channel."""
-    interpolated, indices = np.array(samples), np.arange(len(samples))
-    for column in interpolated.T:
+def _interpolate_gaps(samples: FloatArray) -> FloatArray:
+    """Interpolate NaN in samples (n, m) linearly, channel by channel; unchanged where a channel is all NaN."""
+    interpolated_samples, indices = np.array(samples), np.arange(len(samples))
+    for column in interpolated_samples.T:
         is_known = np.isfinite(column)
         if is_known.any():
             column[:] = np.interp(indices, indices[is_known], column[is_known])
-    return interpolated
+    return interpolated_samples

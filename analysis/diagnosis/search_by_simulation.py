@@ -117,7 +117,7 @@ class _ImpactSearch:
         """catalogue: the effects that may be named."""
         self._fitting, self._catalogue, self._settings, self._progress = fitting, catalogue, settings, progress
         self._play_result: SearchResult | None = None
-        self._searched_step_count = -1
+        self._searched_step_count = -1  # number of effects of the result that was last searched; -1: none yet
 
     def explain_before_third_effect(self, result: SearchResult) -> SearchResult:
         """Return the result with play, where the drive repeats, the mismatch is unexplained, and play explains all of
@@ -175,7 +175,7 @@ def _search_with_learned_error(
 ) -> SearchOutcome:
     """Search while the model error on the clean recordings counts as noise. search_inputs: the shared state, the
     effects to try, and the effects that may be named as sensor faults without a search. Raises
-    IncomparableRecordingsError."""
+    IncomparableRecordingsError where no model error can be learned."""
     from analysis.diagnosis.reference.learn_model_error import learn_model_error
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
     from analysis.diagnosis.reference.search_with_reference import search_with_reference
@@ -196,7 +196,7 @@ def _search(
 ) -> SearchOutcome:
     """Search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
     the model was fitted to the recordings, repeated with a wider bound where needed."""
-    law_searches = FurtherSearches(before_thirds=impact_search.explain_before_third_effect)
+    further_searches = FurtherSearches(before_thirds=impact_search.explain_before_third_effect)
     if settings.discovery and not settings.fitted:
         # Imported here, because only a diagnosis that searches for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
@@ -208,17 +208,17 @@ def _search(
             result_with_play = impact_search.explain_before_third_effect(pair_result)
             is_unchanged = result_with_play.found is pair_result.found
             return (
-                _skip_law_search_with_hum(law_search.add_before_third)(pair_result)
+                _skip_law_search_with_hum(law_search.add_laws_before_third_effect)(pair_result)
                 if is_unchanged
                 else result_with_play
             )
 
-        law_searches = FurtherSearches(
-            _skip_law_search_with_hum(law_search.add_short),
+        further_searches = FurtherSearches(
+            _skip_law_search_with_hum(law_search.add_short_laws),
             explain_before_third_effect,
-            _skip_law_search_with_hum(law_search.add_any),
+            _skip_law_search_with_hum(law_search.add_laws),
         )
-    result = search_effects(context, catalogue, progress, settings.time_left, law_searches)
+    result = search_effects(context, catalogue, progress, settings.time_left, further_searches)
     # A model that was fitted to the recordings has no calibration, hence no bound to widen.
     if not settings.fitted:
         result = repeat_with_wider_bound(context, result, catalogue, progress, settings.time_left)
@@ -252,8 +252,8 @@ def _is_unobservable(name: str, place: str, is_complete_command: bool) -> bool:
 
 
 def has_low_hum(explanation: Explanation) -> bool:
-    """Whether mains hum was placed at a frequency below `LOWEST_MAINS_HZ`: such a spectral line comes from the
-    excitation, not from the power grid."""
+    """Whether the explanation contains mains hum at a frequency below `LOWEST_MAINS_HZ`: such a spectral line comes
+    from the excitation, not from the power grid."""
     placed_effects = explanation.after.fitted.hypothesis.list_placed_effects()
     return any(effect.effect.name == HUM and effect.values["frequency"] < LOWEST_MAINS_HZ for effect in placed_effects)
 

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from analysis.evaluation.blind_test.calibration import Calibration
-from analysis.evaluation.blind_test.detection import EffectDraws, compute_rates_by_size, make_detection_strips
+from analysis.evaluation.blind_test.detection import EffectDraws, collect_effect_draws, compute_rates_by_size
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, create_figure, set_ratio_ticks, style_axes
@@ -24,7 +24,7 @@ OUTCOME_MARKS = {
     "missed": ("X", VERMILLION),
     "invisible": (".", GREY),
 }
-"""Marker and colour of each outcome of a single effect (`Outcome`)."""
+"""Marker and colour of each outcome of a single effect (`detection.classify_outcome`)."""
 NO_NAME_COLUMN = "no name"
 """Column of the confusion matrix for devices of which no effect is named."""
 
@@ -36,7 +36,7 @@ def make_blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibrati
     pictures = []
     if singles:
         pictures += [
-            _make_strips_picture(make_detection_strips(singles)),
+            _make_thresholds_picture(collect_effect_draws(singles)),
             _make_size_picture(singles),
             _make_confusion_picture(singles),
         ]
@@ -45,20 +45,20 @@ def make_blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibrati
     return tuple(pictures)
 
 
-def _make_strips_picture(strips: Sequence[EffectDraws]) -> Picture:
+def _make_thresholds_picture(effects: Sequence[EffectDraws]) -> Picture:
     """Draw the detection thresholds: a row per effect, with the outcome of each device over the effect's strength (0 to
     1)."""
-    figure = create_figure(8.8, 1.3 + 0.21 * len(strips))
+    figure = create_figure(8.8, 1.3 + 0.21 * len(effects))
     axes = figure.add_subplot()
     style_axes(axes)
-    for row, strip in enumerate(strips):
-        for strength, outcome in strip.draws:
+    for row, effect in enumerate(effects):
+        for strength, outcome in effect.draws:
             marker, colour = OUTCOME_MARKS[outcome]
             axes.plot(strength, row, marker, color=colour, markersize=6.5 if marker != "." else 5)
-        if strip.ideal_threshold is not None:
-            axes.vlines(strip.ideal_threshold, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
-    axes.set_yticks(range(len(strips)), labels=[strip.effect.replace("_", " ") for strip in strips])
-    axes.set_ylim(len(strips) - 0.4, -0.6)
+        if effect.ideal_threshold is not None:
+            axes.vlines(effect.ideal_threshold, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
+    axes.set_yticks(range(len(effects)), labels=[effect.effect.replace("_", " ") for effect in effects])
+    axes.set_ylim(len(effects) - 0.4, -0.6)
     axes.set_xlim(-0.03, 1.03)
     axes.set_xlabel("strength, from the weakest that is drawn to the strongest (logarithmic)")
     handles = [
@@ -78,7 +78,7 @@ def _make_strips_picture(strips: Sequence[EffectDraws]) -> Picture:
         "that the effects cause).",
         figure,
         alternative=" ".join(
-            f"{drawn.effect}: {', '.join(f'{size:.2f} {result}' for size, result in drawn.draws)}." for drawn in strips
+            f"{entry.effect}: {', '.join(f'{size:.2f} {result}' for size, result in entry.draws)}." for entry in effects
         ),
     )  # fmt: skip
 

@@ -21,8 +21,8 @@ _MAX_COLUMNS = 6
 """Largest number of frequencies in a row of panels."""
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
 _LINE_STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
-"""Five colours and five dashes of the test directions, in order of appearance; a sixth direction has those of the
-first."""
+"""Five colours and five dashes of the test directions, in order of appearance: direction k has those with the index k
+modulo 5."""
 
 
 def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:

@@ -20,6 +20,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, create_figure, draw_no_data_note, style_axes
 
 _AXES = "xyz"
+"""Names of the axes, in the order of the response's rows and columns."""
 _COLOURS = (BLUE, VERMILLION, GREEN)
 """Colours of the delivered axes x, y, z."""
 _LOWEST_DB, _HIGHEST_DB = -55.0, 12.0

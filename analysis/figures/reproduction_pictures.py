@@ -12,7 +12,7 @@ from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.figures.frequency_bands import make_frequency_bands_picture
 from analysis.figures.picture import Picture
 from analysis.figures.played_responses import make_friction_picture, make_played_responses_picture
-from analysis.figures.study_pictures import make_ellipsoid_picture, study_pictures
+from analysis.figures.study_pictures import draw_study_pictures, make_ellipsoid_picture
 from analysis.figures.transfer_functions import make_transfer_functions_picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.study_analysis import StudyAnalysis
@@ -31,7 +31,7 @@ def make_reproduction_pictures(
     direction_limit_hz: frequency from which directions are no longer perceived, drawn in figure 1."""
     return {
         1: (make_frequency_bands_picture(device.response, device.onset, bands, direction_limit_hz),),
-        2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),
+        2: tuple(picture for picture in draw_study_pictures(study) if picture.name == "thresholds"),
         3: (make_ellipsoid_picture(ellipses),),
         4: (make_transfer_functions_picture(device.response),),
         5: (

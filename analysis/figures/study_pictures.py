@@ -2,6 +2,7 @@
 
 Thresholds by frequency and in other units, psychometric functions of the model, delivered acceleration, staircases, and
 acceleration ellipses. A figure without data is left out; in the report, those of single participants are collapsed.
+Called by `study.workflows.results.analyze_data` and `reproduction_pictures`; exported as `analysis.study_pictures`.
 """
 
 import re
@@ -25,7 +26,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thre
 from analysis.threshold_words import select_threshold_words
 
 
-def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
+def draw_study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
     """Make the pictures of the study, in the order of the report; without those that have no data."""
     pictures = []
     if any(row.complete for row in analysis.thresholds):
@@ -41,7 +42,7 @@ def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult
 
 
 def make_ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
-    """Picture of the acceleration ellipses by frequency, with its caption."""
+    """Make the picture of the acceleration ellipses by frequency, with its caption."""
     return Picture(
         name="ellipsoids",
         title="Acceleration ellipses by frequency",
@@ -55,7 +56,7 @@ def make_ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
 
 
 def _make_thresholds_picture(analysis: StudyAnalysis) -> Picture:
-    """Picture of the thresholds in newtons, with group means and comparison intervals."""
+    """Make the picture of the thresholds in newtons, with group means and comparison intervals."""
     return Picture(
         name="thresholds",
         title="Thresholds by frequency",
@@ -68,7 +69,8 @@ def _make_thresholds_picture(analysis: StudyAnalysis) -> Picture:
 
 
 def _make_units_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """The picture of the thresholds in all units with data, as a list; empty where newtons are the only such unit."""
+    """Make the picture of the thresholds in all units with data, as a list; empty where fewer than two units have
+    data."""
     tables = [
         table
         for table in _list_unit_tables(analysis)
@@ -94,7 +96,7 @@ def _make_units_pictures(analysis: StudyAnalysis) -> list[Picture]:
 
 
 def _list_unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
-    """Tables of thresholds in N, m/s², mm, and dB above the detection threshold, in this order."""
+    """List the tables of thresholds in N, m/s², mm, and dB above the detection threshold, in this order."""
     frequencies_hz = analysis.table.frequencies_hz
     measured = [
         tabulate_thresholds(analysis.thresholds, frequencies_hz, quantity)
@@ -104,9 +106,9 @@ def _list_unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
 
 
 def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """Pictures of the medians by the hierarchical model, then of the psychometric functions of all people together and
-    of each person; empty without a fit."""
-    fit = analysis.primary or analysis.single
+    """Make the pictures of the medians by the hierarchical model and of the psychometric functions of all people
+    together, where that model was fitted, then of those of each person; empty without a fit or without answers."""
+    fit = analysis.primary or analysis.single_persons
     answer_counts = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
     if fit is None or answer_counts is None:
         return []
@@ -145,7 +147,7 @@ def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
 
 
 def _make_medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
-    """Picture of the median thresholds by the hierarchical model, with the direction limit."""
+    """Make the picture of the median thresholds by the hierarchical model, with the direction limit."""
     return Picture(
         name="medians",
         title="Thresholds by the model of all answers",
@@ -164,7 +166,7 @@ def _sanitize_subject_code(subject: str) -> str:
 
 
 def _make_delivered_picture(analysis: StudyAnalysis) -> Picture:
-    """Picture of the delivered acceleration over the commanded level, along and off the direction."""
+    """Make the picture of the delivered acceleration over the commanded level, along and off the direction."""
     return Picture(
         name="delivered",
         title="Delivered acceleration against commanded level",
@@ -176,7 +178,7 @@ def _make_delivered_picture(analysis: StudyAnalysis) -> Picture:
 
 
 def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """A picture per participant with the levels of all runs, collapsed in the report."""
+    """Make a picture per participant with the levels of all runs, collapsed in the report."""
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(

@@ -124,9 +124,8 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     half its 1 % quantile, so that a single low bin does not set it."""
     axes.set_xscale("log")
     axes.set_yscale("log")
-    lowest_hz = (
-        1.0 if bins.frequency_hz[-1] > 1.0 else 0.0
-    )  # if no line is above 1 Hz, as for slow or untimed recordings, all are shown
+    # All lines are shown if none is above 1 Hz, as for slow or untimed recordings.
+    lowest_hz = 1.0 if bins.frequency_hz[-1] > 1.0 else 0.0
     is_in_range = bins.frequency_hz >= lowest_hz
     axes.set_xlim(max(lowest_hz, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
     magnitude = np.abs(

@@ -18,6 +18,7 @@ class Check:
     name: str
     """Name of the check, such as "clipping"."""
     level: Level
+    """Severity of the finding."""
     finding: str
     """Sentence with numbers and units."""
     advice: str = ""

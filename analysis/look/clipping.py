@@ -18,10 +18,10 @@ from equalizer.signals.signal import FloatArray, find_runs
 
 CLIPPING = "clipping"
 """Name of this check."""
-LEAST_SAMPLES = 5
+LEAST_FLAT_SAMPLES = 5
 """Fewest samples at an extreme that count as clipping; also the least length of a run that suffices alone."""
-LEAST_RUNS = 2
-"""Fewest different runs of equal readings at an extreme that count as clipping, unless one has `LEAST_SAMPLES`."""
+LEAST_FLAT_RUNS = 2
+"""Fewest different runs of equal readings at an extreme that count as clipping, unless one has `LEAST_FLAT_SAMPLES`."""
 _LEAST_RISE_STEPS = 3.0
 """Extrapolated rise beyond the extreme, in rounding steps, above which a run counts as clipped."""
 SETTLING_SHARE = 0.4
@@ -67,7 +67,7 @@ def _check_channel(channel: Channel) -> tuple[Check, ...]:
 
 def count_clipped_samples(samples: FloatArray) -> int:
     """Count the samples at the maximum of a clipped signal; 0 where the signal is not clipped there, or too few samples
-    lie there (`LEAST_SAMPLES`, `_LEAST_CROWDING`). samples: (n,), NaN = missing, at least one known. Lower
+    lie there (`LEAST_FLAT_SAMPLES`, `_LEAST_CROWDING`). samples: (n,), NaN = missing, at least one known. Lower
     limits for signals without rounding, relative to the range: 1e-9 (equal values), 1e-6 (rise), 1e-3 (next bin)."""
     filled_samples = np.where(np.isfinite(samples), samples, -np.inf)
     maximum = float(filled_samples.max())
@@ -80,7 +80,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     next_bin_count = int(
         np.sum((filled_samples < maximum - tolerance) & (filled_samples >= maximum - tolerance - bin_width))
     )
-    if is_maximum.sum() < LEAST_SAMPLES or is_maximum.sum() < _LEAST_CROWDING * next_bin_count:
+    if is_maximum.sum() < LEAST_FLAT_SAMPLES or is_maximum.sum() < _LEAST_CROWDING * next_bin_count:
         return 0
     runs = find_runs(is_maximum)
     rises = [_extrapolate_rise(filled_samples, start, stop) for start, stop in runs]
@@ -94,7 +94,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     }
     return (
         int(is_maximum.sum())
-        if len(run_signatures) >= LEAST_RUNS or max(run_lengths, default=0) >= LEAST_SAMPLES
+        if len(run_signatures) >= LEAST_FLAT_RUNS or max(run_lengths, default=0) >= LEAST_FLAT_SAMPLES
         else 0
     )
 

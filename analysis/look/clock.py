@@ -1,4 +1,4 @@
-"""Check the time stamps of a recording against its stated sample rate: gaps, jitter and drift.
+"""Checks of the time stamps of a recording against its stated sample rate: gaps, jitter and drift.
 
 A straight line is fitted by least squares to the stamps over the sample numbers (gaps counted as lost samples). Its
 slope gives the true period, hence the drift in ppm; the deviations from it are the jitter. Without stamps only the

@@ -13,7 +13,8 @@ from analysis.look.channels import Channel, compute_rms
 from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, find_runs
 
-MISSING, CONSTANT, COPIES = "missing samples", "constant channels", "copied channels"
+MISSING_CHECK, CONSTANT_CHECK, COPIES_CHECK = "missing samples", "constant channels", "copied channels"
+"""Names of the checks of this module."""
 _WRONG_MISSING_SHARE = 0.2
 """Share of missing samples above which the check is "wrong" instead of a notice: most analyses cannot use the channel.
 Chosen by hand."""
@@ -21,24 +22,25 @@ _COPY_TOLERANCE = 1e-6
 """Largest rms difference between a channel and its copy, relative to the rms of the copy: rounding in single
 precision."""
 _SUBSET_SIZE = 1000
-"""Approximate number of samples, evenly spaced, that are compared first to save time: most pairs differ in these."""
+"""Approximate number of samples, evenly spaced, that are compared first to save time: most pairs differ in these.
+Chosen."""
 
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
-    """A check of each channel with missing samples; a single "fine" check where no channel has any."""
+    """Check all channels for missing samples: one check per channel that has any, or a single "fine" check."""
     checks = tuple(
         _report_missing_samples(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all()
     )
-    return add_fine_if_none(MISSING, checks, "No sample is missing in any channel.")
+    return add_fine_if_none(MISSING_CHECK, checks, "No sample is missing in any channel.")
 
 
 def _report_missing_samples(channel: Channel, rate_hz: float) -> Check:
-    """The check of a channel with at least one missing sample: "wrong" above `_WRONG_MISSING_SHARE`."""
+    """Report the missing samples of a channel, at least one: "wrong" above `_WRONG_MISSING_SHARE`, else a notice."""
     is_missing = ~np.isfinite(channel.samples)
     count, first_gap = int(is_missing.sum()), int(np.argmax(is_missing))
     longest_gap = max(stop - start for start, stop in find_runs(is_missing))
     return Check(
-        MISSING,
+        MISSING_CHECK,
         "wrong" if count > _WRONG_MISSING_SHARE * len(is_missing) else "notice",
         f"{channel.label} lacks {count} of {len(is_missing)} samples, the first at {first_gap / rate_hz:.4g} s; the "
         f"longest gap is {longest_gap} samples.",
@@ -47,34 +49,38 @@ def _report_missing_samples(channel: Channel, rate_hz: float) -> Check:
 
 
 def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """A check of each constant command or sensor; a single "fine" check if all vary. Conditions and excitations are
-    left out: they may be constant."""
+    """Check commands and sensors for constant values: one check per constant channel, or a single "fine" check.
+    Conditions and excitations are left out: they may be constant."""
     measured = [channel for channel in channels if channel.role not in ("condition", "excitation")]
     checks = tuple(
         _report_constant_channel(channel)
         for channel in measured
         if channel.finite_samples.size and np.ptp(channel.finite_samples) == 0
     )
-    return add_fine_if_none(CONSTANT, checks, "Every command and every sensor changes.")
+    return add_fine_if_none(CONSTANT_CHECK, checks, "Every command and every sensor changes.")
 
 
 def _report_constant_channel(channel: Channel) -> Check:
-    """The check of a constant channel: a notice for a command, "wrong" for a sensor."""
+    """Report a constant channel: a notice for a command, "wrong" for a sensor."""
     text = f"{channel.label} is {channel.format(float(channel.finite_samples[0]))} throughout."
     if channel.role == "command":
-        return Check(CONSTANT, "notice", text, "Its effect cannot be determined; leave it out, or record it driven.")
-    return Check(CONSTANT, "wrong", text, "Check the cable and the map: a working sensor is never exactly constant.")
+        return Check(
+            CONSTANT_CHECK, "notice", text, "Its effect cannot be determined; leave it out, or record it driven."
+        )
+    return Check(
+        CONSTANT_CHECK, "wrong", text, "Check the cable and the map: a working sensor is never exactly constant."
+    )
 
 
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """A check of each channel that is a copy of another, possibly scaled and shifted; a single "fine" check without
-    copies. An excitation may equal its command: without feedback they are the same signal."""
+    """Check for channels that are copies of others, possibly scaled and shifted: one check per pair, or a single "fine"
+    check. An excitation may equal its command: without feedback they are the same signal."""
     checks = tuple(_compare_pairs(channels))
-    return add_fine_if_none(COPIES, checks, "No channel is a copy of another.")
+    return add_fine_if_none(COPIES_CHECK, checks, "No channel is a copy of another.")
 
 
 def _compare_pairs(channels: Sequence[Channel]) -> Iterator[Check]:
-    """A check of each pair of varying channels that are copies: "wrong" if both are commands or responses, else a
+    """Report each pair of varying channels that are copies: "wrong" if each is a command or a response, else a
     notice."""
     changing = [channel for channel in channels if channel.finite_samples.size and np.ptp(channel.finite_samples) > 0]
     for first, second in combinations(changing, 2):
@@ -86,7 +92,7 @@ def _compare_pairs(channels: Sequence[Channel]) -> Iterator[Check]:
         scale_text = "" if abs(scale - 1) < _COPY_TOLERANCE else f" times {scale:.6g}, up to an offset"
         is_suspicious = {first.role, second.role} <= {"command", "response"}
         yield Check(
-            COPIES,
+            COPIES_CHECK,
             "wrong" if is_suspicious else "notice",
             f"{second.label} is {first.label}{scale_text}, sample by sample.",
             "Check the map: two sensors never agree to the last digit; leave one of them out.",
@@ -94,7 +100,7 @@ def _compare_pairs(channels: Sequence[Channel]) -> Iterator[Check]:
 
 
 def _match_channels(first: FloatArray, second: FloatArray) -> float | None:
-    """Scale factor from the first channel to the second, both (n,); None if the second is not a copy."""
+    """Compute the scale factor from the first channel to the second, both (n,); None if the second is not a copy."""
     subset = slice(None, None, max(1, len(first) // _SUBSET_SIZE))
     if len(first) > _SUBSET_SIZE and _fit_scale(first[subset], second[subset]) is None:
         return None
@@ -102,8 +108,8 @@ def _match_channels(first: FloatArray, second: FloatArray) -> float | None:
 
 
 def _fit_scale(values: FloatArray, copy: FloatArray) -> float | None:
-    """Least-squares scale factor from `values` to `copy`, both (n,), about their means; None if the residual exceeds
-    `_COPY_TOLERANCE`, a channel is constant, or fewer than three samples are finite in both."""
+    """Fit the least-squares scale factor from `values` to `copy`, both (n,), about their means; None if the residual is
+    at least `_COPY_TOLERANCE`, a channel is constant, or fewer than three samples are finite in both."""
     is_finite = np.isfinite(values) & np.isfinite(copy)
     if is_finite.sum() < 3:
         return None

@@ -1,8 +1,8 @@
 """One-sided power and cross spectral densities of all channels by Welch's method: averages over Hann windows.
 
 Windows overlap by half; a straight line is subtracted from each. No window spans two stretches of a recording or
-contains a missing sample, so gaps do not leak into the spectra. Used by all checks of `analysis.look` that compare
-channels by frequency.
+contains a missing sample, so gaps do not leak into the spectra. Called by `overview`; used by `driven_band`,
+`gain_and_lag`, `kinematics` and the figures of `overview`.
 
 Reference: Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 """
@@ -20,9 +20,11 @@ _TARGET_WINDOW_COUNT = 12
 """Number of half-overlapping windows to aim for. The estimated coherence of unrelated signals averages 1 / n for n
 independent windows, so coherences near 0.1 mean little here."""
 _SHORTEST_WINDOW_SAMPLES, _LONGEST_WINDOW_SAMPLES = 32, 8192
-"""Shortest and longest window, samples."""
+"""Shortest and longest window, samples. Chosen: shorter ones resolve hardly any frequency; the longest bounds the
+memory."""
 LARGEST_WINDOW_COUNT = 400
-"""Largest number of windows that are averaged, spread over the recording: more take time without benefit."""
+"""Largest number of windows that are averaged, spread over the recording: more take time without benefit. Chosen: the
+coherence of unrelated signals is then below 1 %."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +41,12 @@ class CrossSpectra:
     """Labels of the channels."""
 
     def get_power_density(self, channel_index: int) -> FloatArray:
-        """(lines,): power spectral density of a channel, in its unit² / Hz. channel: its index."""
+        """Return the power spectral density (lines,) of a channel, in its unit² / Hz."""
         density: FloatArray = self.matrix[:, channel_index, channel_index].real
         return density
 
     def compute_coherence(self, first_index: int, second_index: int) -> FloatArray:
-        """(lines,): magnitude-squared coherence of two channels, 0 to 1; 0 where either has no power."""
+        """Compute the magnitude-squared coherence (lines,) of two channels, 0 to 1; 0 where either has no power."""
         amplitude_product = np.sqrt(self.get_power_density(first_index)) * np.sqrt(self.get_power_density(second_index))
         return np.asarray(
             (

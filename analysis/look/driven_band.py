@@ -1,5 +1,5 @@
 """Checks of the excitation: driven frequency band of each command, multiple coherence of each response with all
-commands, and segments without excitation. Called by `overview`.
+commands, and segments without excitation. Called by `overview`; `study.workflows.files` calls `find_silent_segments`.
 
 The multiple coherence of a response with q inputs is S_xy^H S_xx^-1 S_xy / S_yy at each spectral line, between 0 and 1.
 Source: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010, chapter 7. Unrelated signals have, for n averaged
@@ -17,16 +17,18 @@ from analysis.look.cross_spectra import CrossSpectra
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-DRIVEN, COHERENCE = "driven axes", "coherence"
+DRIVEN_CHECK, COHERENCE_CHECK = "driven axes", "coherence"
+"""Names of the checks of this module."""
 LEAST_RELATIVE_DENSITY = 1e-2
-"""Power spectral density, relative to the highest of the command, above which a line is driven."""
+"""Power spectral density, relative to the highest of the command, above which a line is driven. All limits of this
+module are chosen."""
 LEAST_RELATIVE_POWER = 1e-4
 """Power, relative to the strongest command of the same unit, below which a command is not driven."""
 LOW_COHERENCE, POOR_COHERENCE = 0.8, 0.1
 """Coherent share of a response's power below which there is a notice, and below which the check is "wrong" (the channel
 may be a wrong one)."""
 _BROADBAND_KINDS = frozenset({"multisine", "noise", "binary", "sweep", "rest"})
-"""Kinds of segments for which the estimate of coherence by windows is reliable."""
+"""Kinds of segments (`Segment.kind`) for which the estimate of coherence by windows is reliable."""
 _NOTABLE_SHARE = 0.01
 """Least share of a response's power that an octave must contain to be reported."""
 
@@ -36,8 +38,11 @@ class DrivenBand:
     """The frequency band in which a command is driven: from the first to the last driven line."""
 
     command: str
+    """Name of the channel: of a command, or of an excitation."""
     low_hz: float
+    """Frequency of the first driven line."""
     high_hz: float
+    """Frequency of the last driven line."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +51,7 @@ class ResponseCoherence:
     lowest."""
 
     response: str
+    """Name of the response channel."""
     multiple: FloatArray
     """(lines,): share of the response's power that is linear in all commands together, 0 to 1."""
     share: float
@@ -57,8 +63,8 @@ class ResponseCoherence:
 
 
 def find_driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[DrivenBand, ...]:
-    """Driven band of each excitation if excitations were recorded, else of each command. Channels that are not driven
-    are left out."""
+    """Find the driven band of each excitation if an excitation varies, else of each command. Channels that are not
+    driven are left out."""
     role = (
         "excitation"
         if any(_is_varying(candidate) and candidate.role == "excitation" for candidate in channels)
@@ -87,8 +93,9 @@ def _is_varying(channel: Channel) -> bool:
 def estimate_coherences(
     spectra: CrossSpectra, channels: Sequence[Channel], bands: Sequence[DrivenBand]
 ) -> tuple[ResponseCoherence, ...]:
-    """Multiple coherence of each response that varies with all driven commands. Empty if nothing is driven, or if fewer
-    than 2 q + 2 windows were averaged for q inputs."""
+    """Estimate the multiple coherence of each varying response with all driven commands. bands: their driven bands, by
+    the names of the commands. Empty if no command is driven, or if fewer than 2 q + 2 windows were averaged for q
+    inputs."""
     inputs = [
         index
         for index, candidate in enumerate(channels)
@@ -110,8 +117,8 @@ def estimate_coherences(
 
 
 def _estimate_multiple_coherence(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
-    """Multiple coherence (lines,) of the response with the inputs (indices of channels), less its mean for unrelated
-    signals and rescaled, so that it is 0 for these and 1 for a linear relation."""
+    """Estimate the multiple coherence (lines,) of the response with the inputs (indices of channels), less its mean for
+    unrelated signals and rescaled, so that it averages about 0 for these and is 1 for a linear relation."""
     input_spectra = spectra.matrix[:, inputs][:, :, inputs]
     # Diagonal loading: the spectral matrix of collinear commands is singular.
     diagonal_loading = 1e-9 * np.trace(input_spectra, axis1=1, axis2=2).real.clip(min=np.finfo(np.float64).tiny)
@@ -127,7 +134,8 @@ def _estimate_multiple_coherence(spectra: CrossSpectra, inputs: list[int], respo
 
 
 def _find_worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: FloatArray) -> tuple[float, float]:
-    """Geometric centre (Hz) of the octave with the lowest coherent share of power, and that share. All: (lines,)."""
+    """Find the octave with the lowest coherent share of power, of those with at least `_NOTABLE_SHARE` of the power.
+    Returns its geometric centre (Hz) and that share. All arguments: (lines,), at least one line."""
     octaves = np.floor(np.log2(frequency_hz))
     coherence_by_octave = {}
     for octave in np.unique(octaves):
@@ -141,13 +149,13 @@ def _find_worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: F
 
 
 def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:
-    """Checks of the excitation: a notice for each command that is not driven, "wrong" for each segment that states an
-    amplitude without excitation."""
-    driven = {band.command for band in bands}
-    undriven_commands = [name for name in recording.command.channels if name not in driven]
+    """Check the excitation: a notice for each command that is not driven, "wrong" for each segment that states an
+    amplitude without excitation, and a "fine" check with all driven bands, if any."""
+    driven_names = {band.command for band in bands}
+    undriven_commands = [name for name in recording.command.channels if name not in driven_names]
     checks = [
         Check(
-            DRIVEN,
+            DRIVEN_CHECK,
             "notice",
             f"command '{name}' is not driven.",
             "Its effect cannot be determined; leave it out, or record it driven.",
@@ -155,14 +163,17 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
         for name in undriven_commands
     ]
     checks += [
-        Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in find_silent_segments(recording)
+        Check(DRIVEN_CHECK, "wrong", sentence, "Correct the segments.") for sentence in find_silent_segments(recording)
     ]
-    text = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
-    return (*checks, *((Check(DRIVEN, "fine", f"Command {text}."),) if text else ()))
+    bands_text = "; ".join(
+        f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands
+    )
+    return (*checks, *((Check(DRIVEN_CHECK, "fine", f"Command {bands_text}."),) if bands_text else ()))
 
 
 def find_silent_segments(recording: Recording) -> tuple[str, ...]:
-    """A sentence for each segment that states an amplitude, but in which all commands are zero."""
+    """List a sentence for each segment that states an amplitude, but in which all commands are zero. Segments of rest,
+    free motion and impacts have no command and are left out."""
     sentences = []
     for number, segment in enumerate(recording.segments, start=1):
         segment_samples = recording.command.samples[segment.start : segment.stop]
@@ -176,27 +187,32 @@ def find_silent_segments(recording: Recording) -> tuple[str, ...]:
 
 
 def check_coherences(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
-    """A check of each coherence. For single steps, slow signals and feedback controllers, the estimate by windows is
-    unreliable: a notice at most."""
+    """Check each coherence. For other segments than `_BROADBAND_KINDS`, and with feedback controllers, the estimate by
+    windows is unreliable: a notice at most."""
     kinds = {segment.kind for segment in recording.segments}
     is_broadband = bool(kinds) and kinds <= _BROADBAND_KINDS and recording.excitation is None
     return tuple(_check_coherence(coherence, is_broadband) for coherence in coherences)
 
 
 def _check_coherence(coherence: ResponseCoherence, is_broadband: bool) -> Check:
+    """Check the coherence of one response: "wrong" below `POOR_COHERENCE` with a broadband excitation, a notice below
+    `LOW_COHERENCE`, else "fine"."""
     text = (
         f"Of the power of response '{coherence.response}' in the driven band, {coherence.share:.1%} is linear in the "
         f"commands, least around {coherence.lowest_hz:.3g} Hz ({coherence.lowest:.0%})."
     )
     if coherence.share < POOR_COHERENCE and is_broadband:
         return Check(
-            COHERENCE, "wrong", text, "Look for a wrong channel, a large time shift, or an input that was not recorded."
+            COHERENCE_CHECK,
+            "wrong",
+            text,
+            "Look for a wrong channel, a large time shift, or an input that was not recorded.",
         )
     if coherence.share < LOW_COHERENCE:
         return Check(
-            COHERENCE,
+            COHERENCE_CHECK,
             "notice",
             text,
             "Expect noise, a nonlinearity, motion slower than a window, or an input that was not recorded.",
         )
-    return Check(COHERENCE, "fine", text)
+    return Check(COHERENCE_CHECK, "fine", text)

@@ -4,7 +4,7 @@ Two channels that show the same quantity differ by a gain g, negative where a si
 samples: Y(f) = g X(f) exp(-2j pi f L / f_s). Each spectral line gives |g| as the square root of the ratio of the
 powers; the result is the weighted median. L follows from the slope of the cross spectrum's phase over frequency. Only
 coherent lines count, each weighted with its share of the second channel's power. A wrong unit shows as a wrong gain, a
-reversed sign as a negative gain, and a clock error or a filter as a lag.
+reversed sign as a negative gain, and a clock error or a filter as a lag. Called by `kinematics`. All limits are chosen.
 
 Reference: Bendat and Piersol, Random Data (4th ed., 2010), chapters 5 and 6 (cross spectra, coherence, time delays).
 """
@@ -84,9 +84,9 @@ def _estimate_sign_and_lag(
 ) -> tuple[float, float]:
     """Estimate the sign of the gain, and the lag in samples.
 
-    phasors: (lines,), cross spectrum over its magnitude. cycles: (lines,), frequency in cycles per sample. weight:
-    (lines,), of sum 1. The lag L maximises |Re sum(weight phasor exp(2j pi cycles L))|, which is 1 for a pure lag,
-    minus the penalty `_LAG_PENALTY`; a line fitted to the remaining phase refines it.
+    phasors: (lines,), cross spectrum over its magnitude. cycles_per_sample: (lines,), frequency. weight: (lines,), of
+    sum 1. The lag L maximises |Re sum(weight phasor exp(2j pi cycles_per_sample L))|, which is 1 for a pure lag, minus
+    the penalty `_LAG_PENALTY`; a line fitted to the remaining phase refines it.
     """
     lags_samples = np.arange(-LONGEST_LAG_SAMPLES, LONGEST_LAG_SAMPLES + _LAG_STEP_SAMPLES / 2, _LAG_STEP_SAMPLES)
     aligned = np.exp(2j * np.pi * np.outer(lags_samples, cycles_per_sample)) @ (weight * phasors)

@@ -31,11 +31,13 @@ class SegmentLevel:
     number: int
     """Number of the segment from 1; 0 for a recording without segments."""
     kind: str
+    """Kind of excitation (`Segment.kind`)."""
     role: str
-    """Kind of excitation, and role, as in `Segment`."""
+    """Role of the segment (`Segment.role`)."""
     start_s: float
+    """Start from the first sample of the recording (s)."""
     duration_s: float
-    """Start and duration (s)."""
+    """Duration (s)."""
     period: int
     """Samples per period; 0 = not periodic."""
     rms: tuple[float, ...]
@@ -87,9 +89,9 @@ def check_proportionality(levels: Sequence[SegmentLevel], channels: Sequence[Cha
             for command_rms, level in command_levels
             if _find_active_commands(level, command_indices) == active_set and command_rms > 0
         ]
-        if len(comparable_levels) > 1 and max(s for s, _ in comparable_levels) > _LEAST_LEVEL_RATIO * min(
-            s for s, _ in comparable_levels
-        ):
+        if len(comparable_levels) > 1 and max(
+            level_rms for level_rms, _ in comparable_levels
+        ) > _LEAST_LEVEL_RATIO * min(level_rms for level_rms, _ in comparable_levels):
             checks += [
                 _compare_response_gains(comparable_levels, index, response_channel)
                 for index, response_channel in enumerate(channels)

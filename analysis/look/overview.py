@@ -2,7 +2,8 @@
 
 The checks find missing samples, constant or copied channels, clock errors, wrong units, inconsistent kinematics,
 clipping, coarse quantization, offsets, axes without excitation, low coherence and poor repeatability; each gives a
-sentence and advice. Called by `study.workflows.recording.look_at_recordings`; `analysis.reports.look_report` shows it.
+sentence and advice. Called by `study.workflows.recording.look_at_recordings`, exported as `analysis.overview`;
+`analysis.reports.look_report` shows it.
 """
 
 from collections.abc import Sequence
@@ -46,7 +47,7 @@ _SENSOR_ROLES = ("response", "position")
 
 def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
     """Check the quantization of sensor channels: one check per channel whose rms is below `FINE_STEPS` steps, or a
-    single one if there is none. Commands are left out: they may have few values by design."""
+    single "fine" check if there is none. Commands are left out: they may have few values by design."""
     candidates = [_check_channel_resolution(channel) for channel in channels if channel.role in _SENSOR_ROLES]
     checks = tuple(check for check in candidates if check is not None)
     return checks or (Check(RESOLUTION, "fine", "No sensor is limited by the resolution of its converter."),)
@@ -80,12 +81,16 @@ class ChannelSummary:
     """Range, mean, rms and number of missing samples of a channel, in its unit; NaN without finite samples."""
 
     role: str
+    """Role, name, quantity and unit: as in `Channel`."""
     name: str
     quantity: str
     unit: str
     lowest: float
+    """Smallest sample."""
     highest: float
+    """Largest sample."""
     mean: float
+    """Mean of the samples."""
     rms: float
     """Rms about the mean."""
     missing: int
@@ -97,11 +102,15 @@ class Overview(SummaryDisplay):
     """Properties of a recording that need no model: spectra, levels, repeats, consistency and checks."""
 
     name: str
+    """Name of the recording's file."""
     recording: Recording
+    """The recording itself."""
     channels: tuple[Channel, ...]
+    """All channels of the recording."""
     stretches: tuple[Stretch, ...]
     """Parts of the recording that are analysed separately (`find_parts`)."""
     summaries: tuple[ChannelSummary, ...]
+    """Summary of each channel, in the order of `channels`."""
     levels: tuple[SegmentLevel, ...]
     """Rms of each channel in each segment."""
     spectra: CrossSpectra | None
@@ -113,6 +122,7 @@ class Overview(SummaryDisplay):
     pairs: tuple[KinematicPair, ...]
     """Pairs of channels of which the second should be a time derivative of the first."""
     repeats: Repeats
+    """An undeclared period, and the noise between periods."""
     checks: tuple[Check, ...]
     """All checks, sorted by level: "wrong", then "notice", then "fine"."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.look.channels import Channel, compute_rms
 from analysis.look.check import Check, add_fine_if_none
-from equalizer.signals.units import UNSTATED
+from equalizer.signals.units import NO_UNIT
 
 UNITS_CHECK, OFFSETS_CHECK = "units", "static offset"
 """Names of the checks of this module."""
@@ -45,7 +45,7 @@ def _check_channel_unit(channel: Channel) -> Check | None:
     finite_samples = channel.finite_samples
     if not finite_samples.size:
         return None
-    if channel.unit == UNSTATED and channel.role != "condition":
+    if channel.unit == NO_UNIT and channel.role != "condition":
         return Check(
             UNITS_CHECK,
             "notice",
@@ -92,8 +92,9 @@ def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
 
 
 def _check_channel_offset(channel: Channel) -> Check | None:
-    """Check the offset of one channel: "fine" where it is standard gravity within 3 %, else a "notice". None where it
-    is below `LEAST_OFFSET_RATIO` times the rms, or the channel is constant or has no finite sample."""
+    """Check the offset of one channel: "fine" where it is standard gravity within 3 % (as `GRAVITY_MULTIPLE_RANGE`),
+    else a "notice". None where the mean is below `LEAST_OFFSET_RATIO` times the rms, or the channel is constant or has
+    no finite sample."""
     finite_samples = channel.finite_samples
     rms = compute_rms(finite_samples)
     if not finite_samples.size or rms == 0 or abs(float(finite_samples.mean())) < LEAST_OFFSET_RATIO * rms:

@@ -52,6 +52,7 @@ class Repeats:
     period_range: Stretch
     """First and end sample of the range in which that period was detected; (0, 0) without one."""
     noise: tuple[RepeatNoise, ...]
+    """Noise of each segment that repeats; empty where nothing repeats."""
 
 
 def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
@@ -60,10 +61,8 @@ def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
     if any(segment.period for segment in recording.segments):
         return Repeats(0, (0, 0), _compute_repeat_noise(recording, declared=True))
     segment_ranges = [(segment.start, segment.stop) for segment in recording.segments]
-    for ranges in (
-        segment_ranges,
-        list(stretches),
-    ):  # a segment that was split for a test may hold less than two periods
+    # A segment that was split for a test may hold less than two periods: the stretches are searched as well.
+    for ranges in (segment_ranges, list(stretches)):
         start, stop = max(ranges, key=lambda sample_range: sample_range[1] - sample_range[0], default=(0, 0))
         if period := find_period(find_designed_command(recording).samples[start:stop]):
             with_period = replace(recording, segments=(Segment(start, stop, "multisine", 0.0, period),))
@@ -92,7 +91,7 @@ def _compute_repeat_noise(recording: Recording, *, declared: bool) -> tuple[Repe
 
 def check_repeats(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
     """Check the declared periods, an undeclared period, and the noise between repeats. A notice is given where nothing
-    repeats."""
+    repeats and no period is objected to."""
     checks = [check for check in _check_periods(recording) if check is not None]
     if repeats.undeclared_period:
         repeat_count = (repeats.period_range[1] - repeats.period_range[0]) / repeats.undeclared_period

@@ -8,7 +8,8 @@ tested at every frequency), the differences between participants stay in the err
     omega² = (SS_between - (k - 1) MS_within) / (SS_total + MS_within)
 
 References: Fisher, Statistical Methods for Research Workers (1925); Hays, Statistics (1963), for omega².
-Called by `study_analysis`, and by `power.power_curve` for simulated studies.
+Called by `study_analysis`, by `comparisons`, whose tests use its error term, and by `power.power_curve` for simulated
+studies.
 """
 
 import math
@@ -26,7 +27,9 @@ class GroupSummary:
     """Number, mean and standard deviation of a group's values."""
 
     name: str
+    """Name of the group, such as its frequency."""
     n: int
+    """Number of values."""
     mean: float | None
     """None without values."""
     sd: float | None
@@ -35,7 +38,8 @@ class GroupSummary:
 
 @dataclass(frozen=True, slots=True)
 class OneWayAnova:
-    """Result of a one-way ANOVA. Values that the data do not determine are None; `notes` state the reasons."""
+    """Result of a one-way ANOVA by the equations of the module. Values that the data do not determine are None; `notes`
+    state the reasons. Sums of squares (`ss_`) and the mean square are in the squared unit of the values."""
 
     groups: tuple[GroupSummary, ...]
     df_between: int | None
@@ -53,8 +57,8 @@ class OneWayAnova:
 
 def compute_one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
     """Compute a one-way ANOVA over named groups of values, all in one unit. None, NaN and infinite values are left out
-    as missing; groups may differ in size. What the data do not determine is None, with the reason in `notes`; no data
-    raise an exception."""
+    as missing; groups may differ in size. What the data do not determine is None, with the reason in `notes`, also
+    where there are no values at all."""
     samples = {name: _select_finite_values(values) for name, values in groups.items()}
     summaries = tuple(_summarise_group(name, sample) for name, sample in samples.items())
     gap_count = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())

@@ -10,7 +10,8 @@ the log-linear correction is that of M. J. Hautus, Behav. Res. Methods Instrum. 
 
 Sign of the criterion, everywhere in hapteq: c = -(z(H) + z(F)) / 2 (Macmillan and Creelman, equation 2.1), where a hit
 is the answer 1 to a 1 and a false alarm the answer 1 to a 2. So c > 0 is a tendency to answer 2 (in a detection run,
-the second interval), c < 0 a tendency to answer 1. Criteria of simulated participants have the same sign.
+the second interval), c < 0 a tendency to answer 1. Criteria of simulated participants have the same sign. Called by
+`thresholds`, `criterion_drift` and `cues.cue_findings`.
 """
 
 from collections.abc import Sequence
@@ -45,7 +46,9 @@ def estimate_response_bias(directions_shown: Sequence[int], correct: Sequence[bo
 
 
 def compute_criterion_variance(correct_count: int, first_trials: float, second_trials: float) -> float:
-    """Binomial variance of c of an unbiased observer, by the delta method: p (1 - p) / phi(z)^2 (1 / n1 + 1 / n2) / 4.
+    """Compute the binomial variance of c of an unbiased observer by the delta method:
+
+        p (1 - p) / phi(z)^2 (1 / n1 + 1 / n2) / 4
 
     Here p is the share of right answers with the log-linear correction, z = z(p) the common mean of z(H) and -z(F), and
     phi the normal density. correct_count: number of right answers; first_trials, second_trials: n1, n2, trials of each
@@ -56,6 +59,6 @@ def compute_criterion_variance(correct_count: int, first_trials: float, second_t
 
 
 def _compute_corrected_z(answers: Sequence[bool]) -> float:
-    """z of the rate of True with the log-linear correction: 0.5 is added to both counts, so that z is finite for rates
-    of 0 and 1."""
+    """Compute z of the rate of True with the log-linear correction: 0.5 is added to the counts of True and of False, so
+    that z is finite for rates of 0 and 1."""
     return NormalDist().inv_cdf((sum(answers) + 0.5) / (len(answers) + 1.0))

@@ -7,6 +7,7 @@ of freedom nu (P. McCullagh, J. A. Nelder, Generalized Linear Models, 2nd ed. (1
 nu = 3, too few for a precise estimate. A session's dispersion is therefore moderated by the dispersion s0 of all
 sessions of the study, with d0 prior degrees of freedom (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article
 3): (chi squared + d0 s0) / (nu + d0). Above 1 it is an estimate, and the slope is tested by Student's t; else by z.
+Called by `study_warnings`.
 """
 
 import math
@@ -14,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
-from scipy.stats import t as student
+from scipy.stats import t as student_t
 
 from analysis.psychophysics.bias import compute_criterion_variance, estimate_response_bias
 
@@ -28,7 +29,7 @@ class CriterionDrift:
     p: float
     """Two-sided p value of the slope, against no drift."""
     p_without_a_run: float
-    """The largest p value with a single run left out: one unusual run is no drift."""
+    """Largest p value with a single run left out: a slope that rests on one unusual run is no drift."""
 
 
 MIN_RUNS = 4
@@ -38,7 +39,7 @@ PRIOR_DEGREES_OF_FREEDOM = 6
 """Prior degrees of freedom of the dispersion of all sessions (d0 of Smyth), chosen by hand. A session of five runs has
 3 of its own."""
 
-_Point = tuple[float, float, float]
+_RegressionPoint = tuple[float, float, float]
 """A run: number of trials before its middle, criterion c, and weight (inverse of the criterion's binomial variance)."""
 _Run = tuple[Sequence[int], Sequence[bool]]
 """A run's directions shown (1 or 2) and whether each answer was right, as for `estimate_response_bias`."""
@@ -71,9 +72,10 @@ class _LineFit:
     degrees_of_freedom: int
 
 
-def _make_regression_points(runs: Sequence[_Run]) -> list[_Point] | None:
-    """Points of the regression; None with fewer than `MIN_RUNS`."""
-    points, trials_before = list[_Point](), 0
+def _make_regression_points(runs: Sequence[_Run]) -> list[_RegressionPoint] | None:
+    """Make the points of the regression from the runs in which both directions were shown; None with fewer than
+    `MIN_RUNS` of them."""
+    points, trials_before = list[_RegressionPoint](), 0
     for directions, correct in runs:
         if (bias := estimate_response_bias(directions, correct)) is not None:
             points.append(
@@ -87,23 +89,27 @@ def _make_regression_points(runs: Sequence[_Run]) -> list[_Point] | None:
     return points if len(points) >= MIN_RUNS else None
 
 
-def _fit_line(points: Sequence[_Point]) -> _LineFit:
-    """Weighted least squares of the criteria on the number of trials."""
-    total_weight = sum(w for _, _, w in points)
-    mean_position = sum(w * position for position, _, w in points) / total_weight
-    mean_criterion = sum(w * criterion for _, criterion, w in points) / total_weight
-    position_sum_of_squares = sum(w * (position - mean_position) ** 2 for position, _, w in points)
+def _fit_line(points: Sequence[_RegressionPoint]) -> _LineFit:
+    """Fit the criteria over the number of trials by weighted least squares. points: at least three."""
+    total_weight = sum(weight for _, _, weight in points)
+    mean_position = sum(weight * position for position, _, weight in points) / total_weight
+    mean_criterion = sum(weight * criterion for _, criterion, weight in points) / total_weight
+    position_sum_of_squares = sum(weight * (position - mean_position) ** 2 for position, _, weight in points)
     slope = (
-        sum(w * (position - mean_position) * criterion for position, criterion, w in points) / position_sum_of_squares
+        sum(weight * (position - mean_position) * criterion for position, criterion, weight in points)
+        / position_sum_of_squares
     )
     chi_squared = sum(
-        w * (criterion - mean_criterion - slope * (position - mean_position)) ** 2 for position, criterion, w in points
+        weight * (criterion - mean_criterion - slope * (position - mean_position)) ** 2
+        for position, criterion, weight in points
     )
     return _LineFit(slope, slope * math.sqrt(position_sum_of_squares), chi_squared, len(points) - 2)
 
 
-def _test_drift(points: Sequence[_Point], shared_dispersion: float, shared_degrees_of_freedom: int) -> CriterionDrift:
-    """Slope of a session and its tests. shared_dispersion: dispersion of all sessions (s0), with
+def _test_drift(
+    points: Sequence[_RegressionPoint], shared_dispersion: float, shared_degrees_of_freedom: int
+) -> CriterionDrift:
+    """Test the slope of a session. shared_dispersion: dispersion of all sessions (s0), with
     `shared_degrees_of_freedom`."""
     fit = _fit_line(points)
     degrees_of_freedom = fit.degrees_of_freedom + PRIOR_DEGREES_OF_FREEDOM
@@ -119,16 +125,16 @@ def _test_drift(points: Sequence[_Point], shared_dispersion: float, shared_degre
 
 
 def _compute_two_sided_p(z: float, dispersion: float, degrees_of_freedom: int) -> float:
-    """Two-sided p value. A dispersion of 1 or less counts as 1, a known value: normal test; above 1 it is estimated:
-    Student's test. The p value jumps at 1. Student's test throughout would be continuous, but would detect far fewer
-    drifts (docs/statistics.md)."""
+    """Compute the two-sided p value. A dispersion of 1 or less counts as 1, a known value: normal test; above 1 it is
+    estimated: Student's test. The p value jumps at 1. Student's test throughout would be continuous, but would detect
+    far fewer drifts (docs/statistics.md)."""
     if dispersion <= 1.0:
         return 2.0 * NormalDist().cdf(-abs(z))
-    return float(2.0 * student.sf(abs(z) / math.sqrt(dispersion), degrees_of_freedom))
+    return float(2.0 * student_t.sf(abs(z) / math.sqrt(dispersion), degrees_of_freedom))
 
 
 def _compute_variance_without_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
-    """Variance of a run's criterion, computed for both directions at the run's overall share of right answers, as if
+    """Compute the variance of a run's criterion for both directions at the run's overall share of right answers, as if
     there were no bias. With the rates of each direction, runs with a strong bias would get little weight."""
     first_direction_count = sum(direction == 1 for direction in directions_shown)
     return compute_criterion_variance(

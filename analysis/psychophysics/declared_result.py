@@ -24,6 +24,8 @@ NO_DIFFERENCE_NOTE = (
     "It needs two participants with enough answers at both frequencies, and differences that are not all equal."
 )
 NO_PAIR_NOTE = "It needs thresholds at both frequencies, and a spread within frequencies."
+"""Sentences in `ContrastResult.notes`: the first two qualify a result, the other three state why there is none
+(`NO_MODEL_NOTE`, `NO_DIFFERENCE_NOTE`: hierarchical model; `NO_PAIR_NOTE`: one-way analysis)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class ContrastResult:
     p: float | None
     """Two-sided; with Tukey's interval adjusted for all pairs."""
     notes: tuple[str, ...]
+    """Sentences that qualify the result, or state why there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +139,7 @@ def _make_model_contrast(
 
 
 def _explain_missing_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
-    """Explain in a sentence why the model gives no contrast."""
+    """Explain in a sentence why the fitted model gives no contrast of this pair."""
     if set(pair_hz) <= set(primary.far_above_hz):
         return FAR_ABOVE_NOTE
     missing_frequencies = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]

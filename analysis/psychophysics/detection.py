@@ -5,7 +5,8 @@ Sensitivity is d' = (z(H) - z(F)) / sqrt(2). Direction thresholds are then expre
 is censored ("cut") where the force cap limited its staircase (`thresholds.Threshold.censored`).
 
 Source of the two-interval sensitivity: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed.
-(2005), chapter 7. Called by `analysis.psychophysics.study_analysis` for protocols with a detection phase.
+(2005), chapter 7. Called by `study_analysis` for protocols with a detection phase, by `study_warnings`, by
+`analysis.figures.study_pictures` and by `study.workflows.results.session_results`.
 """
 
 import math

@@ -74,8 +74,11 @@ class RepeatedMeasures:
     left_out: tuple[str, ...]
     """Participants with a missing value."""
     conditions: int
+    """Number of conditions, k."""
     df_conditions: int | None
+    """k - 1."""
     df_error: int | None
+    """(n - 1) (k - 1), for n participants."""
     ss_conditions: float | None
     ss_participants: float | None
     ss_error: float | None
@@ -99,7 +102,7 @@ class RepeatedMeasures:
     p_huynh_feldt: float | None = None
     """p-value with both degrees of freedom multiplied by that epsilon."""
     mauchly_w: float | None = None
-    """W of Mauchly's test: 1 under sphericity. None where `compute_mauchly_test` is."""
+    """W of Mauchly's test: 1 under sphericity. None where `compute_mauchly_test` returns None."""
     mauchly_p: float | None = None
     """p-value of Mauchly's test; small where sphericity is violated."""
 

@@ -14,9 +14,9 @@ from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.staircase import (
     StaircaseState,
     begin_staircase,
+    compute_level_n,
     is_complete,
     is_finished,
-    level_n,
     step,
     to_db,
 )
@@ -39,6 +39,7 @@ class Run:
     subject: str
     """Code of the participant."""
     session: str
+    """Identifier of the session."""
     run: int
     """Number of the run in its session."""
     frequency_hz: float
@@ -114,7 +115,7 @@ def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_d
         if trial.phase is Phase.CATCH:
             _refuse_weak_catch_trial(trial, rule)
             continue
-        expected_n = level_n(rule, state)
+        expected_n = compute_level_n(rule, state)
         if not math.isclose(trial.staircase_n, expected_n, rel_tol=LEVEL_TOLERANCE):
             column_name = "level_n" if trial.nominal_n is None else "nominal_n"
             raise InconsistentTrialsError(
@@ -127,8 +128,8 @@ def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_d
 
 
 def _refuse_level_beyond_roving(trial: Trial, rove_db: float) -> None:
-    """Raise InconsistentTrialsError where the level played is farther from the staircase's level than half the roving
-    range; nothing is checked for a trial without a separate staircase level (`nominal_n` None)."""
+    """Raise InconsistentTrialsError where the level played is farther from the staircase's level (`nominal_n`) than
+    half the roving range, or where there is a `nominal_n` without roving. A trial without one is not checked."""
     if trial.nominal_n is None:
         return
     deviation_db = abs(to_db(trial.level_n) - to_db(trial.nominal_n)) if trial.nominal_n > 0 else math.inf
@@ -153,7 +154,7 @@ def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
 
 def _refuse_inconsistent_rows(rows: list[Trial], valid_trials: tuple[Trial, ...]) -> None:
     """Raise InconsistentTrialsError where a run has two frequencies, or valid trials that are doubled or not numbered
-    in sequence."""
+    consecutively; the first may have any number."""
     first_trial = rows[0]
     for trial in rows:
         if trial.frequency_hz != first_trial.frequency_hz:

@@ -3,6 +3,7 @@
 The published analysis (one-way ANOVA of reversal means between groups, with Tukey-Kramer comparisons) is reproduced and
 compared with analyses that fit the design: repeated measures, Friedman's test, and, as primary analysis, a hierarchical
 model of all answers. Equations and sources are in the modules that are called here. Levels are in N, contrasts in dB.
+Called by `study.workflows.results.analyze_data`, `study.workflows.views.view_session` and `reproduce_paper`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -57,7 +58,7 @@ class PracticeRun:
     right: int
     """Number of correct answers among them."""
     right_of_last: int
-    """Correct answers among the last trials that the criterion covers."""
+    """Correct answers among the last `practice.of_last` trials of the protocol, which the criterion covers."""
     passed: bool
     over: bool
     """Whether the run ended by its rule: passed, or its trials used up. False: it was broken off before."""
@@ -66,24 +67,25 @@ class PracticeRun:
 def evaluate_practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
     """Evaluate the practice runs, in the order in which they first occur. Their trials have the phase TRAINING, and
     their run numbers follow those of the training staircases."""
-    first = len(protocol.training.frequencies_hz)
-    practice_numbers = range(first, first + len(protocol.practice.frequencies_hz))
-    grouped: dict[tuple[str, str, int], list[Trial]] = {}
+    first_number = len(protocol.training.frequencies_hz)
+    practice_numbers = range(first_number, first_number + len(protocol.practice.frequencies_hz))
+    trials_by_run: dict[tuple[str, str, int], list[Trial]] = {}
     for trial in trials:
         if trial.phase is Phase.TRAINING and trial.run in practice_numbers:
-            grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
-    return tuple(_evaluate_practice_run(rows, protocol) for rows in grouped.values())
+            trials_by_run.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
+    return tuple(_evaluate_practice_run(rows, protocol) for rows in trials_by_run.values())
 
 
 def _evaluate_practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
-    first, settings = rows[0], protocol.practice
+    """Evaluate the practice run of these trials, at least one, of one subject, session and run number."""
+    first_trial, settings = rows[0], protocol.practice
     valid_trials = sorted((trial for trial in rows if trial.is_valid), key=lambda trial: trial.trial)
     state = PracticeState(tuple(bool(trial.correct) for trial in valid_trials))
     return PracticeRun(
-        subject=first.subject,
-        session=first.session,
-        run=first.run,
-        frequency_hz=first.frequency_hz,
+        subject=first_trial.subject,
+        session=first_trial.session,
+        run=first_trial.run,
+        frequency_hz=first_trial.frequency_hz,
         trials=len(valid_trials),
         right=sum(state.correct),
         right_of_last=count_right_of_last(settings, state),
@@ -107,22 +109,22 @@ class StudyAnalysis(SummaryDisplay):
     table: ThresholdTable
     anova: OneWayAnova
     comparisons: Comparisons
-    within: RepeatedMeasures
-    ranks: FriedmanTest
-    difference: str
+    repeated_measures: RepeatedMeasures
+    friedman: FriedmanTest
+    design_difference: str
     """Difference between the published one-way analysis and the analysis within participants, in words."""
     primary: PrimaryAnalysis | None
     """The hierarchical model of all answers; None with fewer than two participants or two frequencies with answers."""
-    single: SinglePersons | None
+    single_persons: SinglePersons | None
     """Each person's thresholds by maximum a posteriori; None where there is a hierarchical model, or no answer."""
     mean_contrasts: tuple[Contrast, ...]
     """Differences of reversal means (dB) from the lowest frequency with answers, within participants."""
     tobit: tuple[Contrast, ...]
-    """The same contrasts by Tobit's model for values cut by the cap, a sensitivity analysis; empty where none is."""
-    declared: str
+    """The same contrasts by the Tobit model for values cut by the cap, a sensitivity analysis; empty where none is."""
+    declaration: str
     """The analysis that the protocol declares before any data, in words."""
     declared_result: DeclaredResult
-    compared: str
+    comparison_text: str
     """Differences between the published and the primary analysis, in words."""
     warnings: tuple[str, ...]
     detection: tuple[Threshold, ...]
@@ -145,51 +147,52 @@ class StudyAnalysis(SummaryDisplay):
         )
 
 
-def _format_mean(values: Sequence[float | None]) -> str:
-    """Format the mean of the known thresholds (N) and their number."""
-    measured = [value for value in values if value is not None]
-    return f"mean threshold {sum(measured) / len(measured):.3g} N of {len(measured)}" if measured else "no threshold"
+def _format_mean(thresholds_n: Sequence[float | None]) -> str:
+    """Format mean (N) and number of the thresholds that are not None."""
+    known_n = [threshold_n for threshold_n in thresholds_n if threshold_n is not None]
+    return f"mean threshold {sum(known_n) / len(known_n):.3g} N of {len(known_n)}" if known_n else "no threshold"
 
 
 def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Sequence[str] = ()) -> StudyAnalysis:
-    """Thresholds and statistics of trials of one population that followed one protocol.
+    """Compute thresholds, statistics and warnings from trials of one population under one protocol.
 
     left_out: sessions and trials that are not among these, with the reason, in sentences; listed in `declared_result`.
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
-    with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
+    with `split_by_population` first), and InconsistentTrialsError where they contradict the protocol's staircase.
     """
     population, rule = _find_single_population(trials), protocol.staircase
     runs = recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
-    rows = tuple(compute_run_threshold(run, rule) for run in runs)
-    tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
-    table = tabulate_thresholds(rows, protocol.stimulus.frequencies_hz)
+    thresholds = tuple(compute_run_threshold(run, rule) for run in runs)
+    test_trials = tuple(trial for trial in trials if trial.phase is Phase.TEST)
+    table = tabulate_thresholds(thresholds, protocol.stimulus.frequencies_hz)
     detection, catches = compute_detection_thresholds(trials, protocol), tally_catch_trials(trials)
     detection_table = tabulate_thresholds(detection, protocol.detection.frequencies_hz)
-    anova, within = (
+    anova, repeated_measures = (
         compute_one_way_anova(table.group_by_frequency()), analyse_repeated_measures(table.subjects, table.values),
     )  # fmt: skip
-    comparisons, (primary, single) = compare_group_means(anova, CONFIDENCE), _fit_models(tested, protocol)
-    (means, tobit), cues, gaps = (
-        _compute_mean_contrasts(rows, primary, protocol), compute_cue_findings(tested), find_cue_gaps(tested),
+    comparisons, (primary, single_persons) = compare_group_means(anova, CONFIDENCE), _fit_models(test_trials, protocol)
+    (mean_contrasts, tobit), cues, cue_gaps = (
+        _compute_mean_contrasts(thresholds, primary, protocol),
+        compute_cue_findings(test_trials), find_cue_gaps(test_trials),
     )  # fmt: skip
     return StudyAnalysis(
-        protocol=protocol, population=population, trials=tested, runs=runs, thresholds=rows, table=table,
-        anova=anova, comparisons=comparisons, within=within,
-        ranks=compute_friedman_test(table.values),
-        difference=describe_design_difference(anova, within),
+        protocol=protocol, population=population, trials=test_trials, runs=runs, thresholds=thresholds, table=table,
+        anova=anova, comparisons=comparisons, repeated_measures=repeated_measures,
+        friedman=compute_friedman_test(table.values),
+        design_difference=describe_design_difference(anova, repeated_measures),
         primary=primary,
-        single=single, mean_contrasts=means, tobit=tobit,
-        declared=describe_declaration(protocol.analysis),
+        single_persons=single_persons, mean_contrasts=mean_contrasts, tobit=tobit,
+        declaration=describe_declaration(protocol.analysis),
         declared_result=compute_declared_result(protocol.analysis, primary, comparisons, table, left_out, rule),
-        compared=describe_comparison(primary, means, comparisons, table, rule),
+        comparison_text=describe_comparison(primary, mean_contrasts, comparisons, table, rule),
         warnings=(
-            *list_study_warnings(tested, rows, table, protocol),
-            *filter(None, [format_repeat_warning(trials), make_delivery_warning(compute_deliveries(tested)),
-                           *make_cue_warnings(cues, gaps)]),
+            *list_study_warnings(test_trials, thresholds, table, protocol),
+            *filter(None, [format_repeat_warning(trials), make_delivery_warning(compute_deliveries(test_trials)),
+                           *make_cue_warnings(cues, cue_gaps)]),
             *list_catch_and_detection_warnings(catches, detection, table, detection_table),
         ),
         detection=detection, detection_table=detection_table, catches=catches,
-        practice=evaluate_practice_runs(trials, protocol), cues=cues, cue_gaps=gaps,
+        practice=evaluate_practice_runs(trials, protocol), cues=cues, cue_gaps=cue_gaps,
     )  # fmt: skip
 
 
@@ -207,25 +210,25 @@ def _find_single_population(trials: Sequence[Trial]) -> Population | None:
 def _fit_models(
     trials: Sequence[Trial], protocol: StudyProtocol
 ) -> tuple[PrimaryAnalysis | None, SinglePersons | None]:
-    """The hierarchical model; where it has too few participants or frequencies, thresholds of single persons instead.
-    At most one of the two is not None."""
+    """Fit the hierarchical model or, where there are too few participants or frequencies for it, single persons. At
+    most one of the two results is not None; both are None without answers."""
     answers, cap_n = count_answers(trials, protocol.stimulus.frequencies_hz), protocol.staircase.cap_n
     primary = compute_primary_analysis(answers, cap_n, declared_hz=protocol.analysis.contrast_hz)
     return primary, fit_single_persons(answers, cap_n) if primary is None and answers is not None else None
 
 
 def _compute_mean_contrasts(
-    rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
+    thresholds: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
 ) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
-    """Contrasts of the reversal means and of Tobit's model of them (dB). They use the frequencies of the primary model
-    where it exists, so that all contrasts have the same reference, the lowest frequency."""
+    """Compute the contrasts of the reversal means and of the Tobit model of them (dB); both empty without thresholds.
+    They use the frequencies of the primary model where it exists, so that all have the same reference frequency."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
-    table = tabulate_thresholds(rows, frequencies_hz, "threshold_db")
+    table = tabulate_thresholds(thresholds, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
         return (), ()
-    values = np.array(table.values, dtype=np.float64)
-    means = compute_contrasts(table.frequencies_hz, values, CONFIDENCE)
-    return means, compute_tobit_contrasts(table.frequencies_hz, values, np.array(table.censored), CONFIDENCE)
+    values_db = np.array(table.values, dtype=np.float64)
+    contrasts = compute_contrasts(table.frequencies_hz, values_db, CONFIDENCE)
+    return contrasts, compute_tobit_contrasts(table.frequencies_hz, values_db, np.array(table.censored), CONFIDENCE)
 
 
 def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
@@ -244,16 +247,16 @@ def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "coverage": analysis.table.coverage_warning or None,
         "one_way": asdict(analysis.anova),
         "comparisons": asdict(analysis.comparisons),
-        "within_participants": asdict(analysis.within),
-        "friedman": asdict(analysis.ranks),
-        "difference": analysis.difference,
+        "within_participants": asdict(analysis.repeated_measures),
+        "friedman": asdict(analysis.friedman),
+        "difference": analysis.design_difference,
         "primary": asdict(analysis.primary) if analysis.primary else None,
-        "single_persons": asdict(analysis.single) if analysis.single else None,
+        "single_persons": asdict(analysis.single_persons) if analysis.single_persons else None,
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
         "tobit_contrasts_db": [asdict(contrast) for contrast in analysis.tobit],
         "declared": asdict(analysis.protocol.analysis),
         "declared_result": _anonymise_declared_result(analysis.declared_result),
-        "compared": analysis.compared,
+        "compared": analysis.comparison_text,
         "cues": [asdict(cue) for cue in analysis.cues],
         "cue_gaps": [asdict(gap) for gap in analysis.cue_gaps],
         "warnings": list(analysis.warnings),
@@ -261,15 +264,15 @@ def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
 
 
 def _anonymise_declared_result(result: DeclaredResult) -> dict[str, Any]:
-    """The declared result with the number of left-out sessions and trials only, because the sentences about them name
-    sessions of people who withdrew."""
+    """Convert the declared result to JSON values, with the number of left-out sessions and trials in place of the
+    sentences about them, which name sessions of people who withdrew."""
     document = asdict(result)
     document["left_out_count"] = len(document.pop("left_out"))
     return document
 
 
 def describe_design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
-    """Compare the published analysis with the analysis within participants, in words and numbers."""
+    """Compare in words the published one-way analysis with the repeated-measures analysis, at the 5 % level."""
     if anova.p is None or within.p is None:
         text = "neither" if anova.p is None and within.p is None else "only one"
         return (
@@ -291,7 +294,7 @@ def describe_design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> 
 
 
 def _format_removed_percent(within: RepeatedMeasures) -> str:
-    """Share of the spread within frequencies that is due to participants: SS_participants / (SS_participants +
-    SS_error), in per cent."""
+    """Format the share of the sum of squares within frequencies that is due to participants, SS_participants /
+    (SS_participants + SS_error), in per cent. One of the two must be above 0."""
     ss_participants, ss_error = within.ss_participants or 0.0, within.ss_error or 0.0
     return f"{100 * ss_participants / (ss_participants + ss_error):.0f} %"

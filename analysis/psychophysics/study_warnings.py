@@ -58,7 +58,7 @@ def list_study_warnings(
         _warn_of_censoring(table, protocol.staircase),
         _warn_of_few_participants(table),
         _warn_of_unequal_sizes(table),
-        _warn_of_chance(thresholds),
+        _warn_of_chance_level(thresholds),
         _warn_of_bias(thresholds),
         _warn_of_drift(trials),
         _warn_of_spoiled_trials(trials),
@@ -85,7 +85,7 @@ def list_catch_and_detection_warnings(
         if incomplete
         else "",
         f"{_format_count(censored, 'detection threshold')} cut by the cap: {conjoin(censored)}." if censored else "",
-        _warn_of_chance_detection(detection),
+        _warn_of_detection_at_chance(detection),
         _warn_of_direction_below_detection(table, detection_table),
         *detection_table.notes,
     )
@@ -153,13 +153,13 @@ def _warn_of_few_participants(table: ThresholdTable) -> str:
 
 
 def _warn_of_unequal_sizes(table: ThresholdTable) -> str:
-    sizes = {sum(value is not None for value in column) for column in table.group_by_frequency().values()}
-    if len(sizes) < 2:
+    threshold_counts = {sum(value is not None for value in column) for column in table.group_by_frequency().values()}
+    if len(threshold_counts) < 2:
         return ""
     return "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
 
 
-def _warn_of_chance(thresholds: Sequence[Threshold]) -> str:
+def _warn_of_chance_level(thresholds: Sequence[Threshold]) -> str:
     chance_runs = _describe_runs_at_chance(thresholds)
     return (
         "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far above the cap looks "
@@ -272,7 +272,7 @@ def _warn_of_lapses(catches: Sequence[CatchTally]) -> str:
     )
 
 
-def _warn_of_chance_detection(detection: Sequence[Threshold]) -> str:
+def _warn_of_detection_at_chance(detection: Sequence[Threshold]) -> str:
     chance_runs = _describe_runs_at_chance(detection)
     return f"Detection not shown to be better than chance: {conjoin(chance_runs)}." if chance_runs else ""
 
@@ -296,4 +296,5 @@ def _describe_run(run: Threshold) -> str:
 
 
 def _format_count(items: Sequence[str], noun: str) -> str:
+    """Format the number of items with noun and verb, as the start of a sentence: "2 runs are"."""
     return f"1 {noun} is" if len(items) == 1 else f"{len(items)} {noun}s are"

@@ -1,7 +1,8 @@
 """Threshold of each run: mean of its last reversal levels, or posterior mean of Psi, and whether the cap cut it.
 
 A run also has its response bias (d', criterion), counts of trials, and the threshold as measured acceleration and
-displacement. Runs are recomputed from the answers (`runs`). The rows are those of the table `thresholds.csv`.
+displacement. Runs are recomputed from the answers (`runs`). The rows are those of the table `thresholds.csv`. Called
+by `study_analysis`, `detection` and `study.workflows.results.session_results`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -40,7 +41,9 @@ class Threshold:
     """
 
     subject: str
+    """Code of the participant."""
     frequency_hz: float
+    """Frequency of the stimulus (Hz)."""
     threshold_n: float | None
     """Arithmetic mean of the averaged reversal levels in newtons; for Psi, the posterior mean (taken in dB)."""
     threshold_db: float | None
@@ -49,19 +52,29 @@ class Threshold:
     """Whether the cap cut into the threshold (`is_censored`; Psi: `CUT_PROBABILITY`). The value is then no bound: the
     true threshold may lie above or below it."""
     reversals: int
+    """Number of reversals of the run."""
     trials: int
+    """Number of answered trials that count, without catch trials."""
     cap_reversals: int
     """Number of averaged reversals that are peaks at the cap; 0 for Psi."""
     trials_at_cap: int
+    """Number of trials answered at the cap."""
     pushes_against_cap: int
+    """Number of times the up-down rule asked for a level above the cap."""
     complete: bool
+    """Whether the run has a threshold by its rule."""
     session: str
+    """Identifier of the session."""
     run: int
+    """Number of the run in its session."""
     percent_correct: float | None
+    """Share of right answers (%) among the trials; None without answers."""
     d_prime: float | None
+    """Sensitivity d', as `criterion`; None where it cannot be estimated."""
     criterion: float | None
     """c, positive for a tendency to answer 2: see `analysis.psychophysics.bias`."""
     spoiled_trials: int
+    """Number of spoiled presentations, without those of catch trials."""
     threshold_mps2: float | None
     """Mean measured acceleration amplitude along the direction (m/s²) in the trials of the averaged reversals; for Psi,
     in the last trials, each scaled in proportion to the threshold."""
@@ -114,12 +127,12 @@ def compute_run_threshold(run: Run, rule: StaircaseRule) -> Threshold:
         criterion=bias.criterion if bias else None,
         spoiled_trials=run.spoiled_trials,
         threshold_mps2=_compute_measured_mean(
-            [_scale_to_level(t, t.delivered_mps2, level_n) for t, level_n in run_estimate.measured]
+            [_scale_to_level(played, played.delivered_mps2, level_n) for played, level_n in run_estimate.measured]
         )
         if run.complete
         else None,
         threshold_mm=_compute_measured_mean(
-            [_scale_to_level(t, t.displacement_mm, level_n) for t, level_n in run_estimate.measured]
+            [_scale_to_level(played, played.displacement_mm, level_n) for played, level_n in run_estimate.measured]
         )
         if run.complete
         else None,
@@ -136,7 +149,9 @@ class _RunEstimate:
     """Threshold of a run before the other columns are added."""
 
     newton: float | None
+    """Threshold in N; None without reversals."""
     db: float | None
+    """Threshold in dB re 1 N; None without reversals."""
     censored: bool
     cap_reversals: int
     measured: tuple[tuple[Trial, float], ...]
@@ -147,9 +162,9 @@ def _estimate_from_reversals(run: Run, rule: StaircaseRule) -> _RunEstimate:
     """Compute the means of the last `averaged_reversals` reversal levels, in newtons and in dB."""
     state = run.state
     averaged_db = state.reversal_levels_db[-rule.averaged_reversals :]
-    averaged_n = [min(to_newton(averaged_level), rule.cap_n) for averaged_level in averaged_db]
+    averaged_n = [min(to_newton(level), rule.cap_n) for level in averaged_db]
     averaged_trials = [run.answered[index] for index in state.reversal_trials[-rule.averaged_reversals :]]
-    cap_reversals = sum(averaged_level >= rule.cap_n * (1.0 - _LEVEL_TOLERANCE) for averaged_level in averaged_n)
+    cap_reversals = sum(level >= rule.cap_n * (1.0 - _LEVEL_TOLERANCE) for level in averaged_n)
     return _RunEstimate(
         newton=fmean(averaged_n) if averaged_n else None,
         db=fmean(averaged_db) if averaged_db else None,
@@ -183,7 +198,8 @@ def _scale_to_level(trial: Trial, measured_value: float | None, level_n: float) 
 
 
 CUT_PROBABILITY = 0.1
-"""Posterior probability (Psi) of a threshold above the cap above which the threshold is marked as cut."""
+"""Posterior probability (Psi) of a threshold above the cap above which the threshold is marked as cut. Chosen: a
+threshold without the mark is at or below the cap with a posterior probability of at least 0.9."""
 
 
 def is_censored(cap_reversals: int) -> bool:
@@ -215,4 +231,4 @@ def _compute_measured_mean(values: Sequence[float | None]) -> float | None:
 
 
 _LEVEL_TOLERANCE = 1e-9
-"""Relative difference below which a level counts as equal to the cap: rounding."""
+"""Relative difference below which a level counts as equal to the cap, for rounding. Chosen."""

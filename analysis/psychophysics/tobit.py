@@ -28,7 +28,8 @@ from analysis.psychophysics.group_contrasts import Contrast, apply_holm_correcti
 from equalizer.signals.signal import FloatArray
 
 QUADRATURE_NODES, QUADRATURE_WEIGHTS = np.polynomial.hermite_e.hermegauss(25)
-"""Gauss-Hermite rule of the integral over a person's random effect: weight function exp(-x²/2), x = b / sd_people."""
+"""Gauss-Hermite rule of the integral over a person's random effect: weight function exp(-x²/2), x = b / sd_people. The
+number of nodes is chosen."""
 LOG_SD_BOUNDS = (-4.0, 3.5)
 """Bounds of the natural logarithm of both standard deviations: 0.018 dB to 33 dB."""
 DIFFERENCE_STEP = 1e-3
@@ -56,7 +57,7 @@ def compute_tobit_contrasts(
 
     A frequency without an uncensored run is left out, because its likelihood has no maximum. Empty where no run is
     censored (the analysis of the plain means then suffices), the first frequency is left out, or there are fewer than
-    three people.
+    three people (chosen). Raises LinAlgError as `fit_tobit` does.
     """
     is_measured = np.isfinite(values_db)
     has_uncensored: NDArray[np.bool_] = np.asarray((is_measured & ~is_censored).any(axis=0))
@@ -99,8 +100,10 @@ def compute_tobit_contrasts(
 
 def fit_tobit(values_db: FloatArray, is_censored: NDArray[np.bool_]) -> TobitFit:
     """Fit the Tobit model by maximum likelihood (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; is_censored: (n,
-    k). Each column needs an uncensored value. Raises LinAlgError where the Hessian is singular."""
+    k). Each column needs an uncensored value. An optimiser that does not converge is not reported. Raises LinAlgError
+    where the Hessian is singular."""
     frequency_count = values_db.shape[1]
+    # Start: the means of the columns, and standard deviations of exp(0.7) = 2 dB (chosen).
     start_parameters = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
 
     def compute_cost(parameters: FloatArray) -> float:
@@ -134,14 +137,14 @@ def fit_tobit(values_db: FloatArray, is_censored: NDArray[np.bool_]) -> TobitFit
 
 
 def _compute_second_difference(
-    compute_cost: Callable[[FloatArray], float], centre: FloatArray, a: FloatArray, b: FloatArray
+    compute_cost: Callable[[FloatArray], float], centre: FloatArray, first_step: FloatArray, second_step: FloatArray
 ) -> float:
     """Compute the central second difference of the cost along the steps a and b, not divided by their lengths."""
     return (
-        compute_cost(centre + a + b)
-        - compute_cost(centre + a - b)
-        - compute_cost(centre - a + b)
-        + compute_cost(centre - a - b)
+        compute_cost(centre + first_step + second_step)
+        - compute_cost(centre + first_step - second_step)
+        - compute_cost(centre - first_step + second_step)
+        + compute_cost(centre - first_step - second_step)
     ) / 4.0
 
 

@@ -33,11 +33,12 @@ METHOD_PARAGRAPHS = (
     "An effect is detectable where the error of the re-tuned model is more than 1.25 times the noise in some "
     "channel, on held-out samples. A diagnosis that failed counts as a miss.",
 )
+"""Section on the method; the factor 1.25 is `analysis.evaluation.blind_test.outcome.DETECTABLE_ERROR`."""
 
 
 @dataclass(frozen=True, slots=True)
-class BlindTestFacts:
-    """Facts about a blind test that its outcomes do not contain."""
+class BlindTestMetadata:
+    """Origin of a blind test (seeds, hashes, versions), its remarks, its controls and its further experiments."""
 
     seeds: str
     """Seeds of the simulated devices, as text."""
@@ -59,7 +60,7 @@ def render_blind_test_report(
     outcomes: Sequence[Outcome],
     score: Score,
     pictures: Sequence[Picture],
-    facts: BlindTestFacts,
+    metadata: BlindTestMetadata,
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
@@ -68,17 +69,17 @@ def render_blind_test_report(
     sections = (
         Section(f"Misses: {len(score.misses)}", tables=(_make_miss_table(score.misses),) if score.misses else ()),
         Section("Figures", tables=(_make_score_table(score),)),
-        *_make_follow_up_sections(facts.follow_ups),
-        *_make_control_sections(facts.controls),
+        *_make_follow_up_sections(metadata.follow_ups),
+        *_make_control_sections(metadata.controls),
         Section("Which, from where on, how sure", pictures=tuple(pictures)),
-        Section("How it was done", METHOD_PARAGRAPHS, points=_list_facts(facts)),
+        Section("How it was done", METHOD_PARAGRAPHS, points=_describe_reproduction(metadata)),
     )
     return render_page(
         Page(
             title="Blind test of the diagnosis on concealed physics",
             summary=f"{len(outcomes)} devices were diagnosed blind; {len(score.misses)} answers are not as they should "
             "be. All of them are listed.",
-            banner=" ".join(facts.remarks),
+            banner=" ".join(metadata.remarks),
             sections=sections,
             generated=generated,
             provenance=provenance,
@@ -123,19 +124,19 @@ def _describe_returned(recorded: str, returned: Sequence[str]) -> str:
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
-def _list_facts(facts: BlindTestFacts) -> tuple[str, ...]:
-    """List sentences on how the test can be reproduced and checked."""
+def _describe_reproduction(metadata: BlindTestMetadata) -> tuple[str, ...]:
+    """Describe in sentences how the test can be reproduced and checked."""
     return (
-        f"Seeds {facts.seeds}.",
-        f"SHA-256 of labels.sha256: {facts.labels_sha256}.",
-        f"Commit {facts.commit}; code of the diagnosis {', '.join(facts.engines)}.",
+        f"Seeds {metadata.seeds}.",
+        f"SHA-256 of labels.sha256: {metadata.labels_sha256}.",
+        f"Commit {metadata.commit}; code of the diagnosis {', '.join(metadata.engines)}.",
         "sha256sum --check labels.sha256 checks the labels; proof.csv holds one row per device.",
     )
 
 
 def _make_miss_table(misses: Sequence[Outcome]) -> Table:
-    """Make the table of all wrong answers, with the error over the noise of the re-tuned model and of the model
-    found."""
+    """Make the table of all wrong answers, with the largest ratio of error to noise of the re-tuned model and of the
+    model with the named effects."""
     rows = tuple(
         (
             str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), describe_strengths(miss) or "-",
@@ -151,10 +152,10 @@ def _make_miss_table(misses: Sequence[Outcome]) -> Table:
 def _make_score_table(score: Score) -> Table:
     """Make the table of all scores with 95 % intervals, the expected calibration error last."""
     calibration = score.calibration
-    calibration_figure = IntervalEstimate(
+    calibration_estimate = IntervalEstimate(
         "expected calibration error, 10 bins of equal count", calibration.error, calibration.low, calibration.high,
         sum(probability_bin.of for probability_bin in calibration.bins),
     )  # fmt: skip
-    rows = tuple((figure.name, format_figure(figure)) for figure in (*score.figures, calibration_figure))
+    rows = tuple((estimate.name, format_figure(estimate)) for estimate in (*score.figures, calibration_estimate))
     notes = ("95 % intervals: shares after Wilson, others by resampling. Singles, pairs and outside: the detectable.",)
     return Table("With 95 % intervals", ("what", "measured"), rows, notes)

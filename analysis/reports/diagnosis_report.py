@@ -1,4 +1,9 @@
-"""Report of a diagnosis: what the model lacks, the evidence for it, and how much better it predicts with it."""
+"""HTML report of a diagnosis: named effects, the evidence for each, and the prediction errors with and without them.
+
+This module decides the sections and their order; sentences come from `analysis.diagnosis.result`, tables from
+`diagnosis_tables`, `diagnosis_distortion` and `diagnosis_method`. Called by
+`study.workflows.diagnosis.write_diagnosis`.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -45,8 +50,8 @@ from analysis.wording import capitalise
 def render_diagnosis_report(
     findings: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
-    """The report as an HTML page. pictures: of `analysis.figures.diagnosis.diagnosis_pictures`, for the same
-    findings."""
+    """Render the report as an HTML page. pictures: of `analysis.figures.diagnosis.diagnosis_pictures`, for the same
+    findings, recognised by name. provenance: texts by name. generated: local time of the report, as text."""
     diagnosis = findings.diagnosis
     sections = [
         *_make_answer_sections(findings),
@@ -76,7 +81,7 @@ def render_diagnosis_report(
 
 
 def _join_doubts(findings: Findings) -> str:
-    """Doubts about the answer as one text; empty without doubts."""
+    """Join the doubts about the answer to one text; empty without doubts."""
     has_effects = bool(findings.diagnosis.effects)
     doubts = [describe_confirmation(findings.diagnosis.fit.fit, findings.diagnosis.fit.test)] if has_effects else []
     if has_effects and findings.black_box is not None and is_black_box_better(findings.black_box):
@@ -85,7 +90,7 @@ def _join_doubts(findings: Findings) -> str:
 
 
 def _make_answer_sections(findings: Findings) -> list[Section]:
-    """Sections of a diagnosis that names physics: one sentence for each effect, and what they leave open."""
+    """Make the section on the named effects: one point each, what remains and the next experiment; or none."""
     effects, signatures = findings.diagnosis.effects, collect_signature_texts(findings)
     if not effects:
         return []
@@ -101,23 +106,24 @@ def _make_answer_sections(findings: Findings) -> list[Section]:
 
 
 def _make_candidate_sections(findings: Findings) -> list[Section]:
-    """Section with the effects that may be missing but are not named; none without candidates."""
+    """Make the section on the effects that may be missing but are not named; empty without candidates."""
     table = tabulate_candidates(findings)
     return [] if table is None else [Section("What else may be missing", tables=(table,))]
 
 
 def _make_black_box_sections(findings: Findings) -> list[Section]:
-    """Section that compares the prediction with that of a black-box model; none without one."""
-    text = describe_black_box(findings.black_box, bool(findings.diagnosis.effects))
-    paragraphs = tuple(filter(None, (*describe_ceiling(findings.balance_errors), text)))
+    """Make the section that compares the prediction with that of a black-box model; empty without sentences on it."""
+    comparison_text = describe_black_box(findings.black_box, bool(findings.diagnosis.effects))
+    paragraphs = tuple(filter(None, (*describe_ceiling(findings.balance_errors), comparison_text)))
     return [Section("Comparison with a black box", paragraphs=paragraphs)] if paragraphs else []
 
 
-_NO_MAP = "There is no map: the noise of this recording is not known."
+_NO_MAP_SENTENCE = "There is no map: the noise of this recording is not known."
 
 
 def _make_localisation_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
-    sentences = write_localisation_sentences(findings.localisation) if findings.maps else (_NO_MAP,)
+    """Make the section on the map of the mismatch, with its largest entries before any effect is added."""
+    sentences = write_localisation_sentences(findings.localisation) if findings.maps else (_NO_MAP_SENTENCE,)
     table = tabulate_mismatches("The places that differ most, as given", findings.diagnosis.mismatch, findings.is_timed)
     return Section(
         "Where model and device disagree",
@@ -128,6 +134,7 @@ def _make_localisation_section(findings: Findings, pictures: Sequence[Picture]) 
 
 
 def _make_effect_section(findings: Findings, number: int, pictures: Sequence[Picture]) -> Section:
+    """Make the section on the effect with this index: equation, source, rivals, signature curves and parameters."""
     effect = findings.diagnosis.effects[number]
     catalogue_effect = next((match.effect for match in findings.named if match.effect.name == effect.effect), None)
     paragraphs = [describe_share(effect)]
@@ -145,28 +152,30 @@ def _make_effect_section(findings: Findings, number: int, pictures: Sequence[Pic
 
 
 def _select_signatures(findings: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
-    """Signatures of the effect: only those at its own axis where it has one there."""
+    """Select the signature pictures of the effect: those at its axis, or all of them where it has none there."""
     effect_numbers = [
         number for number, signature in enumerate(findings.signatures, start=1) if signature.effect == effect.effect
     ]
-    at_axis = [number for number in effect_numbers if findings.signatures[number - 1].axis == effect.axis]
-    names = {f"signature-{number}" for number in (at_axis or effect_numbers)}
+    axis_numbers = [number for number in effect_numbers if findings.signatures[number - 1].axis == effect.axis]
+    names = {f"signature-{number}" for number in (axis_numbers or effect_numbers)}
     return tuple(picture for picture in pictures if picture.name in names)
 
 
 def _make_rival_sections(pictures: Sequence[Picture]) -> list[Section]:
-    """Section with the pictures of rival effects; none without pictures."""
+    """Make the section with the pictures of rival effects; empty without pictures."""
     rival_pictures = _select_pictures(pictures, "rivals")
     return [Section("What else was tried", pictures=rival_pictures)] if rival_pictures else []
 
 
 def _make_error_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
+    """Make the section on the prediction errors, in all and by channel, on held-out and on fitted data."""
     tables: list[Table] = [tabulate_errors(findings)]
     tables += [table for part in ("test", "fit") if (table := tabulate_channel_errors(findings, part)) is not None]
     return Section("How well it predicts", pictures=_select_pictures(pictures, "held-out"), tables=tuple(tables))
 
 
 def _make_remainder_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
+    """Make the section on the mismatch that remains with all named effects."""
     remainder = findings.diagnosis.remainder
     tables = (tabulate_mismatches("Remaining mismatch", remainder, findings.is_timed),) if remainder else ()
     return Section(
@@ -181,38 +190,43 @@ _UNMOVED_SENTENCES = {
     False: "No parameter changed by more than the standard deviation of its calibration.",
     True: "No parameter changed by more than the tolerance of the first fit.",
 }
-"""Key: whether the model was fitted to the recordings first."""
+"""Sentence where no parameter was re-tuned beyond its tolerance, by whether the model was fitted to the recordings."""
 
 
 def _make_parameter_section(findings: Findings) -> Section:
+    """Make the section on the parameters of the model itself: those that were re-tuned, and the doubtful ones."""
     moved_parameters = find_final_moves(findings)
-    text = describe_retuning(moved_parameters, findings.fitted) or _UNMOVED_SENTENCES[findings.fitted]
+    retuning_text = describe_retuning(moved_parameters, findings.fitted) or _UNMOVED_SENTENCES[findings.fitted]
     table = tabulate_retuned(findings)
     return Section(
         "The model's own parameters",
-        paragraphs=(text,),
+        paragraphs=(retuning_text,),
         points=describe_doubtful_parameters(moved_parameters, findings.fitted),
         tables=(table,) if table is not None else (),
     )
 
 
 def _make_remark_sections(findings: Findings) -> list[Section]:
+    """Make the section of remarks; empty without any."""
     points = (*describe_doubts(findings), *findings.remarks)
     return [Section("Remarks", points=points)] if points else []
 
 
 def _make_sentence_sections(heading: str, sentence: str) -> list[Section]:
-    """Section with a single sentence; none for an empty sentence."""
+    """Make a section with a single sentence; empty for an empty sentence."""
     return [Section(heading, paragraphs=(sentence,))] if sentence else []
 
 
 def _describe_effect(findings: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
+    """Describe a named effect with the text on its signature, if it has one. signatures: texts by effect name."""
     return describe_effect(effect, signatures.get(effect.effect, ""), _has_single_input(findings))
 
 
 def _has_single_input(findings: Findings) -> bool:
+    """Whether the diagnosed model has a single input, so that sentences need not name the axis."""
     return findings.given.inputs == 1
 
 
 def _select_pictures(pictures: Sequence[Picture], kind: str) -> tuple[Picture, ...]:
+    """Select the pictures named `kind`, or `kind` with a suffix after a hyphen."""
     return tuple(picture for picture in pictures if picture.name == kind or picture.name.startswith(f"{kind}-"))

@@ -61,7 +61,8 @@ def tabulate_candidates(findings: Findings) -> Table | None:
     device = extract_device(findings)
     rows = tuple(
         (
-            f"{capitalise(get_noun(candidate.effect))} {format_place(candidate.place, candidate.axis, device.single)}",
+            f"{capitalise(get_noun(candidate.effect))} "
+            f"{format_place(candidate.place, candidate.axis, device.is_single_axis)}",
             format_candidate_parameters(candidate, device) or MISSING,
             format_share(candidate.held_out_gain),
             format_share(candidate.share_of_black_box),

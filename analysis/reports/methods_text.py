@@ -10,7 +10,7 @@ from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.psi import LAPSE_RATE
-from protocols.procedure.schedule import BLOCK
+from protocols.procedure.schedule import BALANCED_BLOCK_TRIALS
 
 _ORDER_PHRASES = {
     "random": "in random order",
@@ -20,7 +20,7 @@ _ORDER_PHRASES = {
 """Text for the order of the frequencies, by `schedule.order` of the protocol."""
 _DIRECTION_PHRASES = {
     "independent": "drawn independently for every trial",
-    "balanced": f"drawn so that both occurred equally often within every {BLOCK} trials",
+    "balanced": f"drawn so that both occurred equally often within every {BALANCED_BLOCK_TRIALS} trials",
 }
 """Text for the choice of the direction, by `schedule.directions`."""
 _LEVEL_SENTENCES = {
@@ -66,7 +66,7 @@ def compose_methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
         _describe_schedule(protocol),
         _describe_level_rule(rule),
         _describe_threshold(rule),
-        *_describe_side_procedures(protocol),
+        *_describe_further_procedures(protocol),
         _STATISTICS_PARAGRAPH,
     )
 
@@ -75,14 +75,17 @@ def _describe_task(protocol: StudyProtocol) -> str:
     """Describe the directions, the answer, feedback, void trials and swapped numbers. The two directions are at
     45 degrees to either side of the line of symmetry."""
     trial, directions = protocol.trial, protocol.directions
-    first, second, middle = (typeset(f"{directions.symmetry_deg + offset_deg:g}") for offset_deg in (45, -45, 0))
+    first_angle, second_angle, symmetry_angle = (
+        typeset(f"{directions.symmetry_deg + offset_deg:g}") for offset_deg in (45, -45, 0)
+    )
     limit_text = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
     feedback_text = "was told" if trial.feedback == "after_answer" else "was not told"
     return (
         f"Every trial played one {_STIMULUS_NOUNS[protocol.stimulus.quantity]} along one of two orthogonal directions, "
-        f"at {first}° (1) and "
-        f"{second}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
-        f"{middle}°. The direction was {_DIRECTION_PHRASES[protocol.schedule.directions]}. The participant said "
+        f"at {first_angle}° (1) and "
+        f"{second_angle}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
+        f"{symmetry_angle}°. The direction was {_DIRECTION_PHRASES[protocol.schedule.directions]}. The participant "
+        "said "
         f"which of the two it was, {limit_text}, and {feedback_text} whether that was right."
         + (
             " A void trial was presented again with the same stimulus: after pauses and faults, and where the "
@@ -182,7 +185,7 @@ def _describe_threshold(rule: StaircaseRule) -> str:
     )
 
 
-def _describe_side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
+def _describe_further_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
     """Describe demonstration, start position (gate), practice, catch trials and detection in one paragraph, as far as
     the protocol has them; empty without any."""
     demo, practice, catch, detection = protocol.demo, protocol.practice, protocol.catch, protocol.detection

@@ -31,7 +31,6 @@ INTRODUCTION = (
     "79.37 %."
 )
 """Introduction of the section on the model of all answers."""
-
 RUN_NOTE = (
     "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the model. "
     "Above the cap, or below the levels played (right answers only): no size, a one-sided bound."
@@ -47,7 +46,7 @@ TOBIT_NOTE = (
     "A mean that the cap cut counts as at least this. A sensitivity analysis: {too_low}. Wald's intervals, t with "
     "n − 1 degrees of freedom."
 )
-"""Note below the contrasts by Tobit's model (values censored at the cap)."""
+"""Note below the contrasts by the Tobit model (values censored at the cap)."""
 
 
 def make_primary_section(analysis: StudyAnalysis) -> Section:
@@ -68,7 +67,7 @@ def make_primary_section(analysis: StudyAnalysis) -> Section:
     coverage_notes = _describe_coverage(analysis, "model")
     return Section(
         "All answers in one model",
-        paragraphs=(INTRODUCTION, analysis.compared, _describe_estimates(primary), describe_direction_limit(primary)),
+        paragraphs=(INTRODUCTION, analysis.comparison_text, _describe_fit(primary), describe_direction_limit(primary)),
         tables=(
             _make_median_table(primary),
             _make_contrast_table("Differences by the model (dB)", primary.contrasts, primary.medians, coverage_notes),
@@ -82,12 +81,14 @@ def make_primary_section(analysis: StudyAnalysis) -> Section:
 
 def _make_single_section(analysis: StudyAnalysis) -> Section:
     """Make the section without a model of all answers: thresholds of single persons, or the reason for their lack."""
-    single_persons = analysis.single
+    single_persons = analysis.single_persons
     if single_persons is None:
-        return Section("All answers in one model", paragraphs=(analysis.compared,))
+        return Section("All answers in one model", paragraphs=(analysis.comparison_text,))
     run_notes = (SINGLE_RUN_NOTE, *_describe_coverage(analysis, "single"))
     table = _make_run_table(single_persons.runs, single_persons.confidence, run_notes)
-    return Section("Thresholds by likelihood", paragraphs=(analysis.compared,), tables=(replace(table, folded=False),))
+    return Section(
+        "Thresholds by likelihood", paragraphs=(analysis.comparison_text,), tables=(replace(table, folded=False),)
+    )
 
 
 def _describe_coverage(analysis: StudyAnalysis, analysis_name: str) -> tuple[str, ...]:
@@ -96,7 +97,7 @@ def _describe_coverage(analysis: StudyAnalysis, analysis_name: str) -> tuple[str
     return describe_measured_coverage((analysis_name,), analysis.table, analysis.protocol.staircase)
 
 
-def _describe_estimates(primary: PrimaryAnalysis) -> str:
+def _describe_fit(primary: PrimaryAnalysis) -> str:
     """Describe the test over all frequencies, the standard deviations between persons and the common parameters, with
     warnings where the fit did not converge or does not determine them."""
     overall = primary.overall
@@ -120,8 +121,8 @@ def _describe_estimates(primary: PrimaryAnalysis) -> str:
 
 
 def describe_far_above(primary: PrimaryAnalysis) -> str:
-    """Describe the frequencies whose medians lie so far above the cap that they cannot be compared with each other: a
-    sentence with a leading space; empty with fewer than two such frequencies."""
+    """Describe the frequencies whose medians are too far above the cap (`far_above_hz`) to be compared with each other:
+    a sentence with a leading space; empty with fewer than two such frequencies."""
     if len(primary.far_above_hz) < 2:
         return ""
     hz_text = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
@@ -131,12 +132,12 @@ def describe_far_above(primary: PrimaryAnalysis) -> str:
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
     """Describe the standard deviations between persons whose search ended at its upper bound: sentences with a leading
     space; else empty. With few persons, slopes of 2 and of 20 are almost equally likely."""
-    spreads = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
+    sds = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
     quantity_names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
     undetermined = [
         name
-        for name, spread, (_, upper_bound) in zip(quantity_names, spreads, LOG_SD_BOUNDS, strict=True)
-        if math.log(spread) > upper_bound - BOUND_TOLERANCE_LOG
+        for name, sd, (_, upper_bound) in zip(quantity_names, sds, LOG_SD_BOUNDS, strict=True)
+        if math.log(sd) > upper_bound - BOUND_TOLERANCE_LOG
     ]
     if not undetermined:
         return ""
@@ -202,7 +203,7 @@ def format_median_interval(lower: float | None, upper: float | None, above_cap: 
 def _make_contrast_table(
     caption: str, contrasts: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
 ) -> Table:
-    """Make the table of differences between two frequencies (dB); those whose median is above the cap are marked."""
+    """Make the table of contrasts between two frequencies (dB); those whose median is above the cap are marked."""
     above_cap_hz = {median.frequency_hz for median in medians if median.above_cap}
     return Table(
         caption=caption,
@@ -244,8 +245,7 @@ def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tup
 
 
 def format_run(run: RunLikelihood) -> tuple[str, str]:
-    """Format threshold and likelihood interval of a run (N), one-sided where an end is unknown, `MISSING` if both
-    are."""
+    """Format threshold and likelihood interval of a run (N), one-sided without one end, `MISSING` without both."""
     lower_n, upper_n = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)
     if run.below:
         threshold_text = "below the levels played"

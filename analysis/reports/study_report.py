@@ -114,7 +114,7 @@ def _make_declared_sections(analysis: StudyAnalysis) -> list[Section]:
     no test frequencies."""
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
-    return [make_declared_section(analysis.declared, analysis.declared_result)]
+    return [make_declared_section(analysis.declaration, analysis.declared_result)]
 
 
 def _make_model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
@@ -147,7 +147,7 @@ def _make_result_sections(analysis: StudyAnalysis, pictures_by_name: Mapping[str
     )
     comparison_section = Section(
         "Comparison of the frequencies, as published",
-        paragraphs=(analysis.difference,),
+        paragraphs=(analysis.design_difference,),
         tables=(make_one_way_table(analysis), *pair_tables, make_within_table(analysis)),
     )
     model_section = replace(

@@ -165,7 +165,7 @@ def make_within_table(analysis: StudyAnalysis) -> Table:
     """Make the table of the repeated-measures tests that can be computed: ANOVA with Greenhouse-Geisser's and with
     Huynh-Feldt's correction (ε of 1 where that cannot be computed) and without one, and Friedman's test. The notes give
     effect sizes and Mauchly's test, and say why a test is missing."""
-    anova, friedman = analysis.within, analysis.ranks
+    anova, friedman = analysis.repeated_measures, analysis.friedman
     rows: list[tuple[str, ...]] = []
     notes = []
     if anova.epsilon is not None and anova.df_conditions is not None and anova.df_error is not None:

@@ -3,6 +3,7 @@
     F = -level_positive where v > 0, +level_negative where v < 0        levels in N (a rotation: N m)
 
 The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
+An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -15,20 +16,20 @@ from equalizer.effects.starts.starting_values import regress_out_linear_terms, s
 from equalizer.signals.signal import FloatArray
 
 _INITIAL_LEVEL_RATIO = 1.3
-"""Ratio of the two levels in the starting values that are tried in addition to the measured ones."""
+"""Ratio of the two levels in the starting values that are tried in addition to the measured ones. Chosen."""
 
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean friction force (N) over a step. parameters: level for v > 0, level for v < 0 (N); memory: deflection of the
-    bristle over its largest; step_motion: motion in the step, as laid out in `simulation.instant`."""
+    """Compute the mean friction force (N) over a step. parameters: level for v > 0, level for v < 0 (N); memory:
+    deflection of the bristle over its largest; step_motion: motion in the step, as laid out in `simulation.instant`."""
     return float(compute_friction_force(parameters[0], parameters[1], memory[0], memory, step_motion))
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Starting values: the levels by regression of the missing force on either direction of sliding, each at least 5 %
-    of their mean, then two pairs of levels with the ratio `_INITIAL_LEVEL_RATIO` and the same mean. Empty where the
-    mean level is not positive."""
+    """Find starting values: the levels by regression of the missing force on either direction of sliding, each at least
+    5 % of their mean (chosen), then two pairs of levels with the ratio `_INITIAL_LEVEL_RATIO` and the same mean. Empty
+    where the mean level is not positive."""
     motion = select_sliding_motion(evidence, axis)
     is_forward = np.asarray(motion.velocity > 0, dtype=np.float64)
     # No constant force among the regressors: it would absorb the asymmetry.
@@ -38,7 +39,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     mean_level = (positive_level + negative_level) / 2
     if mean_level <= 0:
         return ()
-    measured = {
+    measured_levels = {
         "level_positive": max(positive_level, 0.05 * mean_level),
         "level_negative": max(negative_level, 0.05 * mean_level),
     }
@@ -48,7 +49,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     )
     candidates = ((high_level, low_level), (low_level, high_level))
     return (
-        measured,
+        measured_levels,
         *(
             {"level_positive": trial_positive, "level_negative": trial_negative}
             for trial_positive, trial_negative in candidates

@@ -16,9 +16,10 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean of the forces (N) at the start and the end of the step (trapezoidal rule), and the force at its end in
-    `step_motion`. The end position depends on the force (implicit step): four steps of Newton's method, which converges
-    quadratically, with the derivative limited to 0.5 or more against divergence (both chosen). parameters: k2."""
+    """Compute the mean of the forces (N) at the start and the end of the step (trapezoidal rule), and the force at its
+    end in `step_motion`. The end position depends on the force (implicit step): four steps of Newton's method, which
+    converges quadratically, with the derivative limited to 0.5 or more against divergence (both chosen). parameters:
+    k2; memory: not used; step_motion: see `instant`."""
     half_stiffness, start_squared = 0.5 * parameters[0], step_motion[X] ** 2
     force = -half_stiffness * (start_squared + step_motion[X_FREE] ** 2)
     for _ in range(4):

@@ -2,6 +2,7 @@
 
 A body of mass m and position q is coupled to the axis (position x, velocity v) by a damper c and a spring k:
 F = -(c (v - q') + k (x - q)), m q'' = -F. It adds a coordinate to the model. `extra_mode` is the lightly damped case.
+An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -17,28 +18,29 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 DAMPING_RATIOS = (0.1, 0.3, 0.8, 2.0)
-"""Damping ratios that are tried for starting values."""
+"""Damping ratios that are tried for starting values, from light to overdamped. Chosen."""
 
 
 def _add_body(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    """The model with the body, its damper and its spring attached to a driven axis."""
+    """Attach the body with its damper and its spring to a driven axis of the model."""
     direction = compute_driven_axes(model)[:, axis]
     return with_oscillator(model, direction, values["mass"], values["damping"], values["stiffness"])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The two oscillators that explain most of the missing force: k = m w², c = 2 ratio m w, w = 2 pi natural_hz."""
-    missing = estimate_missing_force_spectra(evidence, axis)
+    """Find starting values from the two oscillators that explain most of the missing force, tried at 50 natural
+    frequencies from 2 Hz to 0.4 of the sample rate (chosen): k = m w², c = 2 ratio m w, w = 2 pi natural_hz."""
+    missing_spectra = estimate_missing_force_spectra(evidence, axis)
     natural_hz = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
-    starts = []
-    for oscillator in find_likely_oscillators(missing, axis, natural_hz, DAMPING_RATIOS)[:2]:
+    starting_values = []
+    for oscillator in find_likely_oscillators(missing_spectra, axis, natural_hz, DAMPING_RATIOS)[:2]:
         natural_rad_s = 2 * np.pi * oscillator.natural_hz
         damping, stiffness = (
             2 * oscillator.damping_ratio * oscillator.mass * natural_rad_s,
             oscillator.mass * natural_rad_s**2,
         )
-        starts.append({"mass": oscillator.mass, "damping": damping, "stiffness": stiffness})
-    return tuple(starts)
+        starting_values.append({"mass": oscillator.mass, "damping": damping, "stiffness": stiffness})
+    return tuple(starting_values)
 
 
 EFFECT = Effect(

@@ -29,8 +29,8 @@ PITCH_COUNT = 3
 _ZERO_PADDING = 8
 """Factor of zero padding: spectral points per period over the travel, so that a peak between two lines is
 found. Chosen by hand."""
-_LEAST_PERIODS = 2
-"""Least number of periods over the travel: fewer cannot be distinguished from a nonlinear spring."""
+_MIN_PERIODS = 2
+"""Smallest number of periods over the travel: fewer cannot be distinguished from a nonlinear spring."""
 _ITERATIONS = 4
 """Fixed-point iterations of the implicit step: each multiplies the error by the force's slope over the position times
 the step's motion per newton, below 1 unless a pitch is crossed within a step. Chosen by hand."""
@@ -87,15 +87,15 @@ def _find_likely_pitches(motion: AxisMotion, regression: PartialRegression) -> l
     # would otherwise hide the pattern. n is averaged over nine cells, chosen by hand.
     cell_weight = 1 / np.sqrt(np.maximum(smoothed_samples, 1.0))
     power = np.abs(np.fft.rfft(force_by_cell * cell_weight, TRAVEL_CELLS * _ZERO_PADDING)) ** 2
-    power[: _LEAST_PERIODS * _ZERO_PADDING] = 0
+    power[: _MIN_PERIODS * _ZERO_PADDING] = 0
     power[TRAVEL_CELLS * _ZERO_PADDING // 4 :] = 0
     pitches = []
     for _ in range(PITCH_COUNT):
-        line = int(np.argmax(power))
-        if power[line] <= 0:
+        line_index = int(np.argmax(power))
+        if power[line_index] <= 0:
             break
-        pitches.append(travel_range * TRAVEL_CELLS / (TRAVEL_CELLS - 1) * _ZERO_PADDING / line)
-        power[max(line - _ZERO_PADDING, 0) : line + _ZERO_PADDING + 1] = 0
+        pitches.append(travel_range * TRAVEL_CELLS / (TRAVEL_CELLS - 1) * _ZERO_PADDING / line_index)
+        power[max(line_index - _ZERO_PADDING, 0) : line_index + _ZERO_PADDING + 1] = 0
     return pitches
 
 

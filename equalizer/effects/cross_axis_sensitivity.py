@@ -15,10 +15,11 @@ from equalizer.signals.signal import FloatArray
 
 SHARE_NAMES = ("from_next", "from_after_next")
 """Parameter names: share of the next channel, and of the channel after it, counted cyclically."""
-LARGEST_SHARE = 1.0
+MAX_SHARE = 1.0
 """Largest share of another channel. Chosen: a larger one indicates exchanged channels, a wiring error."""
-LEAST_SHARE = 1e-4
-"""Starting share up to which none is returned. Chosen: a hundredth of the 1 % that accelerometer data sheets allow."""
+MIN_SHARE = 1e-4
+"""Share at or below which no starting values are returned. Chosen: a hundredth of the 1 % that accelerometer data
+sheets allow."""
 
 
 def _list_following_channels(channel: int, channel_count: int) -> list[int]:
@@ -41,7 +42,7 @@ def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[i
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find starting shares by linear regression of the channel's residual on the next one or two predicted channels and
     on its own prediction (an error of its gain). Empty for a single channel, and where the largest share is not between
-    `LEAST_SHARE` and `LARGEST_SHARE`; the share of a missing channel is 0."""
+    `MIN_SHARE` and `MAX_SHARE`; the share of a missing channel is 0."""
     source_channels = _list_following_channels(channel, evidence.response.shape[1])
     residual = evidence.response - evidence.predicted
     if not source_channels:
@@ -49,7 +50,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
     shares = fit_coefficients(residual[:, channel], evidence.predicted[:, [*source_channels, channel]], evidence.used)[
         : len(source_channels)
     ]
-    if not LEAST_SHARE < float(np.abs(shares).max()) < LARGEST_SHARE:
+    if not MIN_SHARE < float(np.abs(shares).max()) < MAX_SHARE:
         return ()
     return ({**dict.fromkeys(SHARE_NAMES, 0.0), **dict(zip(SHARE_NAMES, shares.tolist(), strict=False))},)
 
@@ -61,7 +62,7 @@ EFFECT = Effect(
     signature="one channel contains a constant share of other channels at every frequency and level, and they "
     "contain no share of it, while the position agrees",
     parameters=tuple(
-        Parameter(name, -LARGEST_SHARE, LARGEST_SHARE, none=0.0, scale="linear", step=1e-3) for name in SHARE_NAMES
+        Parameter(name, -MAX_SHARE, MAX_SHARE, none=0.0, scale="linear", step=1e-3) for name in SHARE_NAMES
     ),
     action=OnResponse(_mix_channels, stage=-1),
     starts=_find_starting_values,

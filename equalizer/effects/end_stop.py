@@ -88,9 +88,9 @@ def _find_best_stop(
     motion: AxisMotion, regression: PartialRegression, stop_sign: float, stop_distances: FloatArray
 ) -> tuple[float, Values] | None:
     """Find the best stop on the side `stop_sign` (1 or -1), with a second stop at the same distance on the other
-    side. A trial whose second stop is over 10 % stiffer is left out; a stiffer one counts as equal. Returns
-    the share of the missing force that both explain, and the values; None where no stop has a positive stiffness.
-    stop_distances: distances (m) to try."""
+    side. A trial whose second stop is more than 10 % stiffer (chosen) is left out, because the stiffer stop is found
+    from the other side; up to 10 % stiffer counts as equal. Returns the share of the missing force that both explain,
+    and the values; None where no stop has a positive stiffness. stop_distances: distances (m) to try."""
     candidates: list[tuple[float, Values]] = []
     for stop_distance in stop_distances.tolist():
         penetration, opposite_penetration = (
@@ -127,8 +127,9 @@ EFFECT = Effect(
     source="Brogliato, Nonsmooth Mechanics, chapter 2",
     signature="nothing is missing until the axis comes near its farthest positions; then a force pushes back, and odd "
     "and even harmonics appear",
-    # `side` is no fitted parameter: starts set it where the position's sign does not give it. `opposite` is 0 for no
-    # second stop and 1 for one as stiff; its upper bound was chosen.
+    # `side` is no fitted parameter, so that it is not listed: starting values set it where the position's sign does not
+    # state the side. Bounds are chosen: of position and stiffness far beyond any device; of `opposite` (0: no second
+    # stop, 1: equally stiff) above 1, so that equal stiffness lies inside the range of a fit.
     parameters=(
         Parameter("position", -1e3, 1e3, none=None, scale="signed"),
         Parameter("stiffness", 1e-6, 1e12, none=0.0),

@@ -1,4 +1,9 @@
-"""Force gain: an actuator whose force is a constant multiple of its command, as with a wrong force constant."""
+"""Force gain: an actuator whose force is a constant multiple of its command, as with a wrong force constant.
+
+    F = gain u        command u and force F in N (a rotation: N m)
+
+An entry of `equalizer.effects.catalogue`.
+"""
 
 import numpy as np
 
@@ -6,29 +11,31 @@ from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Va
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
-_LEAST_DEVIATION = 1e-4
-"""Least deviation of a gain from 1 that is a starting value. Heuristic."""
+_MIN_DEVIATION = 1e-4
+"""Deviation of the gain from 1 at or below which it is no starting value. Chosen."""
 
 
 def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Commands (N) times the gain."""
+    """Multiply the commands (n,), N, by the gain. step_s is not used."""
     return np.asarray(values["gain"] * commands)
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """gain = 1 + sum(u f) / sum(u²): least squares of the missing force f over the command u. Empty where the gain is
-    not positive or as good as 1."""
-    columns, used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
-    commanded, missing_force = evidence.command[used, columns], evidence.axis_force[used, columns]
-    # Also over the command of the sample before, because the estimated force may lag by a sample.
+    """Estimate gain = 1 + sum(u f) / sum(u²) by least squares of the missing force f over the command u, and over u one
+    sample earlier; the gain farther from 1 is returned. Empty where it is not positive or within `_MIN_DEVIATION` of
+    1."""
+    columns, is_used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
+    commanded, missing_force = evidence.command[is_used, columns], evidence.axis_force[is_used, columns]
+    # The estimated force may lag by a sample.
     gain_deviations = [
         float(
-            np.sum(np.roll(commanded, shift, axis=0) * missing_force) / max(np.sum(commanded**2), np.finfo(float).tiny)
+            np.sum(np.roll(commanded, delay_samples, axis=0) * missing_force)
+            / max(np.sum(commanded**2), np.finfo(float).tiny)
         )
-        for shift in (0, 1)
+        for delay_samples in (0, 1)
     ]
     gain = 1 + max(gain_deviations, key=abs)
-    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > _LEAST_DEVIATION else ()
+    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > _MIN_DEVIATION else ()
 
 
 EFFECT = Effect(

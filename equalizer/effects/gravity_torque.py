@@ -20,10 +20,10 @@ gravity and a spring cannot be distinguished. Chosen."""
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean of the torques (N m) at start and end of the step (trapezoidal rule). The angle at the end depends on that
-    mean, which is found by four fixed-point iterations; each multiplies the error by at most 0.5 torque times the angle
-    that 1 N m adds in a step, a small number at usual sample rates. parameters: torque, angle; memory: not used;
-    step_motion: see `instant`."""
+    """Compute the mean of the torques (N m) at start and end of the step (trapezoidal rule). The angle at the end
+    depends on that mean, which is found by four fixed-point iterations; each multiplies the error by at most 0.5 torque
+    times the angle that 1 N m adds in a step, a small number at usual sample rates. parameters: torque, angle; memory:
+    not used; step_motion: see `instant`."""
     start_sine, torque = np.sin(step_motion[X] + parameters[1]), 0.0
     for _ in range(4):
         torque = (
@@ -36,7 +36,7 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Starting values by linear regression of the missing torque on -sin(x) and -cos(x), whose factors are
+    """Find starting values by linear regression of the missing torque on -sin(x) and -cos(x), whose factors are
     torque cos(angle) and torque sin(angle). Empty for translational models, for a travel of at most `LEAST_TRAVEL_RAD`
     (or NaN) and for a torque of zero."""
     motion = select_axis_motion(evidence, axis)

@@ -1,4 +1,4 @@
-"""Library entry of a discovered law: effects that are searched for in other recordings as those of the catalogue are.
+"""Library entry of a discovered law, from which effects are made that a diagnosis searches for in other recordings.
 
 A law was found at one axis of one device. An entry yields one effect per axis of the new recording, with the axis
 letters of its formula permuted cyclically, and starting values by linear regression. Called by

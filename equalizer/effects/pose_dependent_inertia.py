@@ -26,10 +26,10 @@ axes move."""
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Force (N) at the mean position and velocity of the step without this force. The mean acceleration depends on the
-    force itself: an implicit step, linear in the force. Its divisor, the total mass over M, is at least 0.1 (chosen),
-    so that a fit cannot make the mass zero or negative. parameters: per_m M, speed_share; memory: not used;
-    step_motion: see `instant`."""
+    """Compute the force (N) at the mean position and velocity of the step without this force. The mean acceleration
+    depends on the force itself: an implicit step, linear in the force. Its divisor, the total mass over M, is at least
+    0.1 (chosen), so that a fit cannot make the mass zero or negative. parameters: per_m M, speed_share; memory: not
+    used; step_motion: see `instant`."""
     mid_position, mid_velocity = (
         0.5 * (step_motion[X] + step_motion[X_FREE]),
         0.5 * (step_motion[V] + step_motion[V_FREE]),

@@ -2,7 +2,7 @@
 
     F = -level max(1 + s x + b x², 0) sgn(v)        level in N, s in 1/m, b in 1/m² (a rotation: N m, 1/rad, 1/rad²)
 
-The bristle of `simulation.dry_friction_kernel` replaces the jump at v = 0.
+The bristle of `simulation.dry_friction_kernel` replaces the jump at v = 0. An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean friction force (N) over a step, its level at the mean of the step's start and (force-free) end position.
-    parameters: level (N), slope (1/m), bend (1/m²); memory: the bristle's deflection over its largest; step_motion:
-    see `instant`."""
+    """Compute the mean friction force (N) over a step, its level at the mean of its start and (force-free) end
+    position. parameters: level (N), slope (1/m), bend (1/m²); memory: the bristle's deflection over its largest;
+    step_motion: see `instant`."""
     mean_position = 0.5 * (step_motion[X] + step_motion[X_FREE])
     level = max(
         parameters[0] * (1 + parameters[1] * mean_position + parameters[2] * mean_position * mean_position), 0.0
@@ -29,17 +29,17 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Values by linear regression of the missing force on -sgn(v), -x sgn(v), -x² sgn(v) where the axis slides; empty
-    unless the level is positive."""
+    """Find starting values by linear regression of the missing force on -sgn(v), -x sgn(v), -x² sgn(v) where the axis
+    slides; empty unless the level is positive."""
     motion = select_sliding_motion(evidence, axis)
     friction_direction = -np.sign(motion.velocity)
     fit = regress_out_linear_terms(motion).fit(
         friction_direction, friction_direction * motion.position, friction_direction * motion.position**2
     )
-    level, slope, bend = fit.strengths.tolist()
+    level, slope_strength, bend_strength = fit.strengths.tolist()
     if level <= 0:
         return ()
-    return ({"level": level, "slope_per_m": slope / level, "bend_per_m2": bend / level},)
+    return ({"level": level, "slope_per_m": slope_strength / level, "bend_per_m2": bend_strength / level},)
 
 
 EFFECT = Effect(

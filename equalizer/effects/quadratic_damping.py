@@ -18,9 +18,10 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean of the drag (N) at the step's start and end (trapezoidal rule); the drag at the end is written to
-    step_motion[F_END]. The end velocity w depends on it (implicit step) and solves w + r w |w| = v_free - r v |v|, with
-    r = c v_per_n / 2 (`half_drag_gain`). parameters: c; memory: not used; step_motion: columns as in `instant`."""
+    """Compute the mean of the drag (N) at the step's start and end (trapezoidal rule); the drag at the end is
+    written to step_motion[F_END]. The end velocity w depends on it (implicit step) and solves w + r w |w| = v_free - r
+    v |v|, with r = c v_per_n / 2 (`half_drag_gain`). parameters: c; memory: not used; step_motion: columns as in
+    `instant`."""
     half_drag_gain = 0.5 * parameters[0] * step_motion[V_PER_N]
     right_side = step_motion[V_FREE] - half_drag_gain * step_motion[V] * abs(step_motion[V])
     end_velocity = 2 * right_side / (1 + np.sqrt(1 + 4 * half_drag_gain * abs(right_side)))

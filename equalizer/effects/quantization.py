@@ -19,14 +19,16 @@ from equalizer.effects.starts.lattice import find_lattice_offset, find_lattice_s
 from equalizer.effects.starts.response_starts import list_site_channels
 from equalizer.signals.signal import FloatArray
 
-LEAST_TAIL_PROBABILITY = 1e-12
-"""Least tail probability for which a quantile is computed; below it too few significant digits remain."""
+MIN_TAIL_PROBABILITY = 1e-12
+"""Smallest tail probability for which a quantile is computed; below it too few significant digits remain.
+Chosen."""
 
 
 def _round_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """The response (n, p) with these channels rounded to multiples of the step; unchanged for a step of 0."""
+    """Round these channels of a response (n, p) to multiples of the step; unchanged for a step of 0. sample_rate_hz is
+    not used."""
     rounded = response.copy()
     if values["step"] > 0:
         rounded[:, channels] = values["step"] * np.round(response[:, channels] / values["step"])
@@ -36,8 +38,8 @@ def _round_response(
 def _condition_on_measurement(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """The predicted response (n, p), conditioned on the measured one: by quantile residuals in channels that were
-    recorded on the lattice, else rounded. noise: (p,), rms before rounding."""
+    """Condition the predicted response (n, p) on the measured one (n, p): by quantile residuals in channels that were
+    recorded on the lattice, else by rounding. noise: (p,), rms before rounding, above 0."""
     conditioned, step = _round_response(response, 0.0, channels, values), values["step"]
     for channel in channels:
         if find_lattice_offset(measured[:, channel], step) is not None:
@@ -48,33 +50,42 @@ def _condition_on_measurement(
 
 
 def _compute_quantile_response(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
-    """The prediction (n,) whose residual is the randomised quantile residual: the quantile of a uniformly random
-    probability between those of both ends of the rounding interval. response, measured: (n,); noise: rms of the noise
-    before rounding."""
+    """Compute the prediction (n,) whose residual is the randomised quantile residual: the quantile of a uniformly
+    random probability between those of both ends of the rounding interval. response, measured: (n,); noise: rms of the
+    noise before rounding, above 0."""
     deviation = measured - response
     # Positive deviations are mirrored, because only small probabilities (the lower tail) keep their significant digits.
     sign = np.where(deviation > 0, -1.0, 1.0)
-    low, high = ndtr((sign * deviation - step / 2) / noise), ndtr((sign * deviation + step / 2) / noise)
+    low_probability, high_probability = (
+        ndtr((sign * deviation - step / 2) / noise),
+        ndtr((sign * deviation + step / 2) / noise),
+    )
     # Seeded with the length, so that the same prediction always has the same residual in a fit.
     uniform_draws = np.random.default_rng(len(response)).random(len(response))
     quantile_residual = (
         sign
         * noise
-        * ndtri(np.clip(low + uniform_draws * (high - low), LEAST_TAIL_PROBABILITY, 1 - LEAST_TAIL_PROBABILITY))
+        * ndtri(
+            np.clip(
+                low_probability + uniform_draws * (high_probability - low_probability),
+                MIN_TAIL_PROBABILITY,
+                1 - MIN_TAIL_PROBABILITY,
+            )
+        )
     )
     # Too improbable for a quantile: the distance to the nearest end of the rounding interval.
-    is_extreme = high < LEAST_TAIL_PROBABILITY
+    is_extreme = high_probability < MIN_TAIL_PROBABILITY
     quantile_residual[is_extreme] = (deviation - np.sign(deviation) * step / 2)[is_extreme]
     return np.asarray(measured - quantile_residual)
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The step of the lattice of the measured values, or else the step detected under added noise; empty if neither is
-    found."""
+    """Find the step of the lattice of the measured values, or else the step under added noise, in the first channel
+    where there is one; empty without any."""
     is_used = evidence.used > 0
     for column in list_site_channels(evidence, channel):
-        measured, noise = evidence.response[is_used, column], float(evidence.noise[column])
-        step = find_lattice_step(measured) or find_step_under_noise(measured, noise)
+        measured_samples, noise = evidence.response[is_used, column], float(evidence.noise[column])
+        step = find_lattice_step(measured_samples) or find_step_under_noise(measured_samples, noise)
         if step is not None:
             return ({"step": step},)
     return ()

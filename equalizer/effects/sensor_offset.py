@@ -25,8 +25,8 @@ def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Estimate the offset as the mean residual of the channel; empty where it is not significant, or without usable
-    samples."""
+    """Estimate the offset as the mean residual of the channel; empty where its magnitude is at most
+    `SIGNIFICANCE_THRESHOLD` standard errors, or without usable samples (NumPy then warns)."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0, channel]
     offset = float(residual.mean())
     is_significant = abs(offset) * np.sqrt(len(residual)) > SIGNIFICANCE_THRESHOLD * float(residual.std())

@@ -2,7 +2,8 @@
 
 A time step has a start and an end. Between them the signals of operators with memory (lag, play, delay, integral) are
 linear in time; at a start they may jump, as commands do. `run_program` may be called several times for a step;
-`commit_step` then stores its end as the start of the next step. Times are in seconds.
+`commit_step` then stores its end as the start of the next step. Times are in seconds. Called by `laws.evaluate` (along
+samples) and `effects.simulation.law_kernel` (in a simulation).
 """
 
 from typing import Any
@@ -31,7 +32,7 @@ _NEGATE, _ABS, _SIGN, _SQRT = OPCODES["neg"], OPCODES["abs"], OPCODES["sign"], O
 _SIN, _COS, _EXP, _LOG, _TANH, _ATAN = (OPCODES[name] for name in ("sin", "cos", "exp", "log", "tanh", "atan"))
 _LAG, _PLAY, _DELAY, _INTEGRAL = (OPCODES[name] for name in ("lag", "play", "delay", "integral"))
 _TIME_TOLERANCE = 1e-9
-"""Tolerance for equal instants, relative to the delay (rounding)."""
+"""Tolerance for equal instants, relative to the delay, for rounding. Chosen."""
 _RING_SIZE = (MEMORY_SIZE["delay"] - 4) // 2
 """Number of instants that the ring buffer of a delay can store."""
 
@@ -82,8 +83,8 @@ def _apply_unary(code: int, operand: float) -> float:  # noqa: C901 - a table, i
 
 @njit(inline="always")
 def _apply_lag(signal: float, tau_s: float, memory: FloatArray, offset: int, phase: int, step_s: float) -> float:
-    """First-order lag, y' = (s - y) / tau, exact for signals s that are linear over a step; s itself where tau is not
-    above 0. memory: y and s at the start, then y and s at the end."""
+    """Compute a first-order lag, y' = (s - y) / tau, exact for signals s that are linear over a step; s itself where
+    tau is not above 0. memory: y and s at the start, then y and s at the end."""
     if not tau_s > 0:
         return signal
     if phase == START:
@@ -101,8 +102,8 @@ def _apply_lag(signal: float, tau_s: float, memory: FloatArray, offset: int, pha
 
 @njit(inline="always")
 def _apply_integral(signal: float, memory: FloatArray, offset: int, phase: int, step_s: float) -> float:
-    """Integral over time by the trapezoidal rule, exact for linear signals. memory: value and signal at the start, then
-    at the end."""
+    """Compute the integral over time by the trapezoidal rule, exact for linear signals. memory: value and signal at the
+    start, then at the end."""
     if phase == START:
         memory[offset + 1] = signal
         return float(memory[offset])
@@ -113,8 +114,8 @@ def _apply_integral(signal: float, memory: FloatArray, offset: int, phase: int, 
 
 @njit(inline="always")
 def _apply_play(signal: float, half_width: float, memory: FloatArray, offset: int, phase: int) -> float:
-    """Play (backlash) operator: the output moves only as far as needed to stay within half_width of the signal. memory:
-    output at the start, at the end."""
+    """Compute the play (backlash) operator: the output moves only as far as needed to stay within half_width of the
+    signal. memory: output at the start, at the end."""
     width = max(half_width, 0.0)
     output = min(max(memory[offset], signal - width), signal + width)
     memory[offset + 1] = output
@@ -130,7 +131,7 @@ def _apply_play(signal: float, half_width: float, memory: FloatArray, offset: in
 def _interpolate_delayed(
     signal: float, delay_s: float, memory: FloatArray, offset: int, phase: int, time_s: float
 ) -> float:
-    """The signal at time_s - delay_s, interpolated linearly in the ring buffer. memory: number of instants written,
+    """Interpolate the signal at time_s - delay_s linearly in the ring buffer. memory: number of instants written,
     index of the oldest in use, their times and values; then the latest signal and delay, which are not yet in the
     buffer. At a jump of the signal, the start of a step reads the value after it, the end the value before it."""
     times, values, delayed_s = offset + 2, offset + 2 + _RING_SIZE, time_s - delay_s
@@ -174,8 +175,8 @@ def _store_instant(signal: float, delay_s: float, memory: FloatArray, offset: in
 
 @njit(inline="always")
 def _apply_delay(signal: float, delay_s: float, memory: FloatArray, offset: int, phase: int, time_s: float) -> float:
-    """Delay by delay_s seconds, none where it is not above 0; a jump at the start of a step is stored as a second
-    instant of the same time."""
+    """Delay a signal by delay_s seconds, none where it is not above 0; a jump at the start of a step is stored as a
+    second instant of the same time."""
     if not delay_s > 0:
         return signal
     newest = offset + 2 + _RING_SIZE + (int(memory[offset]) - 1) % _RING_SIZE
@@ -210,7 +211,7 @@ def _run_with_memory(  # noqa: PLR0913 - a kernel takes flat arrays
     time_s: float,
     step_s: float,
 ) -> float:
-    """Value of an operator with memory. parameter: its second, constant argument (unused by the integral); offset:
+    """Compute an operator with memory. parameter: its second, constant argument (unused by the integral); offset:
     index of its first cell in `memory`."""
     if memory[0] != STARTED:
         _initialise_memory(code, 0.0 if memory[0] == FROM_ZERO else signal, memory, offset, time_s)
@@ -231,7 +232,7 @@ def run_program(  # noqa: PLR0913 - a kernel takes flat arrays
     program: FloatArray, signals: FloatArray, memory: FloatArray, stack: FloatArray, phase: int, time_s: float,
     step_s: float,
 ) -> float:  # fmt: skip
-    """The law's value at a step's start or end (`phase`). program: (2 k,), code and operand in turn; signals:
+    """Compute the law's value at a step's start or end (`phase`). program: (2 k,), code and operand in turn; signals:
     (columns,), at this instant; time_s: time of this instant; stack: (STACK_SIZE,), work space."""
     top = -1
     for row in range(0, program.shape[0], 2):

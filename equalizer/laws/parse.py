@@ -3,7 +3,8 @@ The text is parsed to a syntax tree by Python's `ast` and never executed.
 
 Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters, which a fit may change. Whole numbers (`2`) and
 `pi` are part of the form. A template contains the names `p0`, `p1`, … of the free parameters instead of their values.
-Called by `laws.law`; `FUNCTIONS` and `LawError` are used by all modules that handle laws.
+Called by `laws.law` and `analysis.diagnosis.discovery.evaluate_shape`; `FUNCTIONS` and `LawError` are used by all
+modules that handle laws.
 """
 
 import ast
@@ -26,13 +27,13 @@ FUNCTIONS: Mapping[str, int] = {
 MEMORY_OPERATORS = ("lag", "play", "delay", "integral")
 """Operators with memory, of a signal s: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s); times in s,
 half_width in the unit of s."""
-MOST_CHARACTERS, MOST_NODES = 2000, 200
+MAX_CHARACTERS, MAX_NODES = 2000, 200
 """Largest number of characters, and of nodes of the syntax tree, of a formula. Chosen: they bound the parsing time."""
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"
 }  # fmt: skip
 """Symbol of each binary operator, by its class in `ast`."""
-ALLOWED = "allowed are numbers, signals, pi, + - * / ** and " + ", ".join(FUNCTIONS)
+ALLOWED_ELEMENTS = "allowed are numbers, signals, pi, + - * / ** and " + ", ".join(FUNCTIONS)
 """Description of the language, for error messages."""
 
 
@@ -41,7 +42,7 @@ class LawError(ValueError):
 
 
 @dataclass(slots=True)
-class _Reader:
+class _TreeConverter:
     """Converter of Python's syntax tree to the tree of a law; it collects the free numbers in the order of the text.
     Methods raise LawError for text outside the language. text, template: see `parse_formula`."""
 
@@ -50,27 +51,27 @@ class _Reader:
     numbers: list[float] = field(default_factory=list)
     node_count: int = 0
 
-    def read(self, node: ast.expr) -> Node:
+    def convert(self, node: ast.expr) -> Node:
         """Convert a node of Python's syntax tree, with all nodes below it."""
         self.node_count += 1
-        if self.node_count > MOST_NODES:
-            raise LawError(f"the law has more than {MOST_NODES} parts; shorten it")
+        if self.node_count > MAX_NODES:
+            raise LawError(f"the law has more than {MAX_NODES} parts; shorten it")
         match node:
             case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-                return self._read_number(node, value)
+                return self._convert_number(node, value)
             case ast.Name(id=name):
-                return self._read_name(node, name)
+                return self._convert_name(node, name)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return Apply("neg", (self.read(inner),))
+                return Apply("neg", (self.convert(inner),))
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                return self.read(inner)
+                return self.convert(inner)
             case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
-                return Apply(_OPERATORS[type(operator)], (self.read(left), self.read(right)))
+                return Apply(_OPERATORS[type(operator)], (self.convert(left), self.convert(right)))
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                return self._read_call(node, name, arguments)
-        raise LawError(f"{self._describe_position(node)} is not part of the language of laws; {ALLOWED}")
+                return self._convert_call(node, name, arguments)
+        raise LawError(f"{self._describe_position(node)} is not part of the language of laws; {ALLOWED_ELEMENTS}")
 
-    def _read_number(self, node: ast.expr, value: float) -> Node:
+    def _convert_number(self, node: ast.expr, value: float) -> Node:
         """Convert a number: to a free parameter if it has a point or an exponent and is outside a template, else to a
         fixed number. Raises LawError where it overflows a 64-bit float."""
         try:
@@ -84,7 +85,7 @@ class _Reader:
         self.numbers.append(number)
         return FreeParameter(len(self.numbers) - 1)
 
-    def _read_name(self, node: ast.expr, name: str) -> Node:
+    def _convert_name(self, node: ast.expr, name: str) -> Node:
         """Convert a name: pi, a free parameter p0 to p999 (in a template only), or a signal, whose name is not
         checked."""
         if name == "pi":
@@ -97,17 +98,19 @@ class _Reader:
             raise LawError(f"{self._describe_position(node)} is a function; it takes its arguments in parentheses")
         return Variable(name)
 
-    def _read_call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
+    def _convert_call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
         """Convert a call of a function of `FUNCTIONS`; the second argument of an operator with memory must be
         constant."""
         if name not in FUNCTIONS:
             matches = get_close_matches(name[:60], FUNCTIONS, n=1)
             suggestion = f" (did you mean '{matches[0]}'?)" if matches else ""
-            raise LawError(f"{self._describe_position(node)}: there is no function '{name}'{suggestion}; {ALLOWED}")
+            raise LawError(
+                f"{self._describe_position(node)}: there is no function '{name}'{suggestion}; {ALLOWED_ELEMENTS}"
+            )
         if len(arguments) != FUNCTIONS[name]:
             expected_count = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
             raise LawError(f"{self._describe_position(node)}: {name} takes {expected_count}, not {len(arguments)}")
-        argument_trees = tuple(self.read(argument) for argument in arguments)
+        argument_trees = tuple(self.convert(argument) for argument in arguments)
         if name in MEMORY_OPERATORS[:3] and any(
             isinstance(leaf, Variable) and leaf.name != "pi" for leaf in _list_leaves(argument_trees[1])
         ):
@@ -129,15 +132,15 @@ def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float,
     text = text.strip()
     if not text:
         raise LawError("the law is empty")
-    if len(text) > MOST_CHARACTERS:
-        raise LawError(f"the law has {len(text)} characters; up to {MOST_CHARACTERS} are read")
+    if len(text) > MAX_CHARACTERS:
+        raise LawError(f"the law has {len(text)} characters; up to {MAX_CHARACTERS} are read")
     try:
         body = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError, SyntaxWarning) as error:
         raise LawError(_describe_syntax_error(text, error)) from error
-    reader = _Reader(text, template)
+    converter = _TreeConverter(text, template)
     try:
-        return reader.read(body), tuple(reader.numbers)
+        return converter.convert(body), tuple(converter.numbers)
     except RecursionError as error:
         raise LawError("the law is nested too deeply; write it with fewer brackets") from error
 
@@ -146,8 +149,8 @@ def _describe_syntax_error(text: str, error: BaseException) -> str:
     """Describe the error of a text that is no Python expression, with the position in its line (from 1) if known."""
     excerpt = text if len(text) <= 40 else f"{text[:40]}…"
     if isinstance(error, SyntaxError) and error.offset:
-        return f"'{excerpt}' cannot be read at character {error.offset}: {error.msg}; {ALLOWED}"
-    return f"'{excerpt}' cannot be read; {ALLOWED}"
+        return f"'{excerpt}' cannot be read at character {error.offset}: {error.msg}; {ALLOWED_ELEMENTS}"
+    return f"'{excerpt}' cannot be read; {ALLOWED_ELEMENTS}"
 
 
 def _find_column(text: str, node: ast.expr) -> int:

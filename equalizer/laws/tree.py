@@ -10,7 +10,7 @@ from dataclasses import dataclass
 _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = 1, 2, 3, 4, 5
 """Operator precedence, ascending."""
 DIGITS = 5
-"""Significant digits of displayed numbers."""
+"""Significant digits of displayed numbers. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +44,7 @@ class Apply:
 
 
 Node = Number | FreeParameter | Variable | Apply
+"""Node of an expression tree."""
 
 
 def iterate_nodes(tree: Node) -> Iterator[Node]:
@@ -60,7 +61,8 @@ def format_formula(tree: Node, numbers: Sequence[float] | None = None, digits: i
 
 
 def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None) -> tuple[str, int]:
-    """Text of a node, and the precedence of its outermost operator, which decides where parentheses are needed."""
+    """Format a node; returns its text and the precedence of its outermost operator, which decides where parentheses are
+    needed."""
     match tree:
         case Number(value):
             return _format_signed(repr(float(value)).removesuffix(".0"))
@@ -79,17 +81,19 @@ def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None
 
 
 def _format_free_number(value: float, digits: int | None) -> str:
-    """The value with a point or an exponent, which mark it as a free parameter; see `equalizer.laws.law.parse_law`."""
+    """Format a value with a point or an exponent, which mark it as a free parameter; see
+    `equalizer.laws.law.parse_law`."""
     return repr(float(value) if digits is None else float(f"{value:.{digits}g}"))
 
 
 def _format_signed(text: str) -> tuple[str, int]:
-    """The text of a number and its precedence: that of a sign for a negative number."""
+    """Find the precedence of a number's text: that of a sign for a negative number. Returns both."""
     return text, _SIGN if text.startswith("-") else _ATOM
 
 
 def _format_negated(text: str, precedence: int) -> tuple[str, int]:
-    """Text and precedence of the negated operand, given its text and precedence; a double sign is removed."""
+    """Format the negated operand, given its text and precedence; returns both of the result. A double sign is
+    removed."""
     if precedence < _PRODUCT:
         return f"-({text})", _SIGN
     return (text[1:], min(precedence, _SIGN)) if text.startswith("-") else (f"-{text}", min(precedence, _SIGN))
@@ -100,20 +104,20 @@ _OPERATORS = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT, "**": _POWER}
 
 
 def _format_operation(name: str, left: tuple[str, int], right: tuple[str, int]) -> tuple[str, int]:
-    """Text and precedence of a binary operation. left, right: text and precedence of the operands. For a negative
-    second operand, `a + -b` is written `a - b`, and `a * -b` as `a*(-b)`."""
+    """Format a binary operation; returns its text and precedence. left, right: text and precedence of the operands. For
+    a negative second operand, `a + -b` is written `a - b`, and `a * -b` as `a*(-b)`."""
     precedence = _OPERATORS[name]
     if name == "**":
         return f"{_parenthesise(left, _ATOM)}**{_parenthesise(right, _SIGN)}", precedence
-    first, second = _parenthesise(left, precedence), _parenthesise(right, precedence + 1)
+    left_text, right_text = _parenthesise(left, precedence), _parenthesise(right, precedence + 1)
     if precedence == _PRODUCT:
-        return f"{first}{name}{f'({second})' if second.startswith('-') else second}", precedence
-    if second.startswith("-"):
-        return f"{first} {'+' if name == '-' else '-'} {second[1:]}", precedence
-    return f"{first} {name} {second}", precedence
+        return f"{left_text}{name}{f'({right_text})' if right_text.startswith('-') else right_text}", precedence
+    if right_text.startswith("-"):
+        return f"{left_text} {'+' if name == '-' else '-'} {right_text[1:]}", precedence
+    return f"{left_text} {name} {right_text}", precedence
 
 
 def _parenthesise(formatted: tuple[str, int], min_precedence: int) -> str:
-    """The text, in parentheses if its precedence is below `min_precedence`. formatted: text and precedence."""
+    """Enclose a text in parentheses if its precedence is below `min_precedence`. formatted: text and precedence."""
     text, precedence = formatted
     return text if precedence >= min_precedence else f"({text})"

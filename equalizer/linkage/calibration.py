@@ -28,15 +28,15 @@ LARGEST_DIFFERENCE = 0.05
 
 POLYNOMIAL_DEGREES = (4, 3, 2, 1)
 """Degrees of the polynomial of `estimate_local_inertia`, tried from the highest: the first that the positions determine
-is used."""
+is used. Chosen."""
 POSITIONS_PER_TERM = 2
-"""Least ratio of positions to terms of the polynomial; below it a lower degree is used. Chosen."""
+"""Smallest ratio of positions to terms of the polynomial; below it a lower degree is used. Chosen."""
 WEIGHT_SD_RATIO = 0.3
 """Standard deviation of the Gaussian weight over the distance from the position, relative to the largest distance of a
 calibrated position from the origin. Chosen: without it, far positions change the slope at the centre of
 the simulated omega.3 by 20 %; with it, by 2 %."""
 MAX_LISTED_PROBLEMS = 10
-"""Largest number of problems at single positions that are listed; further ones are only counted."""
+"""Largest number of problems at single positions that are listed; further ones are only counted. Chosen."""
 
 
 class CalibrationError(ListedProblemsError):
@@ -65,6 +65,7 @@ class LinkageCalibration:
     plausible. Arrays without a description are those of `LinkageReading`, stacked."""
 
     device: str
+    """Name of the device."""
     details: str
     """Serial number, firmware, SDK."""
     read_on: str
@@ -88,6 +89,7 @@ class LinkageCalibration:
     difference: float
     """Largest relative difference between J and finite differences of the positions."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    """Origin of the calibration: JSON values by name."""
 
     def __post_init__(self) -> None:
         if problems := tuple(find_calibration_problems(self)):
@@ -97,11 +99,11 @@ class LinkageCalibration:
 def find_calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
     """Find the problems of a calibration, a clause for each; none for a calibration that can be used. Where shapes
     differ, nothing else is checked."""
-    positions = len(calibration.position_m)
+    count = len(calibration.position_m)
     shapes = {"position_m": (3,), "joint_angle_rad": (3,), "jacobian": (3, 3), "inertia_kg": (3, 3), "gravity_n": (3,)}
-    wrong_arrays = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (positions, *shape)]
-    if wrong_arrays or calibration.filled.shape != (positions,) or positions == 0:
-        yield f"{', '.join(wrong_arrays) or 'filled'} does not have one entry for each of the {positions} positions"
+    wrong_arrays = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (count, *shape)]
+    if wrong_arrays or calibration.filled.shape != (count,) or count == 0:
+        yield f"{', '.join(wrong_arrays) or 'filled'} does not have one entry for each of the {count} positions"
         return
     reading_problems = [
         problem

@@ -1,10 +1,10 @@
 """Vocabulary of the physical effects in mechanical model files: their names, places, parameters and units.
 
-Model files, `equalizer.effects` and the diagnosis use these names. The equations are in `equalizer.effects`, a file for
-each effect, which also defines parameters not described here. Meanings of parameters: `gap` is the total play,
-`width` half the dead band, `gain` a factor (1 = no effect), `degrees` the total rotation angle; `ppm` > 0 takes the
-response at t (1 + ppm 1e-6); `per_m` is in the mass M (1 + per_m x); `total` of a drift and `amplitude` of a hum are
-those of the largest channel, where all channels share the effect.
+Model files, `equalizer.effects` and the diagnosis use these names. `equalizer.effects` has a module for each effect,
+with its equation and the meaning of the parameters that are not described here: `gap` is the total play, `width` half
+the dead band, `gain` a factor (1 = no effect), `degrees` the total rotation angle; `ppm` > 0 takes the response at
+t (1 + ppm 1e-6); `per_m` is in the mass M (1 + per_m x); `total` of a drift and `amplitude` of a hum are those of the
+largest channel, where all channels share the effect.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ class EffectParameter:
     """Whether a file may omit it; it is needed to reproduce an effect exactly as it was fitted."""
 
     def find_unit(self, system: UnitSystem, response_unit: str) -> str:
-        """Return the unit of the parameter in a model with this unit system. response_unit: unit of the model's
-        response."""
+        """Return the parameter's unit in a model with this unit system: `unit` or `rotational_unit` in SI; outside SI
+        `unit` in the system's units, the command's unit for N m. RESPONSE is replaced by response_unit."""
         unit = {False: self.unit, True: self.rotational_unit, None: system.express(self.unit)}[system.rotational]
         if system.rotational is None and self.unit == ROTATIONAL.force:
             unit = system.force
@@ -68,30 +68,30 @@ def _make_optional(name: str, unit: str, rotational: str = "") -> EffectParamete
     return EffectParameter(name, unit, rotational or unit, optional=True)
 
 
-def _make_force(name: str) -> EffectParameter:
+def _require_force(name: str) -> EffectParameter:
     """Make a required parameter that is a force, or a torque in a rotational model."""
     return _make_required(name, "N", "N m")
 
 
-def _make_stiffness(name: str) -> EffectParameter:
+def _require_stiffness(name: str) -> EffectParameter:
     """Make a required parameter that is a stiffness."""
     return _make_required(name, "N/m", "N m/rad")
 
 
-def _make_damping(name: str) -> EffectParameter:
+def _require_damping(name: str) -> EffectParameter:
     """Make a required parameter that is a viscous damping."""
     return _make_required(name, "N s/m", "N m s/rad")
 
 
-def _make_mass(name: str) -> EffectParameter:
+def _require_mass(name: str) -> EffectParameter:
     """Make a required parameter that is a mass, or a moment of inertia in a rotational model."""
     return _make_required(name, "kg", "kg m^2")
 
 
 MATRIX_UNITS = {
-    "mass": _make_mass("mass"),
-    "damping": _make_damping("damping"),
-    "stiffness": _make_stiffness("stiffness"),
+    "mass": _require_mass("mass"),
+    "damping": _require_damping("damping"),
+    "stiffness": _require_stiffness("stiffness"),
 }
 """Name and unit of the entries of each matrix of a mechanical model."""
 
@@ -102,34 +102,36 @@ def find_matrix_unit(part: str, system: UnitSystem) -> str:
     return MATRIX_UNITS[part].find_unit(system, "1")
 
 
-EFFECT_NAMES: tuple[EffectEntry, ...] = (
-    EffectEntry("coulomb_friction", "mechanism", (_make_force("level"),)),
-    EffectEntry("asymmetric_friction", "mechanism", (_make_force("level_positive"), _make_force("level_negative"))),
+EFFECT_ENTRIES: tuple[EffectEntry, ...] = (
+    EffectEntry("coulomb_friction", "mechanism", (_require_force("level"),)),
+    EffectEntry(
+        "asymmetric_friction", "mechanism", (_require_force("level_positive"), _require_force("level_negative"))
+    ),
     EffectEntry(
         "stribeck_friction",
         "mechanism",
-        (_make_force("coulomb"), _make_force("static"), _make_required("speed", "m/s", "rad/s")),
+        (_require_force("coulomb"), _require_force("static"), _make_required("speed", "m/s", "rad/s")),
     ),
     EffectEntry(
         "position_dependent_friction",
         "mechanism",
         (
-            _make_force("level"),
+            _require_force("level"),
             _make_required("slope_per_m", "1/m", "1/rad"),
             _make_required("bend_per_m2", "1/m^2", "1/rad^2"),
         ),
     ),
-    EffectEntry("presliding_hysteresis", "mechanism", (_make_force("level"), _make_stiffness("stiffness"))),
-    EffectEntry("viscous_damping", "mechanism", (_make_damping("damping"),)),
+    EffectEntry("presliding_hysteresis", "mechanism", (_require_force("level"), _require_stiffness("stiffness"))),
+    EffectEntry("viscous_damping", "mechanism", (_require_damping("damping"),)),
     EffectEntry("quadratic_damping", "mechanism", (_make_required("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
     EffectEntry("hardening_stiffness", "mechanism", (_make_required("k3", "N/m^3", "N m/rad^3"),)),
     EffectEntry("asymmetric_stiffness", "mechanism", (_make_required("k2", "N/m^2", "N m/rad^2"),)),
-    EffectEntry("constant_force", "mechanism", (_make_force("force"),)),
+    EffectEntry("constant_force", "mechanism", (_require_force("force"),)),
     EffectEntry("gravity_torque", "mechanism", (_make_required("torque", "N m"), _make_required("angle", "rad"))),
     EffectEntry(
         "cogging",
         "mechanism",
-        (_make_force("amplitude"), _make_required("pitch", "m", "rad"), _make_optional("phase", "rad")),
+        (_require_force("amplitude"), _make_required("pitch", "m", "rad"), _make_optional("phase", "rad")),
     ),
     EffectEntry(
         "backlash",
@@ -144,14 +146,14 @@ EFFECT_NAMES: tuple[EffectEntry, ...] = (
     EffectEntry(
         "loose_joint",
         "mechanism",
-        (_make_required("gap", "m", "rad"), _make_stiffness("stiffness"), _make_force("slip")),
+        (_make_required("gap", "m", "rad"), _require_stiffness("stiffness"), _require_force("slip")),
     ),
     EffectEntry(
         "end_stop",
         "mechanism",
         (
             _make_required("position", "m", "rad"),
-            _make_stiffness("stiffness"),
+            _require_stiffness("stiffness"),
             _make_optional("opposite", "1"),
             _make_optional("side", "1"),
         ),
@@ -166,14 +168,16 @@ EFFECT_NAMES: tuple[EffectEntry, ...] = (
         "mechanism",
         (
             _make_required("frequency", "Hz"),
-            _make_mass("mass"),
+            _require_mass("mass"),
             _make_required("damping_ratio", "1"),
             _make_optional("tilt_next", "1"),
             _make_optional("tilt_after_next", "1"),
         ),
     ),
-    EffectEntry("added_mass", "mechanism", (_make_mass("mass"),)),
-    EffectEntry("hand_impedance", "hand", (_make_mass("mass"), _make_damping("damping"), _make_stiffness("stiffness"))),
+    EffectEntry("added_mass", "mechanism", (_require_mass("mass"),)),
+    EffectEntry(
+        "hand_impedance", "hand", (_require_mass("mass"), _require_damping("damping"), _require_stiffness("stiffness"))
+    ),
     EffectEntry(
         "time_varying_grip",
         "hand",
@@ -185,15 +189,17 @@ EFFECT_NAMES: tuple[EffectEntry, ...] = (
         ),
     ),
     EffectEntry(
-        "body_on_actuator", "actuator", (_make_mass("mass"), _make_damping("damping"), _make_stiffness("stiffness"))
+        "body_on_actuator",
+        "actuator",
+        (_require_mass("mass"), _require_damping("damping"), _require_stiffness("stiffness")),
     ),
-    EffectEntry("force_saturation", "actuator", (_make_force("limit"),)),
-    EffectEntry("force_deadband", "actuator", (_make_force("width"), _make_optional("jump", "1"))),
+    EffectEntry("force_saturation", "actuator", (_require_force("limit"),)),
+    EffectEntry("force_deadband", "actuator", (_require_force("width"), _make_optional("jump", "1"))),
     EffectEntry("slew_limit", "actuator", (_make_required("rate", "N/s", "N m/s"),)),
     EffectEntry("amplifier_lag", "actuator", (_make_required("time_constant", "s"),)),
     EffectEntry("transport_delay", "actuator", (_make_required("delay", "s"),)),
     EffectEntry("force_gain", "actuator", (_make_required("gain", "1"),)),
-    EffectEntry("force_nonlinearity", "actuator", (_make_required("square", "1"), _make_force("reference"))),
+    EffectEntry("force_nonlinearity", "actuator", (_make_required("square", "1"), _require_force("reference"))),
     EffectEntry("sensor_lag", "sensor", (_make_required("bandwidth", "Hz"),)),
     EffectEntry("sensor_clipping", "sensor", (_make_required("limit", RESPONSE),)),
     EffectEntry(
@@ -226,7 +232,7 @@ EFFECT_NAMES: tuple[EffectEntry, ...] = (
     EffectEntry("logger_offset", "sensor", (_make_required("offset", "s"), _make_optional("interpolated", "1"))),
     EffectEntry("lost_samples", "sensor", (_make_required("fraction", "1"),)),
 )
-"""All effects of the catalogue, by place: mechanism, hand, actuator, sensor. Units are SI."""
+"""All effects of the vocabulary but `DISCOVERED_LAW`, by place: mechanism, hand, actuator, sensor. Units are SI."""
 
 DISCOVERED_LAW = "discovered_law"
 """Name of an effect that is a formula with free parameters p0, p1, …; see `equalizer.laws`. Its place follows from the
@@ -234,5 +240,5 @@ quantity on which it acts (`LAW_PLACES`)."""
 LAW_PLACES: dict[str, Place] = {"force": "mechanism", "command": "actuator", "response": "sensor"}
 """Place of a law by the quantity on which it acts (`equalizer.laws.law.ActsOn`)."""
 
-EFFECTS_BY_NAME: dict[str, EffectEntry] = {effect.name: effect for effect in EFFECT_NAMES}
-"""Entries of the vocabulary by the name of the effect; without `DISCOVERED_LAW`."""
+EFFECTS_BY_NAME: dict[str, EffectEntry] = {effect.name: effect for effect in EFFECT_ENTRIES}
+"""`EFFECT_ENTRIES` by the name of the effect."""

@@ -87,7 +87,7 @@ class IdentifiedModel(SummaryDisplay):
 
     def with_parameters(self, parameters: FloatArray) -> Self:
         """Copy the model with other entries of A, B, C, D. parameters: (k,), in the order of the property
-        `parameters`."""
+        `parameters`. Raises ValueError for another number of entries."""
         shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]
         split_indices = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
         flat_matrices = np.split(np.asarray(parameters, dtype=np.float64), split_indices)
@@ -149,25 +149,25 @@ def _list_shape_problems(model: IdentifiedModel) -> Iterator[str]:
 
 
 def _list_channel_problems(
-    direction: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int
+    direction: str, channels: tuple[str, ...], unit: str | tuple[str, ...], channel_count: int
 ) -> Iterator[str]:
     """List a wrong number of channels or units, repeated channels and units outside SI. direction: "input" or "output";
-    count: number of channels of the matrices."""
-    if len(channels) != count:
-        yield f"{direction}_channels names {len(channels)} channels, but the matrices have {count}"
+    channel_count: number of channels of the matrices."""
+    if len(channels) != channel_count:
+        yield f"{direction}_channels names {len(channels)} channels, but the matrices have {channel_count}"
     if len(set(channels)) != len(channels):
         yield f"{direction}_channels names a channel twice: {', '.join(channels)}"
     units = (unit,) if isinstance(unit, str) else unit
-    if len(units) not in (1, count):
-        yield f"{direction}_unit holds {len(units)} units for {count} channels; one for all, or one per channel"
+    if len(units) not in (1, channel_count):
+        yield f"{direction}_unit holds {len(units)} units for {channel_count} channels; one for all, or one per channel"
     for unit_text in units:
         try:
-            parsed = parse_unit(unit_text)
+            parsed_unit = parse_unit(unit_text)
         except UnknownUnitError as error:
             yield f"{direction}_unit: {error}"
         else:
-            if parsed.si != unit_text:
-                yield f"{direction}_unit is '{unit_text}'; a model is in SI units, here {parsed.si}"
+            if parsed_unit.si != unit_text:
+                yield f"{direction}_unit is '{unit_text}'; a model is in SI units, here {parsed_unit.si}"
 
 
 def _list_uncertainty_problems(model: IdentifiedModel) -> Iterator[str]:

@@ -21,31 +21,32 @@ class DiscreteModel:
     the m commands and the forces at r ports, both held during the step. There are p responses."""
 
     step_s: float
+    """Duration T of a step (s)."""
     transition: FloatArray
     """(2n, 2n): state transition matrix A."""
-    by_command: FloatArray
+    state_by_command: FloatArray
     """(2n, m): input matrix of the commands, the columns u of H."""
-    by_axis_force: FloatArray
+    state_by_port_force: FloatArray
     """(2n, r): input matrix of the port forces, the columns f of H; per N, or per N m for a torque."""
     motion: FloatArray
     """(3 r, 2n): output matrix of the ports: rows of all positions, then velocities, then accelerations."""
     motion_by_command: FloatArray
     """(3 r, m): feedthrough from the commands to `motion`; not zero for accelerations only."""
-    motion_by_axis_force: FloatArray
+    motion_by_port_force: FloatArray
     """(3 r, r): feedthrough from the port forces to `motion`."""
     response: FloatArray
     """(p, 2n): output matrix of the responses, in the quantity of the model."""
     response_by_command: FloatArray
     """(p, m): feedthrough from the commands to the responses; not zero for an acceleration only."""
-    response_by_axis_force: FloatArray
+    response_by_port_force: FloatArray
     """(p, r): feedthrough from the port forces to the responses."""
     position: FloatArray
     """(p, 2n): output matrix of the positions at the responses, for any quantity of the model."""
 
 
 def compute_driven_axes(model: MechanicalModel) -> FloatArray:
-    """Compute (n, m): per command, the unit vector of the coordinates along which it acts; zeros for a command without
-    effect."""
+    """Compute the unit vectors (n, m) in the coordinates along which the m commands act; zeros for a command whose
+    column of the input matrix is zero."""
     column_norms = np.linalg.norm(model.input, axis=0)
     return np.asarray(model.input / np.where(column_norms > 0, column_norms, 1.0))
 
@@ -55,11 +56,13 @@ def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | 
     r), directions in the coordinates along which forces act and motion is output; None = the driven axes. Raises
     numpy.linalg.LinAlgError for a singular mass matrix."""
     n, m = model.coordinates, model.inputs
-    axes = compute_driven_axes(model) if ports is None else ports
-    acceleration_by_input = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
-    restoring = np.hstack([model.stiffness, model.damping])
-    acceleration_by_state = -np.asarray(np.linalg.solve(model.mass, restoring), dtype=np.float64)
-    state_count, input_count = 2 * n, m + axes.shape[1]
+    port_directions = compute_driven_axes(model) if ports is None else ports
+    acceleration_by_input = np.asarray(
+        np.linalg.solve(model.mass, np.hstack([model.input, port_directions])), dtype=np.float64
+    )
+    restoring_matrix = np.hstack([model.stiffness, model.damping])
+    acceleration_by_state = -np.asarray(np.linalg.solve(model.mass, restoring_matrix), dtype=np.float64)
+    state_count, input_count = 2 * n, m + port_directions.shape[1]
     generator_matrix = np.zeros((state_count + input_count, state_count + input_count))
     generator_matrix[:n, n:state_count] = np.eye(n)
     generator_matrix[n:state_count, :state_count] = acceleration_by_state
@@ -70,19 +73,20 @@ def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | 
         model.output, derivative_order, acceleration_by_state, acceleration_by_input
     )
     motion = [
-        _build_output_rows(axes.T, derivative, acceleration_by_state, acceleration_by_input) for derivative in range(3)
+        _build_output_rows(port_directions.T, derivative, acceleration_by_state, acceleration_by_input)
+        for derivative in range(3)
     ]
     return DiscreteModel(
         step_s=step_s,
         transition=step_matrices[:state_count, :state_count],
-        by_command=step_matrices[:state_count, state_count : state_count + m],
-        by_axis_force=step_matrices[:state_count, state_count + m :],
+        state_by_command=step_matrices[:state_count, state_count : state_count + m],
+        state_by_port_force=step_matrices[:state_count, state_count + m :],
         motion=np.vstack([rows for rows, _ in motion]),
         motion_by_command=np.vstack([feedthrough[:, :m] for _, feedthrough in motion]),
-        motion_by_axis_force=np.vstack([feedthrough[:, m:] for _, feedthrough in motion]),
+        motion_by_port_force=np.vstack([feedthrough[:, m:] for _, feedthrough in motion]),
         response=response,
         response_by_command=response_by_input[:, :m],
-        response_by_axis_force=response_by_input[:, m:],
+        response_by_port_force=response_by_input[:, m:],
         position=_build_output_rows(model.output, 0, acceleration_by_state, acceleration_by_input)[0],
     )
 

@@ -47,7 +47,9 @@ class ActuatorLimits:
     """Delay, first-order low pass and largest force of the actuator; 0 = none."""
 
     delay_s: float = 0.0
+    """Delay (s) from a command to its force."""
     bandwidth_hz: float = 0.0
+    """Bandwidth (Hz) of a first-order low pass per channel."""
     limit: float = 0.0
     """Largest force (N) or torque (N m) per channel."""
 
@@ -61,7 +63,7 @@ class Tolerance:
     damping_n_s_per_m: float | None = None
     stiffness_n_per_m: float | None = None
     modes: float | None = None
-    """Relative standard deviation of modal frequencies and masses."""
+    """Relative standard deviation of modal frequencies and masses (1 = 100 %)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +82,11 @@ class ModelEffect:
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class MechanicalModel(SummaryDisplay):
-    """A mechanical model. Raises MechanicalModelError for inconsistent values."""
+    """A mechanical model. Values are in the units of `system`; the SI units are stated below. Raises
+    MechanicalModelError for inconsistent values."""
 
     name: str
+    """Name of the device."""
     quantity: str
     """Quantity of the response; a key of DERIVATIVE_OF_QUANTITY."""
     mass: FloatArray
@@ -98,14 +102,18 @@ class MechanicalModel(SummaryDisplay):
     sensor: SensorLimits = SensorLimits()
     actuator: ActuatorLimits = ActuatorLimits()
     effects: tuple[ModelEffect, ...] = ()
+    """Nonlinear effects, in addition to the linear model."""
     tolerance: Tolerance | None = None
+    """Calibration uncertainty; None = not stated."""
     rotational: bool = False
     """Whether the coordinates are angles and the commands torques."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    """Origin of the model, as TOML values."""
     units: UnitSystem | None = None
     """Units of the parameters where these are not SI, as for commands that are currents; None = SI, by `rotational`."""
 
     def __post_init__(self) -> None:
+        """Copy the matrices as read-only double precision, and check all values. Raises MechanicalModelError."""
         for name in ("mass", "damping", "stiffness", "input", "output"):
             matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
             matrix.flags.writeable = False
@@ -135,7 +143,7 @@ class MechanicalModel(SummaryDisplay):
         return int(self.output.shape[0])
 
     def summary(self) -> Summary:
-        """Numbers of coordinates, commands and responses, and the effects, for printing."""
+        """Summarise the numbers of coordinates, commands and responses, and the effects, for printing."""
         return Summary(
             f"Mechanical model {self.name}",
             (
@@ -150,31 +158,34 @@ class MechanicalModel(SummaryDisplay):
 def adopt_recording_units(
     model: MechanicalModel, commands: Sequence[str], responses: Sequence[str], time: str = "s"
 ) -> MechanicalModel:
-    """The model with the unit system of its recordings; unchanged if it states its own units, if those of the
+    """Return the model with the unit system of its recordings; unchanged if it states units, if those of the
     recordings are SI, or if its input or output matrix converts units (has entries other than 0, 1 and -1). commands,
-    responses: units of the recordings' channels."""
-    is_unit_free = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
+    responses: units of the recordings' channels; time: unit of their time, "sample" where no time is known."""
+    has_unit_entries = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
     system = determine_unit_system(commands, responses, time)
-    if model.units is not None or not is_unit_free or system.rotational is not None:
+    if model.units is not None or not has_unit_entries or system.rotational is not None:
         return model
     return replace(model, units=system)
 
 
 def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
-    """Text that suggests the most similar of the allowed words, to be appended to a message; empty if none is
-    similar."""
-    matches = get_close_matches(word[:60], allowed, n=1)  # the comparison of longer words takes minutes
-    return f" (did you mean '{matches[0]}'?)" if matches else ""
+    """Suggest the most similar of the allowed words, as text to append to a message; empty if none is similar."""
+    similar_words = get_close_matches(word[:60], allowed, n=1)  # the comparison of longer words takes minutes
+    return f" (did you mean '{similar_words[0]}'?)" if similar_words else ""
 
 
 def _find_problems(model: MechanicalModel) -> Iterator[str]:
-    """A sentence for each inconsistent value of the model."""
+    """Find the inconsistent values of the model. Yields a sentence for each."""
     if model.quantity not in DERIVATIVE_OF_QUANTITY:
         yield f"model.quantity is '{model.quantity}'; allowed are {', '.join(DERIVATIVE_OF_QUANTITY)}"
     yield from _find_matrix_problems(model)
-    for section, limits in (("sensor", model.sensor), ("actuator", model.actuator), ("tolerance", model.tolerance)):
-        for name in () if limits is None else limits.__dataclass_fields__:
-            value = getattr(limits, name)
+    for section, section_values in (
+        ("sensor", model.sensor),
+        ("actuator", model.actuator),
+        ("tolerance", model.tolerance),
+    ):
+        for name in () if section_values is None else section_values.__dataclass_fields__:
+            value = getattr(section_values, name)
             if value is not None and not (np.isfinite(value) and value >= 0):
                 yield f"{section}.{name} is {value}; it must be a number that is not negative"
     for number, effect in enumerate(model.effects, start=1):
@@ -183,7 +194,7 @@ def _find_problems(model: MechanicalModel) -> Iterator[str]:
 
 
 def _find_matrix_problems(model: MechanicalModel) -> Iterator[str]:
-    """Shapes that do not agree with the mass matrix, values that are not finite, and an invalid mass matrix."""
+    """Find shapes that do not agree with the mass matrix, values that are not finite, and an invalid mass matrix."""
     n = model.mass.shape[0]
     shapes = {
         "mass": (n, n), "damping": (n, n), "stiffness": (n, n),
@@ -193,8 +204,8 @@ def _find_matrix_problems(model: MechanicalModel) -> Iterator[str]:
     for name, shape in shapes.items():
         matrix: FloatArray = getattr(model, name)
         if matrix.ndim != 2 or matrix.shape != shape or 0 in matrix.shape:
-            expected = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
-            yield f"model.{name} has shape {matrix.shape}, but must have {expected}: mass is {n} rows high"
+            expected_shape = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
+            yield f"model.{name} has shape {matrix.shape}, but must have {expected_shape}: mass is {n} rows high"
             is_valid = False
         elif not np.isfinite(matrix).all():
             yield f"model.{name} holds values that are not finite numbers"
@@ -204,18 +215,21 @@ def _find_matrix_problems(model: MechanicalModel) -> Iterator[str]:
 
 
 def _find_mass_problems(mass: FloatArray) -> Iterator[str]:
-    """Asymmetry of the mass matrix (n, n), or an eigenvalue that is not positive."""
+    """Find asymmetry of the mass matrix (n, n), or an eigenvalue that is not positive."""
     # Most matrices are exactly symmetric, and the exact comparison takes a tenth of the time of the approximate one.
     is_exactly_symmetric = np.array_equal(mass, mass.T)
     if not is_exactly_symmetric and not np.allclose(mass, mass.T, rtol=1e-6, atol=1e-9 * float(np.abs(mass).max())):
         yield "model.mass is not symmetric; inertia acts alike both ways, so m[i][j] must equal m[j][i]"
-    elif (lowest := float(np.linalg.eigvalsh(mass)[0])) <= 0:
-        yield f"model.mass is not positive definite (its lowest eigenvalue is {lowest:.3g}); every motion needs a mass"
+    elif (lowest_eigenvalue := float(np.linalg.eigvalsh(mass)[0])) <= 0:
+        yield (
+            f"model.mass is not positive definite (its lowest eigenvalue is {lowest_eigenvalue:.3g}); "
+            "every motion needs a mass"
+        )
 
 
 def find_effect_problems(effect: ModelEffect) -> Iterator[str]:
-    """Deviations of an effect from the vocabulary (unknown or missing names, values that are not finite), a sentence
-    for each."""
+    """Find deviations of an effect from the vocabulary: unknown or missing names, values that are not finite. Yields a
+    sentence for each."""
     if effect.kind == DISCOVERED_LAW:
         yield from _find_law_problems(effect)
         return
@@ -230,17 +244,17 @@ def find_effect_problems(effect: ModelEffect) -> Iterator[str]:
             yield f"{effect.kind} has no parameter '{name}'{suggest_word(name, names)}; allowed are {', '.join(names)}"
         elif not np.isfinite(value):
             yield f"{effect.kind}.{name} is {value}; it must be a finite number"
-    missing = [
+    missing_parameters = [
         f"{definition.name} ({definition.unit})"
         for definition in vocabulary_entry.parameters
         if not (definition.optional or definition.name in effect.parameters)
     ]
-    if missing:
-        yield f"{effect.kind} lacks {', '.join(missing)}"
+    if missing_parameters:
+        yield f"{effect.kind} lacks {', '.join(missing_parameters)}"
 
 
 def _find_law_problems(effect: ModelEffect) -> Iterator[str]:
-    """A discovered law that is missing, or parameters outside its expression."""
+    """Find a missing law of a discovered effect, or parameters outside its expression."""
     if effect.law is None:
         yield f"{effect.kind} lacks expression, acts_on or axis"
     if effect.parameters:

@@ -1,9 +1,8 @@
-"""Reads and writes mechanical models as TOML text.
+"""Parsing and formatting of mechanical models as TOML text. Called by `study.store.formats.mechanical_model_file`.
 
 Tables: [model] (name, quantity, matrices as lists of rows), [sensor], [actuator], [[effect]] (kind, axis, parameters),
-[tolerance], [provenance]. The reader collects all problems of form before it raises an error. Values are in SI units,
-or in those that [provenance] states. Called by
-`study.store.formats.mechanical_model_file`.
+[tolerance], [provenance]. The parser collects all problems of the text before it raises an error; only a text without
+any is checked for consistent values (`MechanicalModel`). Values are in SI units, or in those that [provenance] states.
 """
 
 import re
@@ -30,13 +29,13 @@ from equalizer.plant.mechanical_model import (
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
-MATRICES = ("mass", "damping", "stiffness", "input", "output")
+MATRIX_KEYS = ("mass", "damping", "stiffness", "input", "output")
 """Keys of the matrices in the table [model]."""
-_MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
+_MODEL_KEYS = ("name", "quantity", *MATRIX_KEYS, "rotational")
 _TOP_LEVEL_KEYS = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
 """Tables of the document; `rotational`, a key of [model], is accepted at the top level as well."""
 
-UNITS = "units"
+UNITS_KEY = "units"
 """Key of the table [provenance] for the units of force, length and time, where the model's values are not in SI
 units."""
 
@@ -45,7 +44,7 @@ Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
 
 
 def parse_mechanical_model(text: str) -> MechanicalModel:
-    """Parse a mechanical model. Raises MechanicalModelError with all problems found, a sentence for each."""
+    """Parse a mechanical model. Raises MechanicalModelError with a sentence for each problem."""
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -53,7 +52,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     problems: list[str] = _find_unknown_keys(document, _TOP_LEVEL_KEYS, "")
     model = _read_table(document, "model", problems)
     problems += _find_unknown_keys(model, _MODEL_KEYS, "model.")
-    matrices = {name: _read_matrix(model, name, problems) for name in MATRICES}
+    matrices = {name: _read_matrix(model, name, problems) for name in MATRIX_KEYS}
     texts = {name: _read_text(model, name, problems) for name in ("name", "quantity")}
     sensor = _read_number_table(document, "sensor", SensorLimits, problems)
     actuator = _read_number_table(document, "actuator", ActuatorLimits, problems)
@@ -88,7 +87,7 @@ def format_mechanical_model(model: MechanicalModel) -> str:
     lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
         lines.append("rotational = true")
-    for name in MATRICES:
+    for name in MATRIX_KEYS:
         rows = [f"  {_format_value(row)}," for row in getattr(model, name).tolist()]
         lines += [f"{name} = [", *rows, "]"]
     lines += _format_section("[sensor]", asdict(model.sensor))
@@ -99,7 +98,7 @@ def format_mechanical_model(model: MechanicalModel) -> str:
         )
     if model.tolerance is not None:
         lines += _format_section("[tolerance]", asdict(model.tolerance))
-    provenance = {**model.provenance, **({} if model.units is None else {UNITS: asdict(model.units)})}
+    provenance = {**model.provenance, **({} if model.units is None else {UNITS_KEY: asdict(model.units)})}
     if provenance:
         lines += _format_section("[provenance]", provenance)
     return "\n".join(lines) + "\n"
@@ -117,7 +116,7 @@ def _convert_dates_to_text(value: Any) -> Any:
 def _read_units(provenance: Mapping[str, Any]) -> UnitSystem | None:
     """Read the unit system in the provenance, as `format_mechanical_model` writes it; None, which means SI units, where
     the texts for force or length are missing. The time is in seconds where it is missing."""
-    stored_units = provenance.get(UNITS)
+    stored_units = provenance.get(UNITS_KEY)
     stored_texts = (
         {key: value for key, value in stored_units.items() if isinstance(value, str)}
         if isinstance(stored_units, dict)

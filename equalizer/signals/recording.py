@@ -1,5 +1,8 @@
 """A recording: the commands that entered the plant, the measured responses, and the conditions of the measurement.
 
+The input of identification and diagnosis. `recording_checks` checks it; `study.store.formats.recording_file` reads and
+writes it.
+
 Time convention: `response[k]` and `position[k]` are sampled at t_k, just before `command[k]` is written, which is held
 until t_(k+1). The response of a plant with direct feedthrough to `command[k-1]` therefore appears in `response[k]`.
 """
@@ -98,7 +101,7 @@ class Recording(SummaryDisplay):
         return len(self.response)
 
     def summary(self) -> Summary:
-        """Length, channels with units, and number of segments."""
+        """Summarise length, channels with units, and number of segments, for printing."""
         signals = {"command": self.command, "response": self.response, "position": self.position}
         return Summary(
             f"Recording of {self.device or 'a device'}",
@@ -111,5 +114,5 @@ class Recording(SummaryDisplay):
 
 
 def _format_channels(signal: Signal) -> str:
-    """Text of the channel names with their units, such as "fx [N], fy [N]"."""
+    """Format the channels with their units in brackets, for the summary: "fx [N], fy [N]"."""
     return ", ".join(f"{name} [{unit}]" for name, unit in zip(signal.channels, signal.units, strict=True))

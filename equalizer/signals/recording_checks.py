@@ -1,5 +1,7 @@
-"""Consistency checks of a recording, made when it is read or imported: lengths, rates, channels, segments, time
-stamps.
+"""Consistency checks of a recording: lengths, rates, channels, segments, time stamps.
+
+`study.store.formats.recording_file` and `study.importing.build_recording` call `check_recording` when they read or
+import a recording; identification and diagnosis call `find_unusable_channels`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +22,7 @@ def check_recording(recording: Recording) -> tuple[str, ...]:
 
 
 def collect_signals(recording: Recording) -> dict[str, Signal]:
-    """The signals of the recording, by their names in the file format; absent ones are left out."""
+    """Collect the signals of the recording by their names in the file format; absent ones are left out."""
     signals = {
         "command": recording.command,
         "response": recording.response,
@@ -32,13 +34,13 @@ def collect_signals(recording: Recording) -> dict[str, Signal]:
 
 
 def format_channels(signal: Signal) -> str:
-    """Format the channels of a signal with their units: "fx (N), fy (N)"."""
+    """Format the channels of a signal with their units: "fx (N), fy (N)", for messages."""
     return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))
 
 
 def find_unusable_channels(signals: Sequence[Signal]) -> Iterator[tuple[str, bool]]:
-    """Find channels without a finite value in any of the signals, or constant in each. Yields the channel's name and
-    whether it has no finite value. signals: all with the same channels."""
+    """Find channels without a finite value in any of the signals, or with constant finite values in each. Yields the
+    channel's name and whether it has no finite value. signals: all with the same channels."""
     for index, name in enumerate(signals[0].channels if signals else ()):
         columns = [signal.samples[:, index] for signal in signals]
         finite_columns = [column[np.isfinite(column)] for column in columns]
@@ -68,7 +70,7 @@ def find_segment_problems(segments: Sequence[Segment], sample_count: int) -> Ite
 
 
 def _check_segment(segment: Segment, sample_count: int) -> Iterator[str]:
-    """Yields predicates such as "stops at 12, but ...", to follow the segment's name in a sentence."""
+    """Check a segment. Yields a predicate per problem, such as "stops at 12, but ...", to follow the segment's name."""
     if not 0 <= segment.start < segment.stop:
         yield f"goes from {segment.start} to {segment.stop}; start must be at least 0 and below stop"
     elif segment.stop > sample_count:
@@ -84,7 +86,7 @@ def _check_segment(segment: Segment, sample_count: int) -> Iterator[str]:
 
 
 def _check_signals(recording: Recording) -> Iterator[str]:
-    """Lengths, rates and channels of all signals against those of the response. Yields a sentence per problem."""
+    """Check lengths, rates and channels of all signals against those of the response. Yields a sentence per problem."""
     if len(recording) == 0:
         yield "response holds no samples"
     for name, signal in collect_signals(recording).items():
@@ -106,7 +108,7 @@ def _check_signals(recording: Recording) -> Iterator[str]:
 
 
 def _check_time_stamps(time_s: FloatArray, sample_count: int) -> Iterator[str]:
-    """Time stamps (s): one per sample, finite, strictly increasing. Yields a sentence per problem."""
+    """Check time stamps (s): one per sample, finite, strictly increasing. Yields a sentence for the first problem."""
     if time_s.shape != (sample_count,):
         yield f"time_s has shape {time_s.shape}, but must be ({sample_count},), one stamp per sample"
     elif not np.isfinite(time_s).all():

@@ -1,5 +1,5 @@
 """A signal: uniformly sampled channels with sample rate, quantity, unit and channel names. Immutable.
-Recordings (`signals.recording`) consist of signals."""
+Recordings (`signals.recording`) and feedforward forces (`tracking.feedforward`) consist of signals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ class Signal:
     """
 
     samples: FloatArray
-    """(n, channels): time along the first dimension."""
+    """(n, channels): time along the first dimension; NaN is a missing sample."""
     sample_rate_hz: float
     quantity: str | tuple[str, ...]
     """One word for all channels ("force", "acceleration", "position", "torque", "angle", ...), or one per channel
@@ -65,16 +65,16 @@ class Signal:
         return len(self) / self.sample_rate_hz
 
     def compute_times_s(self) -> FloatArray:
-        """(n,): time of each sample (s), 0 at the first."""
+        """Compute the time (n,) of each sample (s), 0 at the first."""
         return np.arange(len(self), dtype=np.float64) / self.sample_rate_hz
 
     def select_samples(self, start: int, stop: int) -> Self:
-        """The signal from sample `start` (included) to `stop` (excluded)."""
+        """Return the signal from sample `start` (included) to `stop` (excluded)."""
         return replace(self, samples=self.samples[start:stop])
 
-    def select_channels(self, columns: Sequence[int]) -> Self:
-        """The signal with only the channels of these indices, in this order."""
-        indices = list(columns)
+    def select_channels(self, channel_indices: Sequence[int]) -> Self:
+        """Return the signal with only the channels of these indices, in this order."""
+        indices = list(channel_indices)
         return replace(
             self,
             samples=self.samples[:, indices],
@@ -84,18 +84,18 @@ class Signal:
         )
 
 
-def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) -> str | tuple[str, ...]:
-    """A single word where all channels have the same. Raises ValueError for another number of words than channels."""
+def _fold_equal_words(field_name: str, words: str | tuple[str, ...], channel_count: int) -> str | tuple[str, ...]:
+    """Reduce equal words to a single one. Raises ValueError for another number of words than channels."""
     if isinstance(words, str):
         return words
-    if len(words) != channels:
+    if len(words) != channel_count:
         raise ValueError(
-            f"{len(words)} entries of {name} for {channels} channels; give one for all, or one per channel"
+            f"{len(words)} entries of {field_name} for {channel_count} channels; give one for all, or one per channel"
         )
     return words[0] if len(set(words)) == 1 else tuple(words)
 
 
 def find_runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Find start (included) and stop (excluded) of each run of true values in a mask (n,)."""
-    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
+    run_edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
+    return list(zip(run_edges[::2], run_edges[1::2], strict=True))

@@ -2,7 +2,7 @@
 
 A unit is a product of symbols with exponents; each symbol after a slash divides. Factors are exact by definition: inch,
 pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi (BIPM, SI Brochure; NIST SP 811). Called by the
-readers of recordings, models and maps.
+readers of recordings, models and import maps.
 """
 
 import math
@@ -10,7 +10,8 @@ import re
 from dataclasses import dataclass
 
 Dimension = tuple[int, ...]
-"""Exponents of kg, m, s, A, K, rad. The angle is a separate dimension: otherwise N m and N m/rad would be equal."""
+"""Exponents of kg, m, s, A, K, rad, in this order. The angle is a separate dimension: else N m and N m/rad would be
+equal."""
 
 
 class UnknownUnitError(ValueError):
@@ -27,7 +28,7 @@ class _NotAUnitError(UnknownUnitError):
         return (
             f"'{text}' is not a unit known here{reason}"
             + (f" (did you mean '{suggestion}'?)" if suggestion else "")
-            + f"; {ALLOWED}"
+            + f"; {UNITS_CLAUSE}"
         )
 
 
@@ -110,7 +111,7 @@ KNOWN_UNITS = (
 """Units accepted in addition to SI. `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf`
 forces; `counts` are plain numbers of unknown scale."""
 
-ALLOWED = (
+UNITS_CLAUSE = (
     "allowed are SI symbols in ASCII (N, N m, m, rad, m/s, m/s^2, rad/s^2, V, A, kg, s, Hz, 1 ...; "
     f"prefixes n u m c k M) and {', '.join(KNOWN_UNITS)}"
 )
@@ -131,11 +132,12 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
 }
 """SI units that a well-known quantity may have. A quantity that is not listed may have any unit."""
 
-UNSTATED = "1"
+NO_UNIT = "1"
 """SI unit of numbers without a unit or of unknown scale (`counts`); they are not converted."""
 
-LONGEST_UNIT = 100
-"""Largest number of characters of a text for which other spellings are tried. Chosen by hand."""
+MAX_UNIT_TEXT_LENGTH = 100
+"""Largest number of characters of a text for which other spellings are tried. Chosen: longer than any unit; bounds the
+duration of the search."""
 
 _SYMBOLS = frozenset(_UNPREFIXED_UNITS) | {
     prefix + base for prefix in ("", *_PREFIX_FACTORS) for base in _PREFIXABLE_DIMENSIONS
@@ -146,7 +148,7 @@ def parse_unit(text: str) -> Unit:
     """Parse a unit: a product such as `N m s/rad`. Raises UnknownUnitError for an empty text and any other that is not
     a unit; its message lists the accepted units."""
     if not text.strip():
-        raise UnknownUnitError(f"the unit is missing; {ALLOWED}")
+        raise UnknownUnitError(f"the unit is missing; {UNITS_CLAUSE}")
     if text.strip() in _UNPREFIXED_UNITS:
         return _UNPREFIXED_UNITS[text.strip()]
     if re.fullmatch(r"ms\^-[12]", text.strip()):  # m/s is meant, but would be read as 1/ms
@@ -170,7 +172,7 @@ def check_quantity(quantity: str, unit: Unit) -> None:
     """Check that the unit fits the quantity. Raises UnknownUnitError where a quantity of `QUANTITY_UNITS` has a unit
     that is not listed there. The unit 1 (unknown scale) fits every quantity."""
     allowed_units = QUANTITY_UNITS.get(quantity)
-    if allowed_units and unit.si not in (*allowed_units, UNSTATED):
+    if allowed_units and unit.si not in (*allowed_units, NO_UNIT):
         raise UnknownUnitError(
             f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(allowed_units)}"
             f"{suggest_force_unit(quantity, unit)}"
@@ -255,26 +257,26 @@ def _format_power(symbol: str, power: int) -> str:
 
 
 def suggest_unit(text: str) -> str:
-    """Find the accepted unit nearest to a text that is not a unit; empty where none is near."""
-    rewritten = normalise_unit(text)
-    if rewritten != text:
-        return rewritten
+    """Find the accepted unit of the most similar spelling to a text that is not a unit; empty where none is similar."""
+    respelled_text = normalise_unit(text)
+    if respelled_text != text:
+        return respelled_text
     from equalizer.signals.unit_spellings import find_nearest_unit
 
-    nearest = find_nearest_unit(text, _SYMBOLS) if len(text) <= LONGEST_UNIT else text
-    return nearest if nearest != text and _is_accepted(nearest) else ""
+    nearest_unit = find_nearest_unit(text, _SYMBOLS) if len(text) <= MAX_UNIT_TEXT_LENGTH else text
+    return nearest_unit if nearest_unit != text and _is_accepted(nearest_unit) else ""
 
 
 def normalise_unit(text: str) -> str:
     """Rewrite a unit in the spelling of this module (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is
     not a unit is returned unchanged."""
-    if len(text) > LONGEST_UNIT:
+    if len(text) > MAX_UNIT_TEXT_LENGTH:
         return text
     # Imported here, because only files of other origin need it.
     from equalizer.signals.unit_spellings import respell
 
-    rewritten = respell(text, _SYMBOLS)
-    return rewritten if rewritten != text and _is_accepted(rewritten) else text
+    respelled_text = respell(text, _SYMBOLS)
+    return respelled_text if respelled_text != text and _is_accepted(respelled_text) else text
 
 
 def _is_accepted(text: str) -> bool:
@@ -286,7 +288,8 @@ def _is_accepted(text: str) -> bool:
     return True
 
 
-# Preferred spelling of a unit by dimension: kg m/s^2 is written as N, m/s/s as m/s^2. Parsing reads it as it is filled.
+# Preferred spelling of a unit by dimension: kg m/s^2 is written as N, m/s/s as m/s^2. Only the dimension of the parsed
+# unit is used here, which does not depend on the entries that `parse_unit` finds in this unfinished table.
 _PREFERRED_SPELLINGS: dict[Dimension, str] = {}
 for _unit_text in ("N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "s", "kg", "1"):
     _PREFERRED_SPELLINGS[parse_unit(_unit_text).dimension] = _unit_text

@@ -1,4 +1,7 @@
-"""Pydantic types with validation for values that occur in several tables of a protocol file: names and frequencies."""
+"""Pydantic types with validation for values that occur in several tables of a protocol file: names and frequencies.
+
+Used by the other modules of `protocols.definition`. Where no reason is stated, a bound is chosen.
+"""
 
 from typing import Annotated
 
@@ -8,10 +11,11 @@ from protocols.definition.problem import Problem, refuse
 
 
 def _require_whole_tenths(frequency_hz: float) -> float:
-    """Return the frequency (Hz). Raises InconsistentError unless it is a multiple of 0.1 Hz, apart from rounding."""
+    """Return the frequency (Hz) unchanged. Raises InconsistentError unless it is a multiple of 0.1 Hz, within 1e-10 Hz
+    for rounding."""
     if abs(frequency_hz * 10 - round(frequency_hz * 10)) > 1e-9:
-        allowed = "whole tenths of a hertz, so that whole periods can be looped"
-        refuse([Problem("", f"is {frequency_hz} Hz", allowed)])
+        allowed_text = "whole tenths of a hertz, so that whole periods can be looped"
+        refuse([Problem("", f"is {frequency_hz} Hz", allowed_text)])
     return frequency_hz
 
 

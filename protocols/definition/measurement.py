@@ -1,4 +1,7 @@
-"""Settings of the recording of a trial: what is kept, and the conditions under which the trial is valid."""
+"""Settings of the recording of a trial: what is kept, and the conditions under which the trial is valid.
+
+Table `measurement` of a `StudyProtocol`; `study.workflows.trial.judge_trial` applies the conditions.
+"""
 
 from typing import Annotated
 

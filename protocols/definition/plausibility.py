@@ -97,5 +97,5 @@ class PlausibilitySettings:
     ] = 1.0
 
 
-DEFAULT_VALUES = asdict(PlausibilitySettings())
+PLAUSIBILITY_DEFAULTS = asdict(PlausibilitySettings())
 """The default values. A protocol with these values has the same hash as one without this table."""

@@ -1,8 +1,8 @@
 """Settings of probes: short known forces, played between trials, that measure how device and grip change in a session.
 
 A probe is a multisine on all three axes. It shows the response of the device with the hand; a reference, the same
-without a hand, shows that of the device alone. `[probes]` of a protocol (`study_protocol`); the forces are made by
-`study.session.stimulus.probe_stimulus`.
+multisine without a hand, shows that of the device alone. The settings are the table `probes` of a `StudyProtocol`;
+`study.session.stimulus.probe_stimulus` computes the forces.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ if TYPE_CHECKING:
     from protocols.definition.study_protocol import StudyProtocol
 
 LEAST_REFERENCE_TO_HZ = 45.0
-"""Least `to_hz` with a reference: several lines above 30 Hz are needed to recognise whether the handle is free."""
+"""Least `to_hz` with a reference: several lines above 30 Hz are needed to recognise whether the handle is free.
+Chosen."""
 
 PERIOD_S = 1.0
 """Period (s) of a probe's multisine: its odd lines are 2 Hz apart, and each of them drives a single axis."""
 
 LOWEST_LINE_HZ = 3.0
-"""Lowest line (Hz): below it, the acceleration due to forces that are hardly felt is below the sensor's noise."""
+"""Lowest line (Hz): below it, the acceleration due to forces that are hardly felt is below the sensor's noise.
+Chosen."""
 
 LevelN = Annotated[float, Field(gt=0, le=1.5)]
 """Peak force of a probe, N; its upper limit is chosen by hand."""
@@ -85,7 +87,7 @@ class ProbeSettings:
 
     @model_validator(mode="after")
     def _check_limits(self) -> Self:
-        """Check levels against their cap, and the settings that a reference needs. Raises through `refuse`."""
+        """Check levels against their cap, and the settings that a reference needs. Raises InconsistentError."""
         if self.levels_n and max(self.levels_n) > self.probe_cap_n:
             violation = f"holds {max(self.levels_n):g} N, above probe_cap_n"
             refuse([Problem("levels_n", violation, f"at most {self.probe_cap_n:g} N each")])

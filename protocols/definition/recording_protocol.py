@@ -1,6 +1,7 @@
 """Definition of a recording protocol: excitations, their directions, the virtual spring, safety limits and timing.
 
-A protocol file of kind "recording" is read into `RecordingProtocol`, which validates it; `hapteq record` plays it.
+A protocol file of kind "recording" is read into `RecordingProtocol`, which validates it. Read by
+`protocols.document.loading`; `hapteq record` plays it (`study.workflows.recording`).
 """
 
 from typing import Annotated, Literal, Self
@@ -81,16 +82,16 @@ class RecordingProtocol:
 
     @model_validator(mode="after")
     def _require_amplitudes_within_cap(self) -> Self:
-        """Refuse a segment whose amplitude is above the cap of the stimulus."""
+        """Raise InconsistentError where the amplitude of a segment (N) is above the cap of the stimulus."""
         cap_n = self.safety.stimulus_cap_n
         refuse(
             [
                 Problem(
-                    f"segments[{number}].amplitude_n",
+                    f"segments[{segment_number}].amplitude_n",
                     f"is {segment.amplitude_n} N, above safety.stimulus_cap_n",
                     f"above 0 and at most {cap_n} N, the cap",
                 )
-                for number, segment in enumerate(self.segments, start=1)
+                for segment_number, segment in enumerate(self.segments, start=1)
                 if segment.amplitude_n > cap_n
             ]
         )

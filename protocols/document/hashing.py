@@ -1,8 +1,8 @@
 """Hash of a protocol: identifies the settings of a study, independent of the formatting of its file.
 
-Sessions, locks and recordings store it, so that a changed protocol is detected. Settings that later versions added to
-the format enter the hash only where they differ from their defaults, so that old hashes stay valid: the tables
-`*_ADDITIONS` list them.
+Sessions, locks (`protocols.document.lock`) and recordings store it, so that a changed protocol is detected. Settings
+that later versions added to the format enter the hash only where they differ from their defaults, so that old hashes
+stay valid: the tables `*_ADDITIONS` list them.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ from typing import Any
 
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.participant_text import TextSettings
-from protocols.definition.plausibility import DEFAULT_VALUES
+from protocols.definition.plausibility import PLAUSIBILITY_DEFAULTS
 from protocols.definition.preparation import (
     ConsentSettings,
     DemoSettings,
@@ -47,7 +47,7 @@ TABLE_ADDITIONS = {
 """Tables of a study protocol added after the first locks and sessions, with their defaults. A table at its defaults is
 left out of the hash."""
 
-SAFETY_ADDITIONS: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": DEFAULT_VALUES}
+SAFETY_ADDITIONS: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": PLAUSIBILITY_DEFAULTS}
 """Safety settings added later, in study and recording protocols, by dotted path, with their defaults; forces in N."""
 
 ROVE_ADDITIONS: dict[str, DefaultValue] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
@@ -113,10 +113,10 @@ def hash_protocol(protocol: StudyProtocol | RecordingProtocol) -> str:
     for path, default in FIELD_ADDITIONS[protocol.kind].items():
         _delete_default(values, path.split("."), default)
     # JSON writes 0.0 and -0.0 differently, though the values are equal; adding 0.0 turns -0.0 into 0.0.
-    text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    normalised = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
-    canonical = json.dumps(normalised, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(canonical.encode()).hexdigest()
+    json_text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    normalised_values = json.loads(json_text, parse_float=lambda digits: float(digits) + 0.0)
+    canonical_json = json.dumps(normalised_values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(canonical_json.encode()).hexdigest()
 
 
 def _delete_default(values: Any, path: list[str], default: DefaultValue) -> None:

@@ -20,9 +20,9 @@ from protocols.document.schema import (
     resolve_reference,
 )
 
-_LONGEST_COMPARED_TEXT = 60
-"""Number of leading characters of a text that are compared with known keys: comparing long texts takes minutes.
-Chosen."""
+_MAX_COMPARED_LENGTH = 60
+"""Number of leading characters of a text that are compared with known keys; chosen, because the comparison of long
+texts takes minutes."""
 
 
 def collect_problems(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
@@ -64,8 +64,8 @@ def find_nearest_key(key: str, known_keys: Sequence[str]) -> str | None:
     for candidate in known_keys:
         if candidate.endswith(suffixes) and candidate.rsplit("_", 1)[0] in (key, key.rsplit("_", 1)[0]):
             return candidate
-    candidates = get_close_matches(key[:_LONGEST_COMPARED_TEXT].lower(), known_keys, n=1)
-    return candidates[0] if candidates else None
+    similar_keys = get_close_matches(key[:_MAX_COMPARED_LENGTH].lower(), known_keys, n=1)
+    return similar_keys[0] if similar_keys else None
 
 
 def describe_value(value: Any) -> str:
@@ -128,11 +128,11 @@ def _report_unknown_key(root: Node, location: ValuePath) -> Problem:
     key, known_keys = str(location[-1]), _list_sibling_keys(root, location)
     table = format_key_path(root, location[:-1])
     problem = f"is no key of {f'[{table}]' if table else 'a protocol'}"
-    sections_with_key = _find_sections(root, key)
+    tables_with_key = _find_tables_with_key(root, key)
     if table and key in root["properties"]:
         problem += "; it belongs at the top of the file, before the first [table]"
-    elif sections_with_key:
-        problem += f"; it belongs in [{sections_with_key[0]}]"
+    elif tables_with_key:
+        problem += f"; it belongs in [{tables_with_key[0]}]"
     elif suggestion := find_nearest_key(key, known_keys):
         problem += f"; did you mean {suggestion}"
     return Problem(format_key_path(root, location), problem, ", ".join(known_keys))
@@ -145,7 +145,7 @@ def _report_wrong_entry_kind(root: Node, location: ValuePath, error: Any) -> Pro
     given_kind = error["input"].get(kind_key)
     problem = "is missing" if given_kind is None else f'is "{given_kind}"'
     if isinstance(given_kind, str) and (
-        suggestions := get_close_matches(given_kind[:_LONGEST_COMPARED_TEXT], choices, n=1)
+        suggestions := get_close_matches(given_kind[:_MAX_COMPARED_LENGTH], choices, n=1)
     ):
         problem += f'; did you mean "{suggestions[0]}"'
     return Problem(
@@ -159,7 +159,7 @@ def _list_sibling_keys(root: Node, location: ValuePath) -> tuple[str, ...]:
     return list_keys(root, table) if table else ()
 
 
-def _find_sections(root: Node, key: str) -> list[str]:
+def _find_tables_with_key(root: Node, key: str) -> list[str]:
     """Find the names of the top-level tables that have this key."""
-    sections = {name: resolve_reference(root, node) for name, node in root["properties"].items()}
-    return [name for name, section in sections.items() if key in section.get("properties", {})]
+    tables = {name: resolve_reference(root, node) for name, node in root["properties"].items()}
+    return [name for name, table in tables.items() if key in table.get("properties", {})]

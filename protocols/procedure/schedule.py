@@ -17,31 +17,34 @@ from protocols.procedure.staircase import to_db, to_newton
 from protocols.trial import Phase
 
 
-def make_williams_rows(conditions: int) -> tuple[tuple[int, ...], ...]:
-    """Williams design (Latin square balanced for first-order carry-over): orders of conditions 0 … conditions - 1.
+def make_williams_rows(condition_count: int) -> tuple[tuple[int, ...], ...]:
+    """Make a Williams design (Latin square balanced for first-order carry-over): orders of the conditions 0 to n - 1.
 
-    One row per participant. Over all rows each condition occurs in each position equally often, and follows each other
-    condition equally often: once in the `conditions` rows of an even number of conditions, twice in the 2 x
-    `conditions` rows of an odd number. Raises ValueError for fewer than one condition.
+    n: condition_count. One row per participant. Over all rows each condition occurs in each position equally often, and
+    follows each other condition equally often: once in the n rows of an even n, twice in the 2 n rows of an odd n.
+    Raises ValueError for fewer than one condition.
 
     Source: E. J. Williams, Experimental designs balanced for the estimation of residual effects of treatments,
     Australian Journal of Scientific Research A 2 (1949), 149-168.
     """
-    if conditions < 1:
-        raise ValueError(f"a Williams design needs one condition at the least, not {conditions}")
+    if condition_count < 1:
+        raise ValueError(f"a Williams design needs one condition at the least, not {condition_count}")
     # 0, 1, n-1, 2, n-2, …: for an even n all successive differences modulo n are different, so that the shifted rows
     # contain each ordered pair of neighbours once. For an odd n the reversed rows supply the missing pairs.
     first_row = [0]
-    for position in range(1, conditions):
-        first_row.append((position + 1) // 2 if position % 2 else conditions - position // 2)
-    rows = tuple(tuple((condition + shift) % conditions for condition in first_row) for shift in range(conditions))
-    if conditions % 2 == 0:
+    for position in range(1, condition_count):
+        first_row.append((position + 1) // 2 if position % 2 else condition_count - position // 2)
+    rows = tuple(
+        tuple((condition + shift) % condition_count for condition in first_row) for shift in range(condition_count)
+    )
+    if condition_count % 2 == 0:
         return rows
     return rows + tuple(row[::-1] for row in rows)
 
 
-BLOCK = 8
-"""Block length (trials) within which balanced directions occur equally often."""
+BALANCED_BLOCK_TRIALS = 8
+"""Block length (trials) within which balanced directions occur equally often; even. Chosen; part of the format: a
+change would change the draws of earlier sessions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,7 @@ class Run:
     """Number of the run in the session, from 0; the order is training, practice, test, detection."""
     phase: Phase
     frequency_hz: float
+    """Stimulus frequency of the run (Hz)."""
     practice: bool = False
     """True for a training run without a staircase, which ends by a criterion (`protocols.procedure.practice`)."""
 
@@ -67,22 +71,24 @@ class Draw:
 
 
 def schedule_runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[Run, ...]:
-    """All runs of a session: training and practice as listed in the protocol, the test runs in the order of
+    """List all runs of a session: training and practice as listed in the protocol, the test runs in the order of
     `order_frequencies`, then detection as listed. participant_number: from 0."""
-    order = order_frequencies(protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number)
-    planned = [
+    ordered_frequencies_hz = order_frequencies(
+        protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number
+    )
+    phases_and_frequencies = [
         *((Phase.TRAINING, frequency_hz, False) for frequency_hz in protocol.training.frequencies_hz),
         *((Phase.TRAINING, frequency_hz, True) for frequency_hz in protocol.practice.frequencies_hz),
-        *((Phase.TEST, frequency_hz, False) for frequency_hz in order),
+        *((Phase.TEST, frequency_hz, False) for frequency_hz in ordered_frequencies_hz),
         *((Phase.DETECTION, frequency_hz, False) for frequency_hz in protocol.detection.frequencies_hz),
     ]
-    return tuple(Run(index, *run) for index, run in enumerate(planned))
+    return tuple(Run(index, *run) for index, run in enumerate(phases_and_frequencies))
 
 
 def order_frequencies(
     settings: ScheduleSettings, frequencies_hz: tuple[float, ...], seed: int, participant_number: int
 ) -> tuple[float, ...]:
-    """Test frequencies in the order of their runs. participant_number: from 0; only the Williams design uses it."""
+    """Order the test frequencies (Hz) by their runs. participant_number: from 0; only the Williams design uses it."""
     match settings.order:
         case "as_listed":
             return frequencies_hz
@@ -102,8 +108,8 @@ def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: 
     if settings.directions == "balanced" and attempt == 0:
         # A repeated trial (attempt > 0, only in sessions under version 1 of `study.session.state.rules`) is drawn
         # independently of the block: otherwise its direction would be that of the first attempt, already felt.
-        block, position = divmod(trial, BLOCK)
-        direction = 1 + _draw_permutation(seed, (run, block), BLOCK)[position] % 2
+        block, position = divmod(trial, BALANCED_BLOCK_TRIALS)
+        direction = 1 + _draw_permutation(seed, (run, block), BALANCED_BLOCK_TRIALS)[position] % 2
     return Draw(direction, 1 if onset_polarity == "positive" else 1 - 2 * polarity_bit)
 
 
@@ -151,36 +157,37 @@ _CATCH_KEY, _DETECTION_KEY, _ROVE_KEY = 0, 1, 2
 elements never gives the same words as a trial's key of three."""
 
 
-def are_labels_swapped(settings: ScheduleSettings, frequencies: int, participant_number: int) -> bool:
+def are_labels_swapped(settings: ScheduleSettings, frequency_count: int, participant_number: int) -> bool:
     """Whether the numbers 1 and 2 are exchanged for this participant.
 
     True for every second participant, and for the other half on the next pass through the Williams rows, so that each
-    order of the frequencies occurs with both labellings. frequencies: number of stimulus frequencies;
+    order of the frequencies occurs with both labellings. frequency_count: number of stimulus frequencies;
     participant_number: from 0.
     """
     if settings.labels == "fixed":
         return False
-    passes = (
-        participant_number // len(make_williams_rows(frequencies))
-        if settings.order == "williams" and frequencies
+    completed_passes = (
+        participant_number // len(make_williams_rows(frequency_count))
+        if settings.order == "williams" and frequency_count
         else 0
     )
-    return (participant_number + passes) % 2 == 1
+    return (participant_number + completed_passes) % 2 == 1
 
 
 def label_direction(direction: int, is_swapped: bool) -> int:
-    """Number on the screen, 1 or 2, for a direction; the mapping is its own inverse."""
+    """Return the number on the screen, 1 or 2, for a direction, and also the direction for a number on the screen."""
     return 3 - direction if is_swapped else direction
 
 
 def draw_words(seed: int, key: tuple[int, ...], count: int) -> tuple[int, ...]:
-    """`count` pseudo-random 64-bit words for a key. The length is part of the key, so that keys of different lengths
-    give different words."""
+    """Draw `count` pseudo-random 64-bit words for a key. The length is part of the key, so that keys of different
+    lengths give different words."""
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(len(key), *key))
     return tuple(int(word) for word in sequence.generate_state(count, np.uint64))
 
 
 def _draw_permutation(seed: int, key: tuple[int, ...], size: int) -> tuple[int, ...]:
-    """Random permutation by sorting independent 64-bit words; the probability of a tie is below size² / 2^65."""
+    """Draw a random permutation of 0 to size - 1 by sorting independent 64-bit words; the probability of a tie is below
+    size² / 2^65."""
     words = draw_words(seed, key, size)
     return tuple(sorted(range(size), key=words.__getitem__))

@@ -60,12 +60,12 @@ class StaircaseState:
 
 
 def begin_staircase(rule: StaircaseRule) -> StaircaseState:
-    """State before the first answer of a run, at the rule's start level."""
+    """Return the state before the first answer of a run, at the rule's start level."""
     return StaircaseState(level_db=to_db(rule.start_n))
 
 
 def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
-    """State after one answer.
+    """Compute the state after one answer.
 
     The level rises after `up_after_wrong` consecutive wrong answers and falls after `down_after_right` consecutive
     right ones (after one each until the first reversal, with `initial_one_up_one_down`); a change of direction is a
@@ -74,20 +74,20 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     """
     if is_finished(rule, state):
         raise ValueError("this run is finished: no answer can follow")
-    updated = _count_answer(rule, state, correct)
+    counted_state = _count_answer(rule, state, correct)
     if rule.is_bayesian:
-        return _apply_psi(rule, updated, correct)
-    if updated.wrong_in_a_row >= _count_wrong_needed(rule, state):
-        return _move_level(rule, updated, Heading.UP)
-    if updated.right_in_a_row >= _count_right_needed(rule, state):
-        return _move_level(rule, updated, Heading.DOWN)
-    return updated
+        return _apply_psi(rule, counted_state, correct)
+    if counted_state.wrong_in_a_row >= _count_wrong_needed(rule, state):
+        return _move_level(rule, counted_state, Heading.UP)
+    if counted_state.right_in_a_row >= _count_right_needed(rule, state):
+        return _move_level(rule, counted_state, Heading.DOWN)
+    return counted_state
 
 
 def is_finished(rule: StaircaseRule, state: StaircaseState) -> bool:
     """Whether the run is complete or has reached its trial limit."""
-    out_of_trials = rule.trial_limit > 0 and state.trials >= rule.trial_limit
-    return is_complete(rule, state) or out_of_trials
+    is_at_trial_limit = rule.trial_limit > 0 and state.trials >= rule.trial_limit
+    return is_complete(rule, state) or is_at_trial_limit
 
 
 def is_complete(rule: StaircaseRule, state: StaircaseState) -> bool:
@@ -98,18 +98,18 @@ def is_complete(rule: StaircaseRule, state: StaircaseState) -> bool:
     return state.reversals >= rule.reversals
 
 
-def level_n(rule: StaircaseRule, state: StaircaseState) -> float:
-    """Level to present (N); never above the cap, not even by rounding in the conversion from dB."""
+def compute_level_n(rule: StaircaseRule, state: StaircaseState) -> float:
+    """Compute the level to present (N); never above the cap, not even by rounding in the conversion from dB."""
     return min(to_newton(state.level_db), rule.cap_n)
 
 
 def to_db(level_n: float) -> float:
-    """Level in dB re 1 N: 20 log10(level_n)."""
+    """Convert a level above 0 from N to dB re 1 N: 20 log10(level_n)."""
     return 20.0 * math.log10(level_n)
 
 
 def to_newton(level_db: float) -> float:
-    """Level in N: 10^(level_db / 20)."""
+    """Convert a level from dB re 1 N to N: 10^(level_db / 20)."""
     return float(10.0 ** (level_db / 20.0))
 
 
@@ -125,7 +125,7 @@ def _count_answer(rule: StaircaseRule, state: StaircaseState, correct: bool) -> 
 
 
 def _apply_psi(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
-    """State with the level that Psi chooses after this answer, at most the cap, and the standard deviation of the new
+    """Set the level that Psi chooses after this answer, at most the cap, and the standard deviation of the new
     posterior."""
     cap_db, answered = to_db(rule.cap_n), (*state.answered, (state.level_db, correct))
     posterior = compute_posterior(answered, cap_db)
@@ -160,17 +160,18 @@ def _move_level(rule: StaircaseRule, state: StaircaseState, heading: Heading) ->
 
 
 def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool) -> float:
-    """Size of the next change of level (dB). The phase of `rule.steps` follows from the number of reversals so far;
-    `rule.step_change` determines whether the present reversal already counts. After the last phase its step remains."""
-    reversals_now = reversals_before + is_reversal
+    """Find the size of the next change of level (dB). The phase of `rule.steps` follows from the number of reversals so
+    far; `rule.step_change` determines whether the present reversal already counts. After the last phase its step
+    remains."""
+    reversals_with_present = reversals_before + is_reversal
     match rule.step_change:
         case StepChange.AFTER_REVERSAL:
             # The movement at the reversal that completes a phase still has that phase's step.
             reversal_count = reversals_before
         case StepChange.AT_REVERSAL:
-            reversal_count = reversals_now
+            reversal_count = reversals_with_present
         case StepChange.AT_NEXT_REVERSAL:
-            reversal_count = reversals_now - 1
+            reversal_count = reversals_with_present - 1
     for phase in rule.steps:
         if reversal_count < phase.reversals:
             return phase.step_db
@@ -179,12 +180,12 @@ def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool)
 
 
 def _count_wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
-    """Number of consecutive wrong answers that raise the level."""
+    """Return the number of consecutive wrong answers that raise the level."""
     return 1 if _is_in_initial_phase(rule, state) else rule.up_after_wrong
 
 
 def _count_right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
-    """Number of consecutive right answers that lower the level."""
+    """Return the number of consecutive right answers that lower the level."""
     return 1 if _is_in_initial_phase(rule, state) else rule.down_after_right
 
 
@@ -194,7 +195,7 @@ def _is_in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
 
 
 _LEVEL_TOLERANCE_DB = 1e-9
-"""Tolerance (dB) within which two levels are equal; below any allowed step."""
+"""Tolerance (dB) within which two levels are equal: above rounding, below any allowed step. Chosen."""
 
 
 def _is_at_cap(rule: StaircaseRule, level_db: float) -> bool:

@@ -105,8 +105,8 @@ def plan_study(protocol: StudyProtocol, participants: Sequence[Participant], nex
 
 def _find_cycle_length(protocol: StudyProtocol) -> int:
     """Compute the number of participants after which order of frequencies and labelling repeat."""
-    frequencies, settings = protocol.stimulus.frequencies_hz, protocol.schedule
-    order_count = len(make_williams_rows(len(frequencies))) if settings.order == "williams" and frequencies else 1
+    frequencies_hz, settings = protocol.stimulus.frequencies_hz, protocol.schedule
+    order_count = len(make_williams_rows(len(frequencies_hz))) if settings.order == "williams" and frequencies_hz else 1
     return order_count * (1 if settings.labels == "fixed" else 2)
 
 

@@ -19,9 +19,11 @@ FOOTER_KEYS = {text: key for key, text in SCREEN_TEXTS.items() if key.startswith
 
 def _compile_pattern(text: str) -> re.Pattern[str]:
     """Compile the regular expression of a fact; each placeholder becomes a named group that matches its value."""
-    parts = re.split(r"\{(\w+)\}", text)  # plain text and names of placeholders alternate
-    groups = (f"(?P<{part}>.+?)" if index % 2 else re.escape(part) for index, part in enumerate(parts))
-    return re.compile("".join(groups), re.DOTALL)
+    text_parts = re.split(r"\{(\w+)\}", text)  # plain text and names of placeholders alternate
+    pattern_parts = (
+        f"(?P<{text_part}>.+?)" if index % 2 else re.escape(text_part) for index, text_part in enumerate(text_parts)
+    )
+    return re.compile("".join(pattern_parts), re.DOTALL)
 
 
 FACT_PATTERNS = {
@@ -35,16 +37,16 @@ pattern does not match a part of a longer sentence."""
 class Words:
     """The texts of one protocol in one language."""
 
-    own_texts: Mapping[str, str] = field(default_factory=dict, hash=False)
+    protocol_texts: Mapping[str, str] = field(default_factory=dict, hash=False)
     """Texts of the protocol by key. The English text is used for a missing key or an empty text."""
 
     def __getitem__(self, key: str) -> str:
-        """The text with this key; KeyError where neither the protocol nor the English texts have it."""
-        return self.own_texts.get(key) or ENGLISH[key]
+        """Return the text with this key. Raises KeyError where neither the protocol nor the English texts have it."""
+        return self.protocol_texts.get(key) or ENGLISH[key]
 
     def fill(self, key: str, values: Mapping[str, object]) -> str:
         """Fill in the placeholders of a text. The English text is used where the placeholders of the protocol's text
-        differ, because it was written for another version of hapteq. Raises KeyError for an unknown key or a missing
+        differ: it was written for another version of hapteq. Raises KeyError for an unknown key or a missing
         value."""
         has_same_placeholders = list_placeholders(self[key]) == list_placeholders(ENGLISH[key])
         return (self[key] if has_same_placeholders else ENGLISH[key]).format_map(values)
@@ -53,18 +55,18 @@ class Words:
         """Fill a count into a text: `<key>_1`, the singular, for a count of 1, else `<key>_n`."""
         return self[f"{key}_1"] if count == 1 else self.fill(f"{key}_n", {"count": count})
 
-    def translate_key(self, english: str) -> str:
+    def translate_key(self, english_label: str) -> str:
         """Translate the footer's label of a keyboard key; unchanged where it is not in `FOOTER_KEYS`, as on the
         experimenter's screens."""
-        return self[FOOTER_KEYS[english]] if english in FOOTER_KEYS else english
+        return self[FOOTER_KEYS[english_label]] if english_label in FOOTER_KEYS else english_label
 
-    def translate_fact(self, english: str) -> str:
+    def translate_fact(self, english_fact: str) -> str:
         """Translate a fact, with the facts in its placeholders; unchanged where it matches no pattern."""
         for key, pattern in FACT_PATTERNS.items():
-            match = pattern.fullmatch(english)
+            match = pattern.fullmatch(english_fact)
             if match is not None:
                 return self.fill(key, {name: self._translate_value(value) for name, value in match.groupdict().items()})
-        return english
+        return english_fact
 
     def _translate_value(self, value: str) -> str:
         """Translate the value of a placeholder: a fact, or facts separated by ", "; other values, such as numbers, stay

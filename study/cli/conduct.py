@@ -17,7 +17,7 @@ from study.cli.motion_notice import announce_motion
 from study.cli.progress import show_run_and_trial
 from study.cli.results import print_results
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.devices.opening import REAL, needs_real_time
+from study.devices.opening import REAL_DEVICES, needs_real_time
 from study.errors import WrongUseError
 from study.session.views.forms import make_words
 from study.store.disk.privacy import format_data_folder_warning
@@ -30,7 +30,7 @@ from study.workflows.session.conduct_session import Participant, conduct_new, co
 from study.workflows.session.end_sitting import end_sitting, write_missing_results
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.simulated_participant import make_simulated_participant
-from study.workflows.trial.display import PersonsHand
+from study.workflows.trial.display import HumanHand
 from study.workflows.trial.requests_port import QueuedRequests
 
 
@@ -77,7 +77,7 @@ def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> 
     """Print a notice that a real device will move by itself, and require its confirmation, where a simulated
     participant (`observer`) uses one; do nothing otherwise. Raises WrongUseError and KeyboardInterrupt
     where `announce_motion` does."""
-    if observer is not None and device in REAL:
+    if observer is not None and device in REAL_DEVICES:
         announce_motion(
             f"A simulated participant ('{observer}') takes this session: the {device} moves by itself, for as long as "
             "a session lasts. No person may hold the handle, and its workspace must be free.",
@@ -128,7 +128,7 @@ def _provide_participant(
         )
     requests = QueuedRequests()
     display = PlainDisplay(LineInput(), sys.stdout, clock, keys, requests.send, words)
-    yield Participant(display=display, hand=PersonsHand(), clock=clock, requests=requests)
+    yield Participant(display=display, hand=HumanHand(), clock=clock, requests=requests)
     # Results are not for the participant, who may still sit there.
     typer.echo(f"\n{words['for_experimenter']}", err=True)
 

@@ -1,7 +1,7 @@
 """Command `hapteq diagnose`: locates the mismatch of model and recording, and names the physics that the model lacks.
 
-Parses the options, calls `study.workflows.diagnosis.diagnose_recordings` and prints its answer. Loaded by
-`command_table`; `model` uses `ForceConstantOption`, too.
+Parses the options, calls `study.workflows.diagnosis.diagnose_recordings` and prints its answer. Loaded by its name in
+`study.cli.command_table`; `study.cli.model` uses `ForceConstantOption`, too.
 """
 
 import json
@@ -91,12 +91,12 @@ def diagnose(
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
     plan = replace(plan, force_constants=tuple(force_constant or ()))
-    with show_steps("Diagnosing") as show:
-        answer = find_answer(plan, show)
+    with show_steps("Diagnosing") as show_step:
+        answer = find_answer(plan, show_step)
     findings = answer.findings
     # Printed before the report and its figures are made, because they take much longer.
     typer.echo(json.dumps(make_json(findings), indent=2) if as_json else "\n".join(format_answer(findings)))
-    with show_steps("Diagnosing") as show:
-        complete = write_answer(answer, show)
+    with show_steps("Diagnosing") as show_step:
+        reported_answer = write_answer(answer, show_step)
     if not as_json:
-        typer.echo("\n".join((*list_new_remarks(complete.findings, findings), *format_paths(out))))
+        typer.echo("\n".join((*list_new_remarks(reported_answer.findings, findings), *format_paths(out))))

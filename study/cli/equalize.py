@@ -1,7 +1,8 @@
 """Command `hapteq equalize`: compute the feedforward forces for which the handle tracks an acceleration trajectory.
 
 Options and output only. The forces are computed by `study.workflows.equalizer.equalize_trajectory`, and improved by
-repeated plays on the device (iterative learning, `--repeat`) by `study.workflows.equalizer.repeat_trajectory`.
+repeated plays on the device (iterative learning, `--repeat`) by `study.workflows.equalizer.repeat_trajectory`. Loaded
+by its name in `study.cli.command_table`.
 """
 
 import json
@@ -71,7 +72,8 @@ def equalize(
 
 
 def _check_arguments(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:
-    """Raise WrongUseError for missing models or table, and for options that need each other."""
+    """Raise WrongUseError for missing models or a missing table, for --repeat without --device or the reverse, and for
+    --from without --repeat."""
     from study.errors import WrongUseError
 
     if len(files) < 2 or files[-1].suffix.lower() in (".h5", ".hdf5"):
@@ -93,8 +95,8 @@ def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ..
     from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
     from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 
-    equalized = equalize_trajectory(plan)
-    return summarise_equalization(equalized), format_equalization_lines(equalized)
+    equalized_trajectory = equalize_trajectory(plan)
+    return summarise_equalization(equalized_trajectory), format_equalization_lines(equalized_trajectory)
 
 
 def _repeat_on_device(
@@ -112,7 +114,9 @@ def _repeat_on_device(
         summarise_repeats,
     )
 
-    ask = partial(announce_motion, hands_off=hands_off)
-    with show_late_bar("Plays", total=options.repeats + 1) as show:
-        repeated = repeat_trajectory(plan, options, lambda number, share: show(number + share), ask)
-    return summarise_repeats(repeated), format_repeat_lines(repeated)
+    confirm_motion = partial(announce_motion, hands_off=hands_off)
+    with show_late_bar("Plays", total=options.repeats + 1) as show_plays:
+        repeat_result = repeat_trajectory(
+            plan, options, lambda number, share: show_plays(number + share), confirm_motion
+        )
+    return summarise_repeats(repeat_result), format_repeat_lines(repeat_result)

@@ -1,4 +1,8 @@
-"""`hapteq export-controller`: a model's controller as C sources for a user's own control loop."""
+"""Command `hapteq export-controller`: write the feedforward controllers of an identified model as C sources.
+
+Options and output only; `study.workflows.equalizer.controller.export_controller` writes the files. Loaded by its name
+in `study.cli.command_table`.
+"""
 
 import json
 from pathlib import Path

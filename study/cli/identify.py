@@ -52,12 +52,12 @@ def identify(
     """Fit a stable model to the band, test it on held-out data, and write it."""
     from study.cli.progress import show_bar
     from study.workflows.equalizer.identified_summary import format_summary, summarise_model
-    from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
+    from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model, require_new_output
     from study.workflows.equalizer.report_identification import report_identification
 
     chosen_band_hz = _choose_band(band, limit_from)
     plan = IdentifyPlan(tuple(recordings), out, chosen_band_hz, order, smooth, with_spring, physics, longest_decay)
-    check_free(out)
+    require_new_output(out)
     with show_bar("Identifying (%)", total=100) as show_percent:
         device = identify_model(plan, lambda share: show_percent(round(100 * share)))
     summary_lines = [json.dumps(summarise_model(device), indent=2)] if as_json else [str(out), *format_summary(device)]
@@ -66,8 +66,8 @@ def identify(
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:
         with show_bar("Report (%)", total=100) as show_percent:
-            page = report_identification(device, report, lambda share: show_percent(round(100 * share)))
-        typer.echo(f"Report: {page}", err=True)
+            page_path = report_identification(device, report, lambda share: show_percent(round(100 * share)))
+        typer.echo(f"Report: {page_path}", err=True)
 
 
 def _choose_band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, float]:

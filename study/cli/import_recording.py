@@ -33,10 +33,10 @@ def import_recording(
     """
     from study.cli.progress import show_late_bar
     from study.importing.map_format.map_errors import MapNeededError
-    from study.workflows.recording.import_recording import ImportPlan, check_free
+    from study.workflows.recording.import_recording import ImportPlan, require_new_output
     from study.workflows.recording.import_recording import import_recording as convert_files
 
-    check_free(out)
+    require_new_output(out)
     try:
         with show_late_bar("Importing (%)", total=100) as show_percent:
             imported = convert_files(

@@ -1,7 +1,8 @@
 """Commands `hapteq kit`: a laboratory's own blind test of the diagnosis, on a device that is changed on purpose.
 
 Three steps: `draw` writes a table with the changes in random order, `seal` hashes the completed table before the
-diagnosis, `score` compares the diagnoses with it (docs/kit.md).
+diagnosis, `score` compares the diagnoses with it (docs/kit.md). Options and output only; `study.evaluation.kit` does
+the work. Loaded by its name in `study.cli.command_table`.
 """
 
 from pathlib import Path

@@ -45,7 +45,7 @@ INTERRUPTED = StudyError(
 
 
 def _print_version(is_requested: bool) -> None:
-    """Callback of --version: print the version and exit."""
+    """Print the version and exit, where it is requested. Callback of --version."""
     if is_requested:
         from importlib.metadata import version
 
@@ -64,14 +64,15 @@ def options(
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command and return its exit code (`ExitCode`); StudyError, OSError, wrong use and Ctrl-C are reported on
-    stderr, any other exception is raised. arguments: None = those of the process."""
+    """Run a command and return its exit code (`ExitCode`). StudyError, OSError, wrong use and Ctrl-C are reported on
+    stderr, except for a broken pipe (BrokenPipeError), which only sets the exit code; any other exception is raised.
+    arguments: None = those of the process."""
     _configure_process()
     try:
-        code = app(args=arguments, standalone_mode=False)
-        if code == ExitCode.INTERRUPTED:  # some versions of typer return exit codes that others raise
+        exit_code = app(args=arguments, standalone_mode=False)
+        if exit_code == ExitCode.INTERRUPTED:  # some versions of typer return exit codes that others raise
             raise KeyboardInterrupt
-        return code if isinstance(code, int) else ExitCode.DONE
+        return exit_code if isinstance(exit_code, int) else ExitCode.DONE
     except StudyError as error:
         print_error(error)
         return error.exit_code
@@ -90,12 +91,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _configure_process() -> None:
     """Configure output streams, signal handlers and thread counts of numerical libraries for this process."""
-    for output in (sys.stdout, sys.stderr):
-        if isinstance(output, io.TextIOWrapper):
-            output.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _interrupt_on_signal)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
+    for signal_name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, signal_name):
+            signal.signal(getattr(signal, signal_name), _interrupt_on_signal)
     for library in ("OPENBLAS", "OMP", "MKL"):
         # For small matrices, threads cost more time than they save. The libraries read this when numpy is imported.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")

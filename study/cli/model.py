@@ -1,6 +1,7 @@
 """Command `hapteq model`: fit a mechanical model (masses, dampers, springs) to recordings of a device.
 
-Options and output only; `study.workflows.diagnosis.fit_first_model` fits the model and writes the file.
+Options and output only; `study.workflows.diagnosis.fit_first_model` fits the model and writes the file. Loaded by its
+name in `study.cli.command_table`.
 """
 
 import json
@@ -33,10 +34,12 @@ def model(
     )
 
     plan = FirstModelPlan(tuple(recordings), out, structure, tuple(force_constant or ()))
-    with show_late_bar("Model (%)", total=100) as show:
-        fitted = fit_first_model(plan, lambda share: show(round(100 * share)))
+    with show_late_bar("Model (%)", total=100) as show_percent:
+        fitted_model = fit_first_model(plan, lambda share: show_percent(round(100 * share)))
     typer.echo(
-        json.dumps(summarise_first_model(fitted), indent=2) if as_json else "\n".join(format_first_model(fitted))
+        json.dumps(summarise_first_model(fitted_model), indent=2)
+        if as_json
+        else "\n".join(format_first_model(fitted_model))
     )
-    for remark in fitted.remarks:
+    for remark in fitted_model.remarks:
         typer.echo(f"Note: {remark}", err=True)

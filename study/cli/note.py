@@ -1,6 +1,7 @@
-"""`hapteq note`: writes a note into the log of a session, whether it runs or has ended.
+"""Command `hapteq note`: write a note into the log of a session, whether it runs or has ended.
 
-`hapteq watch` uses `write_note` too.
+Options and output only; `study.workflows.views.take_note` writes the note. Loaded by its name in
+`study.cli.command_table`; `study.cli.watch` uses `write_note`, too.
 """
 
 from pathlib import Path
@@ -30,11 +31,12 @@ def note(
 
 
 def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
-    """Write the note, or send it to the running session, and print which of the two happened."""
+    """Write the note into the log, or leave it in the inbox of the running session, and print on stderr which of the
+    two happened. adverse: whether it is an adverse event."""
     from study.devices.clock import RealClock
     from study.session.watching.requests import NoteAsked
     from study.workflows.views.take_note import take_note
 
-    in_log = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
+    is_written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
     waiting_text = f"The session writes it into the log of {folder.name} as soon as it looks."
-    typer.echo(f"Noted in {folder.name}." if in_log else waiting_text, err=True)
+    typer.echo(f"Noted in {folder.name}." if is_written else waiting_text, err=True)

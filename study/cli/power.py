@@ -1,4 +1,9 @@
-"""`hapteq power`: power analysis of a protocol by Monte-Carlo simulation of whole studies."""
+"""Command `hapteq power`: power analysis of a protocol by Monte-Carlo simulation of whole studies.
+
+Reads the protocol, makes the population from the options, simulates the studies on worker processes or a cluster
+(`study.workflows.planning.simulate_power`), and prints the power for each sample size. With --compare it prints the
+errors of staircase rules on the same simulated people instead. Loaded by its name in `study.cli.command_table`.
+"""
 
 import json
 import re
@@ -85,15 +90,15 @@ def power(
     from study.workflows.planning.simulate_power import PowerPlan, simulate_power
     from study.workflows.worker_processes import open_worker_processes
 
-    loaded = read_study_protocol(protocol, Path()).protocol
-    crowd = _make_crowd(loaded, threshold_n, effect_db)
-    crowd = _add_habits(crowd, people, curve, lapse, loaded.trial.repeats_per_run)
-    crowd = replace(crowd, delivery=_read_delivery(delivered, crowd.frequencies_hz), rove_db=loaded.stimulus.rove_db)
+    design = read_study_protocol(protocol, Path()).protocol
+    crowd = _make_crowd(design, threshold_n, effect_db)
+    crowd = _apply_person_options(crowd, people, curve, lapse, design.trial.repeats_per_run)
+    crowd = replace(crowd, delivery=_read_delivery(delivered, crowd.frequencies_hz), rove_db=design.stimulus.rove_db)
     if compare:
-        _print_comparison(crowd, loaded.staircase, studies, seed, as_json)
+        _print_comparison(crowd, design.staircase, studies, seed, as_json)
         return
     sizes = parse_sample_sizes(subjects)
-    plan = PowerPlan(crowd, loaded.staircase, sizes, studies, seed, loaded.analysis.contrast_hz)
+    plan = PowerPlan(crowd, design.staircase, sizes, studies, seed, design.analysis.contrast_hz)
     title = f"{studies} studies of each of {len(sizes)} sizes"
     executor = open_worker_processes(workers) if scheduler is None else open_cluster_workers(scheduler)
     with executor as pool, show_bar(title, total=studies * len(sizes)) as advance:
@@ -104,22 +109,22 @@ def power(
     typer.echo("\n".join((*_format_table(points, plan), f"Figure: {out / 'figures' / 'power.png'}")))
 
 
-def _print_comparison(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_json: bool) -> None:
-    """Print bias, standard deviation and error of each rule on the same simulated people, without habits or
-    delivery."""
+def _print_comparison(crowd: "Crowd", rule: "StaircaseRule", person_count: int, seed: int, as_json: bool) -> None:
+    """Print bias, standard deviation and error of each rule on the same simulated people, one run each; without the
+    habits of --people and without delivery. person_count: number of people."""
     from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules
 
-    results = compare_rules(crowd, list_compared_rules(rule), people, seed)
+    results = compare_rules(crowd, list_compared_rules(rule), person_count, seed)
     if as_json:
         typer.echo(json.dumps([asdict(result) for result in results], indent=2))
         return
     typer.echo(f"{'rule':42}{'trials':>7}{'bias':>8}{'sd':>7}{'error':>8}  error x sqrt(trials), dB")
     for row in results:
-        numbers = (
+        number_columns = (
             f"{row.trials:7.1f}{row.bias_db:+8.2f}{row.sd_db:7.2f}{row.error_db:8.2f}{row.error_per_trial_db:10.1f}"
         )
-        typer.echo(f"{row.rule:42}{numbers}")
-    typer.echo(f"{people} people, the same under every rule; errors of single runs in dB, root mean square.")
+        typer.echo(f"{row.rule:42}{number_columns}")
+    typer.echo(f"{person_count} people, the same under every rule; errors of single runs in dB, root mean square.")
     if crowd.rove_db:
         typer.echo(f"Roved by {crowd.rove_db:g} dB, as the protocol says; Psi's levels are not roved.")
     if crowd.guessers or crowd.criterion_drift_sd or crowd.unsure or crowd.delivery is not None:
@@ -130,7 +135,8 @@ def _print_comparison(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: 
 
 
 def _make_crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
-    """Make a population with the same median threshold at all frequencies but the first of the compared pair."""
+    """Make a population whose median threshold is threshold_n (N) at all frequencies but the first of the compared
+    pair, where it is higher by effect_db (dB). Raises WrongUseError for a protocol with fewer than two frequencies."""
     from analysis.psychophysics.power.power_curve import find_judged_pair
     from analysis.psychophysics.power.simulated_study import Crowd
 
@@ -141,12 +147,16 @@ def _make_crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float)
             f"{protocol.name} plays fewer than two frequencies.",
             "Choose a protocol with two or more in stimulus.frequencies_hz.",
         )
-    higher_n = threshold_n * 10.0 ** (effect_db / 20.0)
-    higher_hz, _ = find_judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
-    return Crowd(frequencies_hz, tuple(higher_n if f == higher_hz else threshold_n for f in frequencies_hz))
+    changed_n = threshold_n * 10.0 ** (effect_db / 20.0)
+    changed_hz, _ = find_judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
+    return Crowd(
+        frequencies_hz,
+        tuple(changed_n if frequency_hz == changed_hz else threshold_n for frequency_hz in frequencies_hz),
+    )
 
 
 def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
+    """Format the lines of the result: power for each sample size, the compared frequencies, and roving."""
     from analysis.threshold_words import select_threshold_words
     from study.workflows.planning.simulate_power import format_power_lines
 
@@ -154,14 +164,14 @@ def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str
     contrast_text = (
         "the declared contrast" if plan.contrast_hz else "the highest frequency and the lowest; no contrast is declared"
     )
-    compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
-    roved = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
-    return [*format_power_lines(points, select_threshold_words(plan.rule).noun), "", compared, *roved]
+    comparison_text = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
+    roving_lines = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
+    return [*format_power_lines(points, select_threshold_words(plan.rule).noun), "", comparison_text, *roving_lines]
 
 
 def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":
-    """Read the delivery of a device from the sessions of a pilot study. Raises StudyError where the data do not
-    determine the threshold at a frequency."""
+    """Read the delivery of a device from the sessions in a folder; None without a folder. Raises StudyError where the
+    sessions contain no measured trials of both directions at a frequency."""
     if data is None:
         return None
     from analysis.psychophysics.power.felt_delivery import tabulate_felt_delivery
@@ -180,38 +190,42 @@ def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "Fel
         ) from problem
 
 
-def _add_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
-    """Add the habits and the curve of the options to the population. Raises WrongUseError for an unknown curve or kind
-    of people."""
+def _apply_person_options(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
+    """Apply the options on people to the population: habits, curve and lapse rate. repeats: most repeats in a run. The
+    numbers of the habits are chosen: a guessing share of 0.1; repeats within 0.5 standard errors of the criterion; a
+    criterion drift of 0.3 (d') per 100 trials. Raises WrongUseError for an unknown curve or kind of people."""
     from analysis.psychophysics.hierarchy.curve import Family
 
-    habits: dict[str, Crowd] = {
+    crowds_by_habit: dict[str, Crowd] = {
         "attentive": crowd,
         "some-guess": replace(crowd, guessers=0.1),
         "repeating": replace(crowd, unsure=0.5, repeats=repeats),
         "criterion-drift": replace(crowd, criterion_drift_sd=0.3),
     }
     for option, name, choices in (
-        ("--people", people, list(habits)),
+        ("--people", people, list(crowds_by_habit)),
         ("--curve", curve, [curve_family.value for curve_family in Family]),
     ):
         if name not in choices:
             raise WrongUseError(
                 "There are no such people", f"{option} is {name}.", f"Choose one of {', '.join(choices)}."
             )
-    return replace(habits[people], family=Family(curve), lapse=lapse)
+    return replace(crowds_by_habit[people], family=Family(curve), lapse=lapse)
 
 
 def parse_sample_sizes(text: str) -> tuple[int, ...]:
-    """Parse sample sizes: "5:40:5" gives 5, 10 ... 40. Raises WrongUseError."""
-    parts = [int(part) for part in text.split(":")] if re.fullmatch(r"\d{1,4}(:\d{1,4}){0,2}", text) else []
-    low = parts[0] if parts else 0
-    high = parts[1] if len(parts) > 1 else low
-    step = parts[2] if len(parts) > 2 else 1
-    if low < 2 or high < low or step < 1 or high > 1000:
+    """Parse sample sizes from:to:step, both limits included: "5:40:5" gives 5, 10 ... 40. Without to: one size; without
+    step: 1. Raises WrongUseError for any other text, sizes outside 2 to 1000, and a step of 0."""
+    numbers = (
+        [int(number_text) for number_text in text.split(":")] if re.fullmatch(r"\d{1,4}(:\d{1,4}){0,2}", text) else []
+    )
+    smallest = numbers[0] if numbers else 0
+    largest = numbers[1] if len(numbers) > 1 else smallest
+    step = numbers[2] if len(numbers) > 2 else 1
+    if smallest < 2 or largest < smallest or step < 1 or largest > 1000:
         raise WrongUseError(
             "These are no sample sizes",
             f"--subjects is {text}.",
             "Write a number from 2 to 1000, or from:to:step, such as 5:40:5.",
         )
-    return tuple(range(low, high + 1, step))
+    return tuple(range(smallest, largest + 1, step))

@@ -1,4 +1,8 @@
-"""`hapteq prove`: blind test of the diagnosis on simulated devices with concealed effects or laws."""
+"""Command `hapteq prove`: blind test of the diagnosis on simulated devices with concealed effects or laws.
+
+Options and output only; `study.evaluation.bank` draws, seals and diagnoses the devices and writes the results. Loaded
+by its name in `study.cli.command_table`.
+"""
 
 import json
 from collections.abc import Callable
@@ -16,6 +20,7 @@ if TYPE_CHECKING:
     from study.evaluation.bank.sealed_bank import BankOptions
 
 Result = TypeVar("Result")
+"""Result of a blind test."""
 
 
 def prove(
@@ -62,6 +67,8 @@ def prove(
 
 
 def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
+    """Run the blind test with laws that no catalogue names, write its results, and print them. table: small table of
+    the figures to write, CSV; None = none."""
     from study.evaluation.bank.laws.prove_laws import prove_laws
     from study.evaluation.bank.laws.write_law_proof import (
         format_law_lines,
@@ -77,9 +84,12 @@ def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path
     typer.echo(format_law_summary(law_proof) if as_json else "\n".join(format_law_lines(law_proof)))
 
 
-def _run_with_steps(run: Callable[[Callable[[str, int, int], None]], Result]) -> Result:
-    """Run the test with a progress display. run: called with a callback (name of the step, its number, total)."""
+def _run_with_steps(run_test: Callable[[Callable[[str, int, int], None]], Result]) -> Result:
+    """Run the test with a progress display, and return its result. run_test: called with a callback (name of the step,
+    its number, total)."""
     from study.cli.progress import show_steps
 
-    with show_steps("Proving") as show:
-        return run(lambda step_name, step, total: show(f"{step_name} {step} of {total}", step / max(total, 1)))
+    with show_steps("Proving") as show_step:
+        return run_test(
+            lambda step_name, step, total: show_step(f"{step_name} {step} of {total}", step / max(total, 1))
+        )

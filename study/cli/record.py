@@ -44,7 +44,7 @@ def record(
 
     from study.cli.progress import show_late_bar
     from study.store.formats.protocol_files import read_recording_protocol
-    from study.workflows.recording.record_device import RecordingPlan, record_device, require_free_output
+    from study.workflows.recording.record_device import RecordingPlan, record_device, require_new_output
 
     source = read_recording_protocol(protocol)
     is_held = source.protocol.hand == "held"
@@ -56,7 +56,7 @@ def record(
             saved="Nothing moved.",
         )
     plan = RecordingPlan(source.protocol, device=device, place_m=place, seed=seed, out=out)
-    require_free_output(out)
+    require_new_output(out)
     with show_late_bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
         recording = record_device(
             plan, on_progress=show, before_moving=partial(announce_motion, hands_off=hands_off, hand_on_handle=is_held)

@@ -1,4 +1,4 @@
-"""Command `hapteq rehearse`: runs the whole study with simulated participants.
+"""Command `hapteq rehearse`: run the whole study with simulated participants.
 
 Protocol and model are checked first; then the sessions run on worker processes or a cluster
 (`study.workflows.session.rehearse_study`), and their data are analysed as those of a study. The command writes the
@@ -48,7 +48,7 @@ def rehearse(
     rehearsal = Rehearsal(
         source.protocol, source.text, subjects, seed, data=out, model=model, observer=observer, locked=source.locked
     )
-    make_rehearsed_observer(rehearsal, 0)
+    make_rehearsed_observer(rehearsal, 0)  # raises StudyError for an unknown observer before any session is run
     with (
         connect_cluster(scheduler) as cluster,
         show_bar(f"{subjects} simulated participants", total=subjects) as advance,

@@ -1,4 +1,8 @@
-"""`hapteq resume`: continue an unfinished session, for example after a crash or a pause."""
+"""Command `hapteq resume`: continue an unfinished session, for example after a crash or a pause.
+
+On full screens (`study.cli.screen`), or line by line (`study.cli.conduct`). Loaded by its name in
+`study.cli.command_table`.
+"""
 
 import json
 from pathlib import Path

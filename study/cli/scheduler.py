@@ -1,4 +1,7 @@
-"""Option `--scheduler`: a command hands its work to the workers of a dask cluster."""
+"""Option `--scheduler` of a command: its work is done by the workers of a dask cluster instead of local processes.
+
+Used by the commands `power`, `prove`, `real` and `rehearse`; `study.workflows.cluster` opens the connection.
+"""
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -19,8 +22,8 @@ SchedulerOption = Annotated[
 
 @contextmanager
 def connect_cluster(scheduler: str | None) -> Iterator[Executor | None]:
-    """Connect to the scheduler's cluster; None without a scheduler. Raises StudyError where the cluster cannot be
-    used."""
+    """Connect to the scheduler's cluster and yield its executor; None without a scheduler. Raises StudyError where the
+    cluster cannot be used, or its workers have several threads."""
     if scheduler is None:
         yield None
         return

@@ -1,4 +1,5 @@
-"""Command `hapteq sessions`: list the sessions in a data folder as a table, or as JSON. Listed in `command_table`."""
+"""Command `hapteq sessions`: list the sessions in a data folder as a table, or as JSON. Loaded by its name in
+`study.cli.command_table`."""
 
 import json
 from collections.abc import Iterator

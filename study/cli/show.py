@@ -1,5 +1,5 @@
-"""`hapteq show`: print a session (facts, thresholds, staircases), a diagnosis, or a recording. Registered in
-`study.cli.command_table`.
+"""Command `hapteq show`: print a session (facts, thresholds, staircases), a diagnosis, or a recording. Loaded by its
+name in `study.cli.command_table`.
 
 WHAT is taken as a recording file, else as a diagnosis (any other file, or a folder with diagnosis.json), else as a
 session.
@@ -96,9 +96,9 @@ def _find_session_folder(target: str, data: Path) -> Path:
     return folder if folder.resolve() in session_paths else find_session(target, data).path
 
 
-def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
-    """Format the lines of a session: summary, facts, thresholds, warnings, staircases, with `log` its events in words,
-    and path of the report."""
+def _format_session(view: "SessionView", with_log: bool) -> Iterable[str]:
+    """Format the lines of a session: summary, facts, thresholds, warnings, staircases, its events in words where
+    with_log, and path of the report."""
     from study.tui.drawing.staircase_drawing import LEGEND
     from study.tui.session_status import describe_session
     from study.tui.text_rows import align_rows
@@ -114,7 +114,7 @@ def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
         yield f"\n{LEGEND}"
     for staircase in view.staircases:
         yield from _draw_plot(staircase)
-    if log:
+    if with_log:
         yield from ("", *view.events)
     if view.report:
         yield f"\nReport: {view.report}"

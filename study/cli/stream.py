@@ -1,4 +1,8 @@
-"""`hapteq stream`: sends a running session's events, forces and motion to the lab streaming layer (LSL)."""
+"""Command `hapteq stream`: send a running session's events, forces and motion to the lab streaming layer (LSL).
+
+Options and output only; `study.workflows.views.stream_session` follows the log. Loaded by its name in
+`study.cli.command_table`.
+"""
 
 import contextlib
 import time
@@ -30,9 +34,12 @@ def stream(
     signals = SignalStreams(folder.path, outlet.make_signal_outlet)
 
     def log_clock_offset(offset_s: float) -> None:
-        note_text = f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."
-        with contextlib.suppress(StudyError):  # the markers report it too
-            inbox.send(NoteAsked("program", note_text))
+        """Send the offset of LSL's clock (s) to the session as a note; without an effect where it cannot be sent."""
+        offset_note = (
+            f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."
+        )
+        with contextlib.suppress(StudyError):  # the marker "clock" states the offset, too
+            inbox.send(NoteAsked("program", offset_note))
 
     typer.echo(f"Streaming {folder.name}; Ctrl-C ends it, and not the session.", err=True)
     marker_count = stream_session(

@@ -1,7 +1,8 @@
-"""Command `hapteq study`: runs a new session of a study, with a person or a simulated participant.
+"""Command `hapteq study`: run a new session of a study, with a person or a simulated participant.
 
 In a terminal, the session is shown on full screens; with `--plain`, without a terminal or with a simulated participant,
-line by line. Modules of the session are imported when the command runs, so that `hapteq --help` starts quickly.
+line by line. Modules of the session are imported when the command runs, so that `hapteq --help` starts quickly. Loaded
+by its name in `study.cli.command_table`.
 """
 
 from pathlib import Path

@@ -1,5 +1,5 @@
 """Command `hapteq study-plan`: print planned, finished and left-out participants, the orders of frequencies that are
-still needed, and the next participant code. Registered in the command table of `study.cli`."""
+still needed, and the next participant code. Loaded by its name in `study.cli.command_table`."""
 
 import json
 from collections.abc import Iterator
@@ -31,27 +31,27 @@ def study_plan(
     """
     from study.workflows.views.plan_study import list_planned_studies, summarise_plans
 
-    studies = list_planned_studies(data, protocol, simulated)
+    planned_studies = list_planned_studies(data, protocol, simulated)
     if as_json:
-        typer.echo(json.dumps(summarise_plans(studies), indent=2))
+        typer.echo(json.dumps(summarise_plans(planned_studies), indent=2))
         return
-    for number, study in enumerate(studies):
-        for line in (*[""] * (number > 0), *_format_plan(study, read_terminal_width())):
+    for index, planned_study in enumerate(planned_studies):
+        for line in (*[""] * (index > 0), *_format_plan(planned_study, read_terminal_width())):
             typer.echo(line)
 
 
-def _format_plan(study: "PlannedStudy", width: int | None) -> Iterator[str]:
-    """Format a plan as lines: summary, then a table of the orders if they are balanced. width: columns of the terminal;
-    None = not limited."""
+def _format_plan(planned_study: "PlannedStudy", width_cells: int | None) -> Iterator[str]:
+    """Format a plan as lines: summary, then a table of the orders if they are balanced. width_cells: width of the
+    terminal in character cells; None = not limited."""
     from study.tui.text_rows import align_rows, wrap_hanging
     from study.workflows.views.plan_study import describe_order, format_plan_lines
 
-    for line in format_plan_lines(study):
-        yield from wrap_hanging(line, 2, width)
-    if study.plan.cells:
+    for line in format_plan_lines(planned_study):
+        yield from wrap_hanging(line, 2, width_cells)
+    if planned_study.plan.cells:
         header = ("order", "frequencies", "wanted", "done", "begun", "needed")
         rows = [
             (str(order_number), describe_order(cell), *map(str, (cell.required, cell.done, cell.begun, cell.needed)))
-            for order_number, cell in enumerate(study.plan.cells, start=1)
+            for order_number, cell in enumerate(planned_study.plan.cells, start=1)
         ]
-        yield from align_rows((header, *rows), width)
+        yield from align_rows((header, *rows), width_cells)

@@ -1,4 +1,7 @@
-"""`hapteq watch`: the experimenter's view of a running session, and requests to it (stop, pause, notes)."""
+"""Command `hapteq watch`: the experimenter's view of a running session, and requests to it (stop, pause, notes).
+
+The view is a full screen, lines, or the present state once. Loaded by its name in `study.cli.command_table`.
+"""
 
 import json
 import sys

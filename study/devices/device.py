@@ -18,10 +18,10 @@ from study.session.facts.void_reasons import PROGRAM_STALLED
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
 
-REPLAY = "replay:"
+REPLAY_PREFIX = "replay:"
 """Prefix of a device's name, followed by the path of a recording: the handle moves as recorded, independent of the
 commanded force."""
-CALIBRATED = "simulated:"
+CALIBRATED_PREFIX = "simulated:"
 """Prefix of a device's name, followed by the path of a calibration: the simulated device with the linkage and inertia
 of that calibration."""
 
@@ -31,6 +31,7 @@ class DeviceInfo:
     """Properties of an opened device: name, rate, maximum force and mass."""
 
     name: str
+    """Name of the device."""
     simulated: bool
     """Whether there is no hardware, as for a simulation or a replay."""
     sample_rate_hz: float
@@ -66,8 +67,8 @@ class DeviceSettings:
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of the spring, x, y, z, in the device's axes (m)."""
     beyond_hand_ceiling: bool = False
-    """Allows force caps up to the device's own maximum instead of the limits for a hand. Never set by a protocol;
-    refused with a hand on the handle."""
+    """Whether force caps up to the device's maximum are allowed instead of the limits for a hand. Never set by a
+    protocol; refused with a hand on the handle."""
     with_sensor: bool = True
     """Whether a real device's accelerometer is read, where the laboratory's settings file configures one. Without it no
     acceleration is measured."""
@@ -145,7 +146,7 @@ class PlaybackResult:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Present state of the handle. Position and acceleration are both None without a reading."""
+    """Present state of the handle. Position and acceleration are both None where the device gave no reading."""
 
     position_m: tuple[float, float, float] | None
     """x, y, z (m); None where the encoders gave no numbers."""
@@ -154,7 +155,7 @@ class Look:
     sensor_clipped: bool
     """Whether a channel of the accelerometer was at its limit in this reading."""
     buttons: frozenset[int]
-    """Numbers of the device's own buttons that are pressed, as its driver counts them."""
+    """Numbers of the pressed buttons of the device, as its driver counts them."""
     missed_ticks: int
     """Missed ticks of the present stimulus; 0 without one."""
 

@@ -19,10 +19,11 @@ FillCallback = Callable[[Any, int, Any, Any], None]
 """Callback of the output stream, fill(out, frames, time, status): writes the next samples into out (frames, 1). Called
 in the library's thread."""
 
-REMEDY = (
+OUTPUT_ADVICE = (
     "Install the extra (pip install '.[audio]'; on Linux also the package libportaudio2), connect a sound output and "
     "choose it as the system's default. To play the noise otherwise, say play = false in [masking] of the protocol."
 )
+"""Remedy of every `DeviceError` of this module."""
 
 
 class Stream(Protocol):
@@ -114,4 +115,4 @@ def _convert_to_device_error(symptom: str) -> Iterator[None]:
         yield
     except Exception as error:
         reason = str(error) or type(error).__name__
-        raise DeviceError(f"The masking noise {symptom}", f"{reason}.", REMEDY) from error
+        raise DeviceError(f"The masking noise {symptom}", f"{reason}.", OUTPUT_ADVICE) from error

@@ -23,15 +23,16 @@ Addresses = npt.NDArray[np.int64]
 """Addresses of C functions and objects, as 64-bit integers."""
 
 CLOCK, SLEEP, MONOTONIC, ACQUIRE, RELEASE, LOCK, SYSTEM_SIZE = range(7)
-"""Indices into `collect_system_calls`. The addresses at CLOCK and SLEEP are 0 except on Linux with its usual
-monotonic clock."""
+"""Indices into `collect_system_calls`: clock_gettime, clock_nanosleep, Python's `time.monotonic`, the functions of
+PyThread that acquire (timeout in µs) and release a lock, and the lock. CLOCK and SLEEP are 0 except on Linux with its
+usual monotonic clock."""
 
 _intrinsic: Any = intrinsic
 """These functions of numba as `Any`, because numba declares no types for them."""
 _cgutils: Any = cgutils
 
 _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
-"""Constants of Linux (time.h, errno.h)."""
+"""Constants of Linux: CLOCK_MONOTONIC and TIMER_ABSTIME (time.h), EINTR (errno.h)."""
 
 
 def _make_caller(result_type: Any) -> Any:
@@ -109,9 +110,9 @@ def read_clock_s(system: Addresses) -> float:
     """Monotonic time (s), bit for bit equal to `time.monotonic`."""
     if system[CLOCK] == 0:
         return float(call_float(system[MONOTONIC], ()))
-    time_now = allocate_2_words()
-    call_int(system[CLOCK], (np.int32(_CLOCK_MONOTONIC), time_now))
-    seconds, nanoseconds = read_word(time_now, 0), read_word(time_now, 1)
+    timespec = allocate_2_words()
+    call_int(system[CLOCK], (np.int32(_CLOCK_MONOTONIC), timespec))
+    seconds, nanoseconds = read_word(timespec, 0), read_word(timespec, 1)
     if nanoseconds == 0:
         return float(seconds)
     return float(seconds * 1_000_000_000 + nanoseconds) / 1e9
@@ -121,11 +122,11 @@ def read_clock_s(system: Addresses) -> float:
 def sleep_until(system: Addresses, wake_time_s: float) -> None:
     """Sleep until wake_time_s (s, by `read_clock_s`); resumed after interruptions by signals. To be called only where
     `system[SLEEP]` is not 0."""
-    wake_time = allocate_2_words()
+    timespec = allocate_2_words()
     whole_seconds = int(wake_time_s)
-    write_word(wake_time, 0, whole_seconds)
-    write_word(wake_time, 1, int((wake_time_s - whole_seconds) * 1e9))
-    arguments = (np.int32(_CLOCK_MONOTONIC), np.int32(_TIMER_ABSTIME), wake_time, np.int64(0))
+    write_word(timespec, 0, whole_seconds)
+    write_word(timespec, 1, int((wake_time_s - whole_seconds) * 1e9))
+    arguments = (np.int32(_CLOCK_MONOTONIC), np.int32(_TIMER_ABSTIME), timespec, np.int64(0))
     while call_int(system[SLEEP], arguments) == _INTERRUPTED:
         pass
 
@@ -171,20 +172,20 @@ class SharedLock:
         self.release()
 
 
-_monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
+_MONOTONIC_CLOCK = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
 """Clock for systems whose own is not used: `time.monotonic` as a C function, which takes the interpreter lock."""
 
 
 def find_address(function: Any) -> int:
-    """Address of a function of a loaded library; 0 for a null pointer."""
+    """Find the address of a function of a loaded library; 0 for a null pointer."""
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
 
 def collect_system_calls(lock: SharedLock) -> Addresses:
-    """(SYSTEM_SIZE,): addresses of the functions for clock, sleep and lock, and of the lock itself, for compiled code.
-    CLOCK and SLEEP are 0 except on Linux with its usual monotonic clock."""
+    """Collect the addresses (SYSTEM_SIZE,) of the functions for clock, sleep and lock, and of the lock itself, for
+    compiled code."""
     addresses = np.zeros(SYSTEM_SIZE, dtype=np.int64)
-    addresses[MONOTONIC] = find_address(_monotonic)
+    addresses[MONOTONIC] = find_address(_MONOTONIC_CLOCK)
     if sys.platform == "linux" and time.get_clock_info("monotonic").implementation == "clock_gettime(CLOCK_MONOTONIC)":
         system = ctypes.CDLL(None)
         addresses[CLOCK], addresses[SLEEP] = find_address(system.clock_gettime), find_address(system.clock_nanosleep)

@@ -2,7 +2,8 @@
 
 The pulse is a byte or a control line (DTR, RTS) of a serial port, or the data lines of a parallel port; `Line` is their
 common interface. A line that fails does not interrupt a trial: the pulse is reported as lost (`Pulse.at_s` is None),
-and the next request opens the line again. Opened by `opening.open_lab_onset_line` for `conduct_session`.
+and the next request opens the line again. Opened by `opening.open_lab_onset_line` for `conduct_session`;
+`force_dimension.lab` reads the settings (`PulseSettings`).
 """
 
 import contextlib
@@ -73,7 +74,7 @@ class PulseSettings:
     """Baud rate of a serial port (bit/s)."""
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Description of the line for the log."""
         carriers = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
         return f"{carriers.get(self.kind, f'data lines {self.code}')} of {self.port}"
@@ -109,7 +110,7 @@ class OnsetLine:
             return self._make_lost_pulse(f"the line accepted none within {1000 * PULSE_TIMEOUT_S:g} ms")
 
     def close(self) -> None:
-        """Lower and close the line; waits at most 1 s for its thread. Never raises."""
+        """Lower and close the line; waits at most 1 s (chosen) for its thread. Never raises."""
         self._requests.put(None)
         self._thread.join(1.0)
 
@@ -130,7 +131,7 @@ class OnsetLine:
             reply_queue.put(self._make_lost_pulse(str(error) or type(error).__name__))
             self._close_line()
             return
-        reply_queue.put(Pulse(self._settings.words, time.monotonic()))
+        reply_queue.put(Pulse(self._settings.description, time.monotonic()))
         time.sleep(self._settings.width_s)
         with contextlib.suppress(Exception):  # a failure shows at the next pulse
             self._line.lower_level()
@@ -139,13 +140,13 @@ class OnsetLine:
         """Lower and close the line, if it is open, and ignore errors."""
         line, self._line = self._line, None
         if line is not None:
-            for shut_down in (line.lower_level, line.close):
+            for close_step in (line.lower_level, line.close):
                 with contextlib.suppress(Exception):
-                    shut_down()
+                    close_step()
 
     def _make_lost_pulse(self, trouble: str) -> Pulse:
         """Make the result for a pulse that may not have been sent. trouble: the reason."""
-        return Pulse(self._settings.words, None, trouble)
+        return Pulse(self._settings.description, None, trouble)
 
 
 def open_onset_line(settings: PulseSettings) -> OnsetLine:
@@ -156,7 +157,7 @@ def open_onset_line(settings: PulseSettings) -> OnsetLine:
     except (OSError, ValueError) as error:
         raise DeviceError(
             "The line for onset pulses cannot be opened",
-            f"{settings.words}: {error}.",
+            f"{settings.description}: {error}.",
             "Plug it in, or remove [pulse] from the device's file (docs/hardware.md).",
         ) from error
     return OnsetLine(settings, open_port, line)

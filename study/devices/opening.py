@@ -1,4 +1,5 @@
-"""Open devices by name; other packages access a device only through this module (`study.workflows`, `study.cli`).
+"""Open devices by name; other packages (`study.workflows`, `study.cli`, `study.tui`, `study.evaluation`) and the
+process of the control loop (`loop_process.serve`) access a device only through this module.
 
 Every device that it returns for playing forces is behind the safety layer (`study.devices.safe`); only `accept_device`
 also sends commands without it, to test the force cap of the vendor's library. Modules with a slow import (numba above
@@ -15,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
-from study.devices.device import CALIBRATED as CALIBRATED
-from study.devices.device import REPLAY, Device, DeviceInfo, DeviceSettings
+from study.devices.device import CALIBRATED_PREFIX as CALIBRATED_PREFIX
+from study.devices.device import REPLAY_PREFIX, Device, DeviceInfo, DeviceSettings
 from study.devices.force_dimension.device_models import MODELS
 from study.errors import DeviceError
 from study.session.views.participant_views import DeviceFinding
@@ -31,13 +32,13 @@ if TYPE_CHECKING:
 SIMULATED = "simulated"
 """Name of the simulated omega.3, as in `--device`."""
 
-REAL = tuple(MODELS)
+REAL_DEVICES = tuple(MODELS)
 """Names of the real devices, which need the vendor's library and a real-time clock."""
 
 LARGEST_DEVICE_FORCE_N = max(model.max_force_n for model in MODELS.values())
 """Largest force (N) of all real devices: a force limit above it is refused as an error."""
 
-DEVICES = (SIMULATED, *REAL)
+DEVICES = (SIMULATED, *REAL_DEVICES)
 """Names of the devices that are offered for studies and recordings."""
 
 FRICTIONLESS = "simulated-frictionless"
@@ -51,7 +52,7 @@ SIMULATIONS = (SIMULATED, FRICTIONLESS)
 def needs_real_time(name: str) -> bool:
     """Whether the device with this name runs in real time; simulated devices, also those from a recording or a
     calibration file, run in virtual time."""
-    return name not in SIMULATIONS and not name.startswith((REPLAY, CALIBRATED))
+    return name not in SIMULATIONS and not name.startswith((REPLAY_PREFIX, CALIBRATED_PREFIX))
 
 
 class LinkageSource(Protocol):
@@ -83,13 +84,13 @@ def open_device(
     control loop of a real device in a separate process; False within that process, and in tests. telemetry: path of the
     caller's telemetry ring; empty: a new ring if the clock is not virtual and own_process is True, else none. Raises
     `DeviceError`, and `StudyError` for a recording or calibration that cannot be used."""
-    if name not in SIMULATIONS and name not in REAL and not name.startswith((REPLAY, CALIBRATED)):
+    if name not in SIMULATIONS and name not in REAL_DEVICES and not name.startswith((REPLAY_PREFIX, CALIBRATED_PREFIX)):
         raise _make_unknown_device_error(name)
-    if name in REAL and clock.virtual:
+    if name in REAL_DEVICES and clock.virtual:
         raise DeviceError(
             "A real device needs real time", f"'{name}' was to be played faster than time passes.", "Use a real clock."
         )
-    if name in REAL and own_process:
+    if name in REAL_DEVICES and own_process:
         from study.devices.loop_process.remote_device import open_remotely
 
         return open_remotely(name, settings, seed)
@@ -121,7 +122,7 @@ def _check_acceptance(name: str, info: DeviceInfo, settings: DeviceSettings) -> 
 def open_linkage(name: str) -> "Iterator[LinkageSource]":
     """Open the source of a device's linkage data: joint angles, Jacobian and inertia by position. Nothing moves, and a
     real device stays braked. Raises `DeviceError`."""
-    if name in REAL:
+    if name in REAL_DEVICES:
         from study.devices.force_dimension.linkage import open_vendor_linkage
 
         with open_vendor_linkage(name) as linkage:
@@ -137,7 +138,7 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
             else DeviceError(
                 "This device has no linkage that can be read",
                 f"{name!r} is made from a file, which contains all that is known of it.",
-                f"Calibrate {SIMULATED} or a device of {', '.join(REAL)}.",
+                f"Calibrate {SIMULATED} or a device of {', '.join(REAL_DEVICES)}.",
             )
         )
 
@@ -146,7 +147,8 @@ def _make_unknown_device_error(name: str) -> DeviceError:
     """Make the error for a name that belongs to no device; it lists the known names."""
     return DeviceError(
         f"There is no device called {name!r}",
-        f"Known are {', '.join(DEVICES)}, {REPLAY}FILE.h5 for a recording, and {CALIBRATED}FILE.h5 for a calibration.",
+        f"Known are {', '.join(DEVICES)}, {REPLAY_PREFIX}FILE.h5 for a recording, and {CALIBRATED_PREFIX}FILE.h5 for a "
+        "calibration.",
         f"Use --device {SIMULATED} where no device is at hand.",
     )
 
@@ -179,9 +181,9 @@ def make_masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
 def raise_thread_priority() -> AbstractContextManager[object]:
     """Context in which the calling thread has the real-time priority of a real device's control loop, where the system
     permits it."""
-    from study.devices.drive.real_time_class import real_time_class
+    from study.devices.drive.real_time_class import request_real_time_class
 
-    return real_time_class()
+    return request_real_time_class()
 
 
 def check_loop_priority() -> DeviceFinding:
@@ -194,7 +196,7 @@ def check_loop_priority() -> DeviceFinding:
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
     """Examine a real device and its driver, with zero force; empty for other devices. Problems are returned as
     findings, not raised."""
-    if name not in REAL:
+    if name not in REAL_DEVICES:
         return ()
     from study.devices.force_dimension.findings import examine
 
@@ -204,7 +206,7 @@ def examine_device(name: str) -> tuple[DeviceFinding, ...]:
 def calibrate_device(name: str, patience_s: float) -> None:
     """Wait, at most `patience_s` (s), until a person has moved the handle of a real device into its calibration
     position. Raises `DeviceError`, also for a device that is not real."""
-    if name not in REAL:
+    if name not in REAL_DEVICES:
         raise DeviceError("There is nothing to calibrate", f"{name!r} is no real device.", "Leave --calibrate out.")
     from study.devices.force_dimension.findings import calibrate
 

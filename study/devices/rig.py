@@ -128,7 +128,7 @@ def ignore_hand(on_handle: bool) -> None:
     """`CompiledRig.simulate_hand` of a device without a simulated hand: does nothing."""
 
 
-def skip_preparation(rows: FloatArray, repeats: bool, wait: int) -> None:
+def skip_preparation(rows: FloatArray, repeats: bool, wait_ticks: int) -> None:
     """`CompiledRig.prepare` of a device that does not use the coming stimulus: does nothing."""
 
 
@@ -151,9 +151,9 @@ class CompiledRig:
     buttons: Callable[[], frozenset[int]] = read_no_buttons
     """Numbers of the pressed buttons."""
     prepare: Callable[[FloatArray, bool, int], None] = skip_preparation
-    """prepare(rows, repeats, wait): called before a stimulus begins; used by the replay of a recording, whose motion
-    does not depend on the force. rows (n, 3), N: played once or, if `repeats`, repeatedly; the first after `wait`
-    ticks."""
+    """prepare(rows, repeats, wait_ticks): called before a stimulus begins; used by the replay of a recording, whose
+    motion does not depend on the force. rows (n, 3), N: played once or, if `repeats`, repeatedly; the first after
+    `wait_ticks` ticks."""
     simulate_hand: Callable[[bool], None] = ignore_hand
     """simulate_hand(on_handle): True: the simulated hand takes the handle; False: it lets go."""
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from study.devices.device import CALIBRATED, REPLAY, DeviceSettings
+from study.devices.device import CALIBRATED_PREFIX, REPLAY_PREFIX, DeviceSettings
 from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.open_rig import open_force_dimension_rig
 from study.devices.rig import CompiledRig, Rig
@@ -71,13 +71,13 @@ RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
 
 
 def build_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
-    """Build the rig of a name in `RIGS_BY_NAME`, of a replay (`REPLAY` and a path) or of a calibrated simulation
-    (`CALIBRATED` and a path). Raises `StudyError` where it cannot be built, and KeyError for any other name."""
-    if name.startswith(REPLAY):
+    """Build the rig of a name in `RIGS_BY_NAME`, of a replay (`REPLAY_PREFIX` and a path) or of a calibrated simulation
+    (`CALIBRATED_PREFIX` and a path). Raises `StudyError` where it cannot be built, and KeyError for any other name."""
+    if name.startswith(REPLAY_PREFIX):
         # Imported only here: the import loads compiled code, which other devices do not need.
         from study.devices.replay.replay_rig import make_replay_rig
 
-        return make_replay_rig(Path(name.removeprefix(REPLAY)))
-    if name.startswith(CALIBRATED):
-        return make_calibrated_rig(Path(name.removeprefix(CALIBRATED)), settings, seed)
+        return make_replay_rig(Path(name.removeprefix(REPLAY_PREFIX)))
+    if name.startswith(CALIBRATED_PREFIX):
+        return make_calibrated_rig(Path(name.removeprefix(CALIBRATED_PREFIX)), settings, seed)
     return RIGS_BY_NAME[name](settings, seed)

@@ -29,10 +29,11 @@ from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 REALTIME_BLOCK_S = 0.05
-"""Longest block of a compiled rig's ticks in real time, and longest keep-alive interval in `play` (s)."""
+"""Longest block of a compiled rig's ticks in real time, and longest keep-alive interval in `play` (s).
+Chosen: the loop reacts to other threads between blocks."""
 
 VIRTUAL_BLOCK_S = 5.0
-"""Longest block of a compiled rig's ticks in virtual time (s)."""
+"""Longest block of a compiled rig's ticks in virtual time (s). Chosen: limits the calls from Python."""
 
 CLOSING_UNCONFIRMED = (
     "the device did not say that it brakes when it was closed: it got zero force, and its brakes may be off; what was "
@@ -41,7 +42,7 @@ CLOSING_UNCONFIRMED = (
 """Written to stderr where the device did not confirm that it was closed."""
 
 STOP_TIMEOUT_S = 1.0
-"""Timeout (s) after the end of all fades; a device that still moves then counts as lost."""
+"""Timeout (s) after the end of all fades; a device that still moves then counts as lost. Chosen."""
 
 
 class SafeDevice:
@@ -108,7 +109,7 @@ class SafeDevice:
         return self._add_failure_reason(replace(self._governor.collect_health(), fault=self.fault()))
 
     def _add_failure_reason(self, health: Health) -> Health:
-        """The counters with the reason of a lost device (`why`), if the rig has failed."""
+        """Add the reason of a lost device (`why`) to the counters, if the rig has failed."""
         failure = self._runner.failure
         if failure is None:
             return health
@@ -142,7 +143,7 @@ class SafeDevice:
         self._drive.check()
         has_reading = not self._closing and self._drive.refresh()
         missed_ticks = self._governor.missed if self._held_stimulus is not None or self._runner.moving else 0
-        return make_look(self._runner.seen if has_reading else None, missed_ticks)
+        return make_look(self._runner.last_reading if has_reading else None, missed_ticks)
 
     def simulate_hand(self, on_handle: bool) -> None:
         self._require_idle()
@@ -188,13 +189,13 @@ class SafeDevice:
 
     def _wait_for_playback(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
         """Wait until the commands are played, at most `STOP_TIMEOUT_S` longer than duration_s; send keep-alives."""
-        interval_s = min(REALTIME_BLOCK_S, self._limits.watchdog_s / 4)
+        keep_alive_interval_s = min(REALTIME_BLOCK_S, self._limits.watchdog_s / 4)
         started_s = self._clock.now_s()
         while self._governor.playing and (elapsed_s := self._clock.now_s() - started_s) < duration_s + STOP_TIMEOUT_S:
             if on_progress is not None:
                 on_progress(min(1.0, elapsed_s / duration_s))
             self.keep_alive()
-            self._clock.sleep(interval_s)
+            self._clock.sleep(keep_alive_interval_s)
         if on_progress is not None and not self._governor.playing:
             on_progress(1.0)
 
@@ -208,19 +209,20 @@ class SafeDevice:
             raise
 
     def _wait_until_still(self, fade_out_s: float) -> None:
-        """Wait until no force is commanded; a device that takes too long counts as lost."""
+        """Wait, checking every 5 ticks, until no force is commanded. A device that takes longer than both fades, the
+        watchdog's timeout and `STOP_TIMEOUT_S` together counts as lost."""
         timeout_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + STOP_TIMEOUT_S
         deadline_s = self._clock.now_s() + timeout_s
-        interval_s = 5 / self._info.sample_rate_hz
+        poll_interval_s = 5 / self._info.sample_rate_hz
         while self._runner.moving:
             self._drive.check()
             if self._clock.now_s() > deadline_s:
                 self._runner.give_up(TimeoutError(f"no answer within {timeout_s:g} s"))
                 return
-            self._clock.sleep(interval_s)
+            self._clock.sleep(poll_interval_s)
 
     def _require_idle(self) -> None:
-        """Raises `DeviceError` where the device is closed, lost, stopped or holds a stimulus."""
+        """Raise `DeviceError` where the device is closed, lost, stopped or holds a stimulus."""
         if self._closing:
             raise _make_usage_error("The device is closed.", "Open it again.")
         self._require_connected()
@@ -239,7 +241,7 @@ class SafeDevice:
             try:
                 begin_stimulus()
                 self._runner.prepare()
-            except BaseException:  # the caller believes that nothing began, so none of its ticks may run
+            except BaseException:  # the caller gets an error, so no tick of the stimulus may run
                 self._governor.abandon(Fault.NONE)
                 raise
 
@@ -249,22 +251,23 @@ class SafeDevice:
             raise _make_playing_error()
 
     def _require_connected(self) -> None:
-        """Raises `DeviceError` for a lost device; the message says whether its force may still be on."""
+        """Raise `DeviceError` for a lost device; the message says whether its force may still be on."""
         failure = self._runner.failure
         if failure is None:
             return
         problem = f"It stopped answering ({type(failure).__name__}: {failure})."
-        remedy = "heck its power and its cable, then open it again; a session is continued with `hapteq resume`."
+        # Without the first letter of "check", which begins a sentence or follows "then".
+        remedy_tail = "heck its power and its cable, then open it again; a session is continued with `hapteq resume`."
         if self._runner.force_off:
-            raise DeviceError("The device was lost", f"{problem} Its force is off.", f"C{remedy}") from failure
+            raise DeviceError("The device was lost", f"{problem} Its force is off.", f"C{remedy_tail}") from failure
         raise DeviceError(
             "The device was lost",
             f"{problem} It took no zero force: its force may still be on.",
-            f"Let go of the handle and switch the device off. Then c{remedy}",
+            f"Let go of the handle and switch the device off. Then c{remedy_tail}",
         ) from failure
 
     def _make_runner(self, rig: Rig | CompiledRig) -> Runner:
-        """Runner of the rig's ticks: in blocks for a compiled rig, tick by tick otherwise."""
+        """Make the runner of the rig's ticks: in blocks for a compiled rig, tick by tick otherwise."""
         is_virtual = self._clock.virtual
         if isinstance(rig, CompiledRig):
             block_ticks = round((VIRTUAL_BLOCK_S if is_virtual else REALTIME_BLOCK_S) * rig.info.sample_rate_hz)
@@ -273,7 +276,7 @@ class SafeDevice:
         return SteppedRunner(rig, self._governor, is_virtual, read_time_s, is_monotonic)
 
     def _make_drive(self, clock: Clock) -> VirtualDrive | RealtimeDrive:
-        """Drive that decides when ticks run: at once in virtual time, at the sample rate in real time."""
+        """Make the drive, which decides when ticks run: at once in virtual time, at the sample rate in real time."""
         rate_hz = self._info.sample_rate_hz
         if isinstance(clock, VirtualClock):
             return VirtualDrive(self._runner, self._governor, clock, rate_hz)

@@ -17,7 +17,7 @@ from analysis.look.clock import describe_implausible_rate
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import check_recording
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, find_quantity, parse_unit
+from equalizer.signals.units import NO_UNIT, UnknownUnitError, check_quantity, find_quantity, parse_unit
 from study.importing.alignment import Logger, align_signals
 from study.importing.arrays.read_arrays import Arrays, read_arrays
 from study.importing.expressions.budget import Budget
@@ -177,7 +177,7 @@ def _parse_units(import_map: ImportMap) -> dict[ChannelKey, _ChannelUnit]:
 def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     """Parse the unit of one channel. Raises ImportProblemError where it is unknown or does not fit the quantity."""
     try:
-        unit = parse_unit(channel.unit.strip() or UNSTATED)
+        unit = parse_unit(channel.unit.strip() or NO_UNIT)
         check_quantity(channel.quantity, unit)
     except UnknownUnitError as error:
         raise ImportProblemError(f"channel '{channel.name}': {error}") from error
@@ -187,13 +187,13 @@ def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
 def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
     """List remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
     for computed in (entry for entry in import_map.computed if entry.role != "helper"):
-        yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
+        yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or NO_UNIT}."
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
     unitless = [
         f"{entry.role} '{entry.name}'" for entry in channels if entry.role != "helper" and not entry.unit.strip()
     ]
     if unitless:
-        yield f"No unit is stated for {', '.join(unitless)}: the numbers are kept as they are (unit {UNSTATED})."
+        yield f"No unit is stated for {', '.join(unitless)}: the numbers are kept as they are (unit {NO_UNIT})."
     if any(clock.unknown for clock in import_map.clock):
         yield f"No time is known: samples are numbered, at {PLACEHOLDER_RATE_HZ:g} Hz."
 

@@ -47,7 +47,7 @@ _TIME_NAME = re.compile(
 _NUMBER_PATTERN = re.compile(r"\d+")
 """A number in a prefix: prefixes that differ only by numbers denote runs of one measurement."""
 _MAX_LISTED_NAMES = 3
-"""Largest number of names that a message lists."""
+"""Largest number of names that a message lists. Chosen."""
 
 
 def read_without_map(path: Path) -> Arrays:
@@ -163,12 +163,12 @@ def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
         return ("; ".join((f"it holds no arrays of numbers{f' ({reasons_text})' if reasons_text else ''}", *advice)),)
     table, prefixes = _select_table(arrays)
     if len({_NUMBER_PATTERN.sub("", prefix) for prefix in prefixes}) > 1:
-        names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_MAX_LISTED_NAMES])
+        parts = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_MAX_LISTED_NAMES])
         sheet_advice = (
             ", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOK_ENDINGS else ""
         )
         return (
-            f"its {len(prefixes)} parts are alike ({names}), but not numbered as repeats are: keep the [[part]] of one "
+            f"its {len(prefixes)} parts are alike ({parts}), but not numbered as repeats are: keep the [[part]] of one "
             f"in the map{sheet_advice}",
         )
     if len({array.shape for array in table.by_name.values()}) != 1:
@@ -178,7 +178,7 @@ def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
     time_columns, columns = _split_time_columns(table)
     duplicates = [name for name, count in Counter(column.name for column in columns).items() if count > 1]
     return (
-        *_find_time_problems(time_columns, columns, arrays),
+        *_find_first_time_problem(time_columns, columns, arrays),
         *(f"'{column.header}': {column.doubt}" for column in columns if column.doubt),
         *(
             f"nothing says {question}"
@@ -207,14 +207,15 @@ def _is_time(column: ParsedName) -> bool:
 
 
 def _select_rates(arrays: Arrays) -> list[str]:
-    """Expressions for the sample rate (Hz): single numbers in hertz, or else the inverse of a step in seconds."""
+    """Select the expressions for the sample rate (Hz): single numbers in hertz, or else the inverse of a step in
+    seconds."""
     rate_names = find_rates(arrays)
     units = {rate: split_bracketed_unit(name)[1] or split_unit_at_end(name)[1] for rate, name in rate_names.items()}
     rates = [rate for rate, name in rate_names.items() if rate == name and units[rate] == "Hz"]
     return rates or [rate for rate, name in rate_names.items() if rate != name and units[rate] == "s"]
 
 
-def _find_time_problems(
+def _find_first_time_problem(
     time_columns: Sequence[ParsedName], columns: Sequence[ParsedName], arrays: Arrays
 ) -> Iterator[str]:
     """Find the first problem of the time base, as a clause: time column, its unit, or sample rate missing or

@@ -41,20 +41,20 @@ def swap_imposed_roles(
     `columns`; they are returned unchanged if the headers exclude an imposed motion (`may_be_imposed_motion`), if the
     arrays are not one-dimensional and of equal length, or if a motion does not pass the test against each force.
     """
-    unchanged = list(roles)
+    proposed_roles = list(roles)
     if not may_be_imposed_motion(columns):
-        return unchanged
+        return proposed_roles
     forces = [column for column in columns if column.quantity in ("force", "torque")]
     positions = [column for column in columns if column.quantity in ("position", "angle")]
     arrays = [arrays_by_header[column.header] for column in (*forces, *positions)]
     if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
-        return unchanged
+        return proposed_roles
     if not all(
         is_imposed(arrays_by_header[position.header].astype(float), arrays_by_header[force.header].astype(float))
         for position in positions
         for force in forces
     ):
-        return unchanged
+        return proposed_roles
     return [
         _ROLE_IF_IMPOSED.get(role, role) if column in forces or column in positions else role
         for column, role in zip(columns, roles, strict=True)

@@ -1,7 +1,8 @@
 """Find the import map for recorded files: by its name or path, in the files' folder, or from the headers of the files.
 
 A map in the folder comes first, then shipped maps (`maps/`) that match file names and arrays, then
-`make_map_from_headers`. Called by `study.workflows.recording.import_recording` and `study.evaluation.real`.
+`make_map_from_headers`. Called by `workflows.recording.import_recording`, `workflows.files.importing_docs` (shipped
+maps) and `study.evaluation.real`.
 """
 
 import re
@@ -27,12 +28,12 @@ from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.text_file import read_toml_text
 from study.store.formats.recording_layout import FORMAT
 
-NO_DATA = (".toml", ".md")
+NON_DATA_SUFFIXES = (".toml", ".md")
 """Suffixes of files in a folder of recordings that hold no data."""
 _NUMBER = re.compile(r"\d+")
 """A number in a file name: files whose names differ only by their numbers are parts of one recording."""
 _MAX_NAMED_FILES = 4
-"""Largest number of files that a message names."""
+"""Largest number of files that a message names. Chosen: a message remains a few lines long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class MapFile:
 
 @dataclass(frozen=True, slots=True)
 class FoundMap:
-    """A map, and the files that it combines into one recording."""
+    """A map, and the files that it combines into one recording, in the order of its patterns."""
 
     source: MapFile
     files: tuple[Path, ...]
@@ -88,17 +89,18 @@ def read_map(name: str) -> MapFile:
 
 def find_maps_for_folder(folder: Path) -> tuple[FoundMap, ...]:
     """Find the maps for the recordings in a folder: those in the folder or, without any, shipped maps that match file
-    names and arrays; empty if none matches. Raises CannotReadError; UnusableFileError for an invalid map."""
+    names and arrays; empty if none matches. Raises CannotReadError or UnusableFileError for a map that cannot be read
+    or is invalid, OSError where the folder cannot be listed."""
     paths = sorted(path for path in folder.iterdir() if path.is_file())
     map_paths = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
     if map_paths:
         folder_maps = [read_map(str(path)) for path in map_paths]
-        return tuple(found_map for source in folder_maps for found_map in _match_recordings(source, paths))
+        return tuple(found_map for map_file in folder_maps for found_map in _match_recordings(map_file, paths))
     shipped_maps = (read_map(name) for name in list_shipped_maps())
     return tuple(
         found_map
-        for source in shipped_maps
-        for found_map in _match_recordings(source, paths)
+        for map_file in shipped_maps
+        for found_map in _match_recordings(map_file, paths)
         if _has_required_arrays(found_map)
     )
 
@@ -120,7 +122,8 @@ def make_map_from_headers(folder: Path) -> FoundMap:
     for file names that differ by more than numbers; MapNeededError where the header of the first file does not
     suffice; CannotReadError and ImportRefusedError as `read_without_map`."""
     data_paths = sorted(
-        (path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_make_natural_sort_key
+        (path for path in folder.iterdir() if path.is_file() and path.suffix not in NON_DATA_SUFFIXES),
+        key=_make_natural_sort_key,
     )
     no_map_text = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
     if not data_paths:
@@ -164,22 +167,23 @@ def _is_map_file(path: Path) -> bool:
         return False
 
 
-def _match_recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
+def _match_recordings(map_file: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
     """Match the files to the patterns of a map and yield its recordings: with `separate` one per matching file,
-    otherwise one of all matching files, if every pattern matches any."""
-    data_paths = [path for path in paths if path.suffix not in NO_DATA]
+    otherwise one of all matching files, if every pattern matches at least one file."""
+    data_paths = [path for path in paths if path.suffix not in NON_DATA_SUFFIXES]
     paths_by_pattern = [
-        [path for path in data_paths if fnmatchcase(path.name, pattern)] for pattern in source.map.files
+        [path for path in data_paths if fnmatchcase(path.name, pattern)] for pattern in map_file.map.files
     ]
-    matching_paths = tuple(dict.fromkeys(path for matches in paths_by_pattern for path in matches))
-    if source.map.separate:
-        yield from (FoundMap(source, (path,)) for path in matching_paths)
+    matching_paths = tuple(dict.fromkeys(path for pattern_matches in paths_by_pattern for path in pattern_matches))
+    if map_file.map.separate:
+        yield from (FoundMap(map_file, (path,)) for path in matching_paths)
     elif all(paths_by_pattern):
-        yield FoundMap(source, matching_paths)
+        yield FoundMap(map_file, matching_paths)
 
 
 def _has_required_arrays(found_map: FoundMap) -> bool:
-    """Whether the first part of a recording has all arrays that the map names; False where it cannot be read."""
+    """Whether the files of a recording's first part have all names in the map's expressions of channels and clocks
+    (computed channels are not checked); False where a file cannot be read."""
     import_map = found_map.source.map
     try:
         part = assign_files(import_map, found_map.files)[0]

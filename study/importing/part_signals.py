@@ -58,17 +58,18 @@ def resample_part(
     on_channel: Callable[[], None],
 ) -> PartSignals:
     """Resample the channels of one part to a common time grid. `report` is called with a sentence for each deviation
-    from the file, `on_channel` after each channel. loggers: aligned to the first. Raises ImportProblemError."""
+    from the file, `on_channel` after each channel. loggers: at least one, aligned to the first. Raises
+    ImportProblemError where an expression, the time grid or a resampling is not possible."""
     logger_by_clock = {logger.clock.name: logger for logger in loggers}
     first_clock = loggers[0].clock.name
-    sources: list[tuple[ChannelMap, Samples]] = []
+    sampled_channels: list[tuple[ChannelMap, Samples]] = []
     for channel in import_map.channel:
         logger = logger_by_clock[channel.clock or first_clock]
         values = _read_values(channel, logger, import_map)
-        sources.append((channel, logger.base.make_samples(values)))
-    grid = _make_grid(import_map, part, loggers, [samples for _, samples in sources])
+        sampled_channels.append((channel, logger.base.make_samples(values)))
+    grid = _make_grid(import_map, part, loggers, [samples for _, samples in sampled_channels])
     columns: dict[ChannelKey, FloatArray] = {}
-    for channel, samples in sources:
+    for channel, samples in sampled_channels:
         columns[channel.role, channel.name] = _put_on_grid(channel, samples, grid, report)
         on_channel()
     for logger in loggers:
@@ -85,25 +86,25 @@ def resample_part(
 
 
 def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> Value:
-    """Read the samples of a channel on its own clock; a single number is repeated. Raises ImportProblemError for
-    another shape or length, or infinite values."""
-    subject = f"channel '{channel.name}'"
+    """Compute the samples (n,) of a channel on its clock; a single number is repeated. Raises ImportProblemError for
+    another shape or length, and for an array with infinite values."""
+    label = f"channel '{channel.name}'"
     try:
         values = logger.namespace.compute_value(channel.value, logger.base)
     except ImportProblemError as error:
-        raise ImportProblemError(f"{subject}: {error}") from error
+        raise ImportProblemError(f"{label}: {error}") from error
     if values.ndim > 1:
         raise ImportProblemError(
-            f"{subject}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
+            f"{label}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
         )
     count = _count_samples(logger, import_map)
     if values.ndim == 0:
         return np.full(count or 1, float(values))
     if count and len(values) != count:
-        clock = f"clock '{logger.clock.name}'"
-        raise ImportProblemError(f"{subject}: {channel.value} has {len(values)} samples, but {clock} has {count}")
+        clock_text = f"clock '{logger.clock.name}'"
+        raise ImportProblemError(f"{label}: {channel.value} has {len(values)} samples, but {clock_text} has {count}")
     if np.isinf(values).any():
-        raise ImportProblemError(f"{subject}: {channel.value} holds infinite values; a missing sample is NaN")
+        raise ImportProblemError(f"{label}: {channel.value} holds infinite values; a missing sample is NaN")
     return values
 
 
@@ -121,7 +122,9 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     return 0
 
 
-def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
+def _make_grid(
+    import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...], channel_samples: list[Samples]
+) -> Grid:
     """Make the grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
     ImportProblemError for uneven stamps without a stated rate, and for too many or too few samples."""
     uneven_loggers = [logger for logger in loggers if not logger.base.rate_hz]
@@ -135,8 +138,8 @@ def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...]
             f'resample = "linear". {_COMMAND_ADVICE}'
         )
     rate_hz = import_map.rate_hz or max(logger.base.rate_hz for logger in loggers)
-    begin_s = max(float(samples.times_s[0]) for samples in sources)
-    end_s = min(float(samples.times_s[-1]) for samples in sources)
+    begin_s = max(float(samples.times_s[0]) for samples in channel_samples)
+    end_s = min(float(samples.times_s[-1]) for samples in channel_samples)
     if part.stop_s:
         end_s = min(end_s, begin_s + part.stop_s - (1 - TIME_TOLERANCE) / rate_hz)
     begin_s += np.ceil(part.start_s * rate_hz - TIME_TOLERANCE) / rate_hz
@@ -177,14 +180,16 @@ def _put_on_grid(channel: ChannelMap, samples: Samples, grid: Grid, report: Call
 
 
 def _has_same_rate(samples: Samples, grid: Grid) -> bool:
-    """Whether two rates differ by less than `TIME_TOLERANCE` periods over the whole grid."""
+    """Whether two rates differ by less than `TIME_TOLERANCE` periods over the whole grid; False for uneven samples,
+    whose rate is 0."""
     return abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < TIME_TOLERANCE
 
 
 def _resample(
     channel: ChannelMap, method: Method, samples: Samples, grid: Grid, report: Callable[[str], None]
 ) -> FloatArray:
-    """Resample a channel to the grid and report how. Raises ImportProblemError."""
+    """Resample a channel to the grid (grid.count,) and report from which rate and how. Raises ImportProblemError where
+    the method cannot be applied to its samples."""
     try:
         column = resample(samples, grid, method)
     except ValueError as error:
@@ -197,24 +202,24 @@ def _resample(
 
 
 def _compute_channel(
-    name: str, expression: str, columns: Mapping[str, FloatArray], grid: Grid, file_namespace: Namespace
+    channel_name: str, expression: str, columns: Mapping[str, FloatArray], grid: Grid, file_namespace: Namespace
 ) -> FloatArray:
-    """Evaluate the expression of a computed channel on the grid (grid.count,). columns: the channels by name. Raises
-    ImportProblemError for another shape or infinite values."""
+    """Evaluate the expression of a computed channel on the grid (grid.count,); a single number is repeated. columns:
+    the channels by name. Raises ImportProblemError for another shape, and for an array with infinite values."""
     arrays = {**file_namespace.arrays, "clock_s": grid.compute_times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(
             arrays, file_namespace.definitions, file_namespace.file_name, file_namespace.budget
         ).compute_value(expression, _GridClock(grid))
     except ImportProblemError as error:
-        raise ImportProblemError(f"computed channel '{name}': {error}") from error
+        raise ImportProblemError(f"computed channel '{channel_name}': {error}") from error
     if value.ndim == 0:
         return np.full(grid.count, float(value))
     if value.shape != (grid.count,):
         raise ImportProblemError(
-            f"computed channel '{name}': {expression} has the shape {value.shape}, but the recording has "
+            f"computed channel '{channel_name}': {expression} has the shape {value.shape}, but the recording has "
             f"{grid.count} samples"
         )
     if np.isinf(value).any():
-        raise ImportProblemError(f"computed channel '{name}': {expression} holds infinite values")
+        raise ImportProblemError(f"computed channel '{channel_name}': {expression} holds infinite values")
     return value

@@ -1,7 +1,7 @@
-"""Recognise the arrays of a file that a proposed map omits: without numbers, row numbers, repeated time columns.
+"""Recognise the arrays of a file that a proposed map omits: arrays without numbers, row numbers and repeated times.
 
-Also recognises time columns, tables whose first column is the time, and sample rates. The limits below were chosen by
-hand. Called by `header_map` and `map_skeleton`.
+Time columns, tables whose first row or column is the time, and sample rates are recognised as well. The limits below
+were chosen by hand. Called by `header_map` and `map_skeleton`.
 """
 
 import re
@@ -41,19 +41,19 @@ SAME_CLOCK_TOLERANCE = 0.5
 
 
 def find_surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
-    """Find the arrays to omit: the reason, as a clause, by name of the array. Row numbers are omitted only where a time
-    column exists."""
+    """Find the arrays to omit; returns the reason, as a clause, by name of the array. Row numbers are omitted only
+    where a time column exists."""
     non_numeric = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_all_nan(array)}
     non_numeric |= {
         name: "holds no numbers" for name, array in arrays.by_name.items() if array.dtype.kind in "SU" and array.ndim
     }
     has_clock = any(name in arrays.clocks or is_growing_time(name, array) for name, array in arrays.by_name.items())
-    row_numbers = {
+    row_number_columns = {
         name: "numbers the rows" for name, array in arrays.by_name.items() if has_clock and _is_row_number(name, array)
     }
     return (
         non_numeric
-        | row_numbers
+        | row_number_columns
         | {name: f"is the same time as '{kept_clock}'" for name, kept_clock in find_equal_clocks(arrays).items()}
     )
 
@@ -86,8 +86,8 @@ def _extract_last_part(name: str) -> str:
 
 
 def find_rates(arrays: Arrays) -> Mapping[str, str]:
-    """Find the single numbers that are named as a sample rate or sampling interval: name by the expression for the
-    rate; rates come first."""
+    """Find the single numbers that are named as a sample rate or sampling interval; returns the name of the number by
+    the expression for the rate, rates first."""
     single_values = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
     named_rates = {
         name: name for name in single_values if _RATE_NAME.fullmatch(" ".join(_split_words(_extract_last_part(name))))
@@ -117,8 +117,8 @@ def _is_row_number(name: str, array: Array) -> bool:
 
 
 def find_equal_clocks(arrays: Arrays) -> Mapping[str, str]:
-    """Find the time columns that repeat another: name of the kept column, by name of the repetition. Of equal columns,
-    one with a unit of time is kept, then one that holds dates or clock times (`Arrays.clocks`)."""
+    """Find the time columns that repeat another; returns the name of the kept column by the name of the repetition. Of
+    equal columns, one with a unit of time is kept, then one that holds dates or clock times (`Arrays.clocks`)."""
     kept_clocks: list[str] = []
     repeated_clocks = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
@@ -149,11 +149,11 @@ def has_time_line(array: Array) -> bool:
 
 
 @np.errstate(all="ignore")
-def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
+def _is_same_clock(by_name: Mapping[str, Array], first_name: str, second_name: str) -> bool:
     """Whether two time columns are equal to `SAME_CLOCK_TOLERANCE`, apart from their starts and the ratio of their
     units; where a name states no unit, the ratio of `_USUAL_UNIT_RATIOS` that fits the end best. False for different
     shapes, for fewer than two times, and where a first or last value is not finite."""
-    first_times, second_times = (by_name[name].astype(float) for name in (first, second))
+    first_times, second_times = (by_name[name].astype(float) for name in (first_name, second_name))
     if (
         first_times.shape != second_times.shape
         or first_times.ndim != 1
@@ -162,7 +162,7 @@ def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> boo
     ):
         return False
     first_times, second_times = first_times - first_times[0], second_times - second_times[0]
-    units = _read_unit_s(first), _read_unit_s(second)
+    units = _read_unit_s(first_name), _read_unit_s(second_name)
     ratios = _USUAL_UNIT_RATIOS if None in units else ((units[1] or 1) / (units[0] or 1),)
     ratio = min(ratios, key=lambda ratio: abs(second_times[-1] * ratio - first_times[-1]))
     median_step = float(np.nanmedian(np.diff(first_times)))

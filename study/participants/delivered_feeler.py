@@ -13,7 +13,8 @@ as a `direction_feeler` would to the amplitude
 The amplitude is converted to newtons by what the simulated omega.3 delivers per newton (`MPS2_PER_N`), because the
 thresholds of `direction_feeler` are forces. The model and its numbers m, A and tau are assumptions of the authors.
 Where nothing was measured (no device, less than a period, a detection trial), the commanded force counts as delivered
-without disturbance.
+without disturbance. Made by `observer_catalogue` and `population`; `simulated_participant` measures the delivered
+acceleration for it.
 """
 
 import math
@@ -26,7 +27,7 @@ from study.participants.psychometric_curve import interpolate_threshold_n
 
 MPS2_PER_N = ((5.0, 1.5), (15.0, 2.7), (25.0, 2.85), (35.0, 3.1), (45.0, 3.6))
 """(Hz, m/s² per N): acceleration along a direction that the simulated omega.3 delivers per newton; medians of four
-rehearsed sessions at levels near the thresholds."""
+rehearsed sessions at levels near the thresholds. Interpolated on logarithmic axes, constant beyond the ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,21 +45,23 @@ class DeliveredFeeler:
     """tau: time constant of adaptation, in trials of a run."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """Answer (1 or 2) and response time (s) for one presentation."""
-        return self.feeler.reply(replace(felt, level_n=self.felt_n(felt)), seed)
+        """Draw the answer (1 or 2) and response time (s) for one presentation, as `feeler` does for the equivalent
+        force."""
+        return self.feeler.reply(replace(felt, level_n=self.compute_equivalent_force_n(felt)), seed)
 
     def compute_proportion_correct(self, felt: PerceivedStimulus) -> float:
-        """Probability of the right answer."""
-        return self.feeler.compute_proportion_correct(replace(felt, level_n=self.felt_n(felt)))
+        """Compute the probability of the right answer, lapses included."""
+        return self.feeler.compute_proportion_correct(replace(felt, level_n=self.compute_equivalent_force_n(felt)))
 
-    def felt_n(self, felt: PerceivedStimulus) -> float:
-        """Force (N) which, delivered without disturbance and before adaptation, would be felt as well as this trial."""
+    def compute_equivalent_force_n(self, felt: PerceivedStimulus) -> float:
+        """Compute the force (N) which, delivered without disturbance and before adaptation, would be felt as well as
+        this stimulus; 0 where the motion across is not less than that along the direction."""
         delivered = felt.delivered
         if felt.phase is Phase.DETECTION or delivered is None:
             return felt.level_n
-        per_newton = interpolate_threshold_n(MPS2_PER_N, felt.frequency_hz)
-        threshold_mps2 = per_newton * interpolate_threshold_n(self.feeler.thresholds_n, felt.frequency_hz)
-        directed = math.sqrt(max(0.0, delivered.along_mps2**2 - delivered.off_axis_mps2**2))
-        masked = math.hypot(1.0, self.masking * (delivered.harmonics_mps2 or 0.0) / threshold_mps2)
-        adapted_db = self.adaptation_db * -math.expm1(-felt.trial / self.adaptation_trials)
-        return directed / per_newton / masked * float(10.0 ** (-adapted_db / 20.0))
+        mps2_per_n = interpolate_threshold_n(MPS2_PER_N, felt.frequency_hz)
+        threshold_mps2 = mps2_per_n * interpolate_threshold_n(self.feeler.thresholds_n, felt.frequency_hz)
+        directed_mps2 = math.sqrt(max(0.0, delivered.along_mps2**2 - delivered.off_axis_mps2**2))
+        masking_factor = math.hypot(1.0, self.masking * (delivered.harmonics_mps2 or 0.0) / threshold_mps2)
+        adaptation_rise_db = self.adaptation_db * -math.expm1(-felt.trial / self.adaptation_trials)
+        return directed_mps2 / mps2_per_n / masking_factor * float(10.0 ** (-adaptation_rise_db / 20.0))

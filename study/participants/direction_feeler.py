@@ -6,7 +6,7 @@ criterion. Without bias the fraction of right answers is Phi(d'/2), so d' = 2 Ph
 With a criterion c it is Phi(d'/2 - c) for direction 1 and Phi(d'/2 + c) for direction 2, which is less on average.
 
 In a detection trial the alternatives are two intervals; the same model is used with the detection curve, whose levels
-are much lower.
+are much lower. Made by `observer_catalogue` and `population`; part of `delivered_feeler` and `unsure_repeater`.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
 """
@@ -33,7 +33,8 @@ class DirectionFeeler:
     thresholds_n: tuple[tuple[float, float], ...]
     """(frequency in Hz, level in N at which 79.37 % of the directions are right), frequencies ascending."""
     slope: float = 2.0
-    """Slope (exponent) of the Weibull function of force, without unit; typical values for people are 1 to 3.5."""
+    """Slope (exponent) of the Weibull function of force in direction trials, without unit. The default is chosen,
+    within the 1 to 3.5 that are typical for people."""
     lapse: float = 0.0
     """Lapse rate: fraction of wrong answers at the strongest level. Random answers occur at twice this rate, half of
     them right."""
@@ -41,9 +42,9 @@ class DirectionFeeler:
     """c of Macmillan and Creelman, in standard deviations of the evidence, as in `psychophysics.bias`: positive for a
     tendency to answer 2, negative for 1."""
     drift_db_per_100_trials: float = 0.0
-    """Rise of the thresholds during the session (dB per 100 trials)."""
+    """Rise of the thresholds during the session (dB per 100 answered trials)."""
     criterion_per_100_trials: float = 0.0
-    """Drift of the criterion during the session (per 100 trials)."""
+    """Drift of the criterion during the session (standard deviations per 100 answered trials)."""
     numb_above_hz: float = math.inf
     """Frequency (Hz) above which the direction is not felt, although the vibration is."""
     detection_n: tuple[tuple[float, float], ...] = TYPICAL_DETECTION_N
@@ -51,29 +52,30 @@ class DirectionFeeler:
     frequencies ascending."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
+        """Draw the answer (1 or 2) and response time (s) for one presentation, random but the same for equal
+        arguments."""
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
-        answer = 1 if choice_draw < self.compute_share_of_answer_1(felt) else 2
+        answer = 1 if choice_draw < self.compute_probability_of_answer_1(felt) else 2
         return Reply(answer, draw_response_time_s(time_draw))
 
-    def compute_share_of_answer_1(self, felt: PerceivedStimulus) -> float:
-        """Probability of answer 1, lapses included."""
+    def compute_probability_of_answer_1(self, felt: PerceivedStimulus) -> float:
+        """Compute the probability of answer 1, lapses included."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        share_without_lapses = _NORMAL.cdf(sign * self.compute_d_prime(felt) / 2 - self.compute_criterion(felt))
-        return self.lapse + (1.0 - 2.0 * self.lapse) * share_without_lapses
+        probability_without_lapses = _NORMAL.cdf(sign * self.compute_d_prime(felt) / 2 - self.compute_criterion(felt))
+        return self.lapse + (1.0 - 2.0 * self.lapse) * probability_without_lapses
 
     def compute_proportion_correct(self, felt: PerceivedStimulus) -> float:
-        """Probability of the right answer, lapses included."""
-        share_of_1 = self.compute_share_of_answer_1(felt)
-        return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
+        """Compute the probability of the right answer, lapses included."""
+        probability_of_1 = self.compute_probability_of_answer_1(felt)
+        return probability_of_1 if felt.direction_shown == 1 else 1.0 - probability_of_1
 
     def compute_criterion(self, felt: PerceivedStimulus) -> float:
-        """Criterion c at this trial, with its drift."""
+        """Compute the criterion c (standard deviations) at this trial, with its drift."""
         return self.criterion + self.criterion_per_100_trials * felt.trials_before / 100.0
 
     def compute_d_prime(self, felt: PerceivedStimulus) -> float:
-        """Sensitivity d' to this stimulus; 0 above `numb_above_hz`, where the direction is not felt, except in a
-        detection trial."""
+        """Compute the sensitivity d' to this stimulus; 0 above `numb_above_hz`, where the direction is not felt, except
+        in a detection trial."""
         is_detection = felt.phase is Phase.DETECTION
         if felt.frequency_hz > self.numb_above_hz and not is_detection:
             return 0.0

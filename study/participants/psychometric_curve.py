@@ -1,7 +1,7 @@
 """Psychometric function of a two-alternative forced-choice task (Weibull): proportion of correct answers by level.
 
-Used by the simulated participants (`direction_feeler`, `delivered_feeler`, `intensity_cue`) and by
-`study.cli.power`."""
+Used by the simulated participants (`direction_feeler`, `delivered_feeler`, `intensity_cue`) and by `study.cli.power`.
+"""
 
 import math
 from dataclasses import dataclass

@@ -48,7 +48,7 @@ def _fit_widths(widths: list[int], are_numeric: list[bool], terminal_width: int 
     widths = list(widths)
     while (
         terminal_width is not None
-        and (excess := sum(widths) + len(COLUMN_GAP) * (len(widths) - 1) - terminal_width) > 0
+        and (excess_width := sum(widths) + len(COLUMN_GAP) * (len(widths) - 1) - terminal_width) > 0
     ):
         text_columns = [
             (width, column)
@@ -61,7 +61,7 @@ def _fit_widths(widths: list[int], are_numeric: list[bool], terminal_width: int 
         next_widest = max(
             [MIN_COLUMN_WIDTH, *(narrower for narrower, index in text_columns if index != column and narrower < width)]
         )
-        widths[column] = max(width - excess, next_widest)
+        widths[column] = max(width - excess_width, next_widest)
     return widths
 
 

@@ -2,6 +2,7 @@
 
 The hues are those of the palette of Okabe and Ito, which can be distinguished with colour vision deficiencies; some are
 made darker or lighter to be legible on the background. Source: M. Okabe, K. Ito, Color Universal Design (2008).
+Registered by `app` (`hapteq study`) and `watch_app` (`hapteq watch`).
 """
 
 from typing import Any

@@ -14,7 +14,7 @@ from protocols.definition.session_settings import CatchSettings, DetectionSettin
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from protocols.definition.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
 from protocols.procedure.run_rules import make_staircase_rule
-from protocols.procedure.staircase import StaircaseState, begin_staircase, is_finished, level_n, step
+from protocols.procedure.staircase import StaircaseState, begin_staircase, compute_level_n, is_finished, step
 from protocols.trial import Phase, Trial, TrialStatus
 
 PUBLISHED = StaircaseRule(
@@ -74,7 +74,7 @@ def simulate_run(
     state, trials = begin_staircase(rule), []
     template = replace(TEMPLATE, **columns)
     while not is_finished(rule, state):
-        level_played = level_n(rule, state)
+        level_played = compute_level_n(rule, state)
         correct = bool(generator.random() < probability_correct(level_played, true_n, slope, lapse))
         state, trial = play_trial(rule, state, template, correct, int(generator.integers(1, 3)))
         trials.append(trial)
@@ -101,7 +101,7 @@ def simulate_run_with_catches(
 def play_trial(
     rule: StaircaseRule, state: StaircaseState, template: Trial, correct: bool, direction: int
 ) -> tuple[StaircaseState, Trial]:
-    level = level_n(rule, state)
+    level = compute_level_n(rule, state)
     next_state = step(rule, state, correct)
     trial = replace(
         template,

@@ -20,7 +20,7 @@ import numpy as np
 from study.devices.clock import RealClock
 from study.devices.device import Health
 from study.devices.drive.stepped_runner import SteppedRunner
-from study.devices.force_dimension.loop_cells import LIBRARY
+from study.devices.force_dimension.loop_cells import VENDOR_CALLS
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
@@ -59,7 +59,7 @@ def us_of_c(folder: Path, rig) -> float:
     command = [*vendor_stub.compiler(), "-std=c11", "-O2", "-shared", "-fPIC", "-o", str(library), str(source)]
     subprocess.run(command, check=True, timeout=240)
     two_calls = ctypes.CDLL(str(library)).two_calls
-    read, send = (ctypes.c_void_p(int(address)) for address in rig._handle.library.find_addresses(LIBRARY[:2]))
+    read, send = (ctypes.c_void_p(int(address)) for address in rig._handle.library.find_addresses(VENDOR_CALLS[:2]))
     return us_each(lambda: two_calls(read, send, TICKS))
 
 

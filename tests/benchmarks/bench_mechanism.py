@@ -35,7 +35,7 @@ def plain(model, commands: np.ndarray) -> np.ndarray:
     state, before, out = np.zeros(len(linear.transition)), np.zeros(commands.shape[1]), []
     for u in commands:
         out.append(linear.response @ state + linear.response_by_command @ before)
-        state, before = linear.transition @ state + linear.by_command @ u, u
+        state, before = linear.transition @ state + linear.state_by_command @ u, u
     decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / RATE_HZ)
     return lfilter([1 - decay], [1, -decay], out, axis=0)
 

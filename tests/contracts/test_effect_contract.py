@@ -9,7 +9,7 @@ import pytest
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import JointForce, OnResponse, Structure
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import ModelEffect, find_effect_problems
 
 ALL = sorted(EFFECTS)
@@ -41,7 +41,7 @@ def played(bench):
 
 
 def test_the_catalogue_is_the_vocabulary_in_its_order():
-    assert [effect.name for effect in CATALOGUE] == [effect.name for effect in EFFECT_NAMES if effect.name in EFFECTS]
+    assert [effect.name for effect in CATALOGUE] == [effect.name for effect in EFFECT_ENTRIES if effect.name in EFFECTS]
     assert set(EFFECTS) == set(EFFECTS_BY_NAME)
 
 

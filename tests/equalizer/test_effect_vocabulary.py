@@ -1,7 +1,7 @@
 import re
 from typing import get_args
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, RESPONSE, Place
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EFFECTS_BY_NAME, RESPONSE, Place
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 from equalizer.signals.units import parse_unit
 
@@ -15,18 +15,18 @@ def test_every_effect_of_the_contract_is_there_with_its_place_and_parameters(sha
             agreed[name] = (place, [number.split(" (")[0].strip() for number in numbers.split(",")])
     ours = {
         effect.name: (effect.place, [number.name for number in effect.parameters if not number.optional])
-        for effect in EFFECT_NAMES
+        for effect in EFFECT_ENTRIES
     }
     assert agreed.items() <= ours.items()
 
 
 def test_names_are_unique_and_places_known():
-    assert len(EFFECTS_BY_NAME) == len(EFFECT_NAMES) >= 33
-    assert {effect.place for effect in EFFECT_NAMES} == set(get_args(Place))
+    assert len(EFFECTS_BY_NAME) == len(EFFECT_ENTRIES) >= 33
+    assert {effect.place for effect in EFFECT_ENTRIES} == set(get_args(Place))
 
 
 def test_every_unit_is_one_that_files_may_use():
-    for effect in EFFECT_NAMES:
+    for effect in EFFECT_ENTRIES:
         for number in effect.parameters:
             for unit in (number.unit, number.rotational_unit):
                 assert unit == "ppm" or RESPONSE in unit or parse_unit(unit)

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equalizer.laws.law import parse_law
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES
 from equalizer.plant.mechanical_model import (
     ActuatorLimits,
     MechanicalModel,
@@ -13,7 +13,7 @@ from equalizer.plant.mechanical_model import (
     SensorLimits,
     Tolerance,
 )
-from equalizer.plant.mechanical_model_toml import MATRICES, format_mechanical_model, parse_mechanical_model
+from equalizer.plant.mechanical_model_toml import MATRIX_KEYS, format_mechanical_model, parse_mechanical_model
 from equalizer.signals.signal import FloatArray
 
 ONE_AXIS = """
@@ -41,7 +41,7 @@ def models(draw):
             rows, columns
         )
 
-    kinds = draw(st.lists(st.sampled_from(EFFECT_NAMES), max_size=3))
+    kinds = draw(st.lists(st.sampled_from(EFFECT_ENTRIES), max_size=3))
     effects = tuple(
         ModelEffect(kind.name, draw(st.none() | words), {part.name: draw(numbers) for part in kind.parameters})
         for kind in kinds
@@ -68,7 +68,7 @@ def models(draw):
 @settings(max_examples=60, deadline=None)
 def test_a_written_model_is_read_back_to_the_last_digit(model):
     again = parse_mechanical_model(format_mechanical_model(model))
-    for name in MATRICES:
+    for name in MATRIX_KEYS:
         assert np.array_equal(getattr(again, name), getattr(model, name))
     for name in ("name", "quantity", "sensor", "actuator", "effects", "tolerance", "rotational", "provenance"):
         assert getattr(again, name) == getattr(model, name)
@@ -153,7 +153,7 @@ def test_an_empty_text_lacks_its_model():
 def test_a_value_that_toml_does_not_have_is_refused_when_writing():
     model = parse_mechanical_model(ONE_AXIS)
     odd = MechanicalModel(
-        **{name: getattr(model, name) for name in ("name", "quantity", *MATRICES)}, provenance={"a": 1j}
+        **{name: getattr(model, name) for name in ("name", "quantity", *MATRIX_KEYS)}, provenance={"a": 1j}
     )
     with pytest.raises(TypeError, match="a value of type complex cannot be written as TOML: 1j"):
         format_mechanical_model(odd)

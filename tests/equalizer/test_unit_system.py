@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, find_matrix_unit
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EFFECTS_BY_NAME, find_matrix_unit
 from equalizer.plant.mechanical_model import MechanicalModel, adopt_recording_units
 from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, determine_unit_system
@@ -27,7 +27,7 @@ def test_mass_damping_and_stiffness(system, units):
 
 
 def test_no_number_of_an_effect_is_a_force_where_the_command_is_none():
-    units = [part.find_unit(MOTOR, "rad") for effect in EFFECT_NAMES for part in effect.parameters]
+    units = [part.find_unit(MOTOR, "rad") for effect in EFFECT_ENTRIES for part in effect.parameters]
     assert not any("N" in unit.split() or "kg" in unit for unit in units)
     assert EFFECTS_BY_NAME["gravity_torque"].main.find_unit(MOTOR, "rad") == "A"
 

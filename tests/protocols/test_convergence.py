@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
-from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
+from protocols.procedure.staircase import begin_staircase, compute_level_n, is_finished, step, to_newton
 
 TARGET = 0.5 ** (1 / 3)
 RUNS = 250
@@ -25,7 +25,7 @@ def measured(rule: StaircaseRule, share_right, seed: int) -> tuple[np.ndarray, n
     for _ in range(RUNS):
         state = begin_staircase(rule)
         while not is_finished(rule, state):
-            state = step(rule, state, rng.random() < share_right(level_n(rule, state)))
+            state = step(rule, state, rng.random() < share_right(compute_level_n(rule, state)))
         found.append(np.mean([to_newton(level) for level in state.reversal_levels_db[-rule.averaged_reversals :]]))
         trials.append(state.trials)
     return np.array(found), np.array(trials)
@@ -61,7 +61,7 @@ def test_long_runs_of_small_steps_converge_where_levitt_says(published, down, ta
     for _ in range(12):
         state = begin_staircase(rule)
         while not is_finished(rule, state):
-            state = step(rule, state, rng.random() < share_right(level_n(rule, state)))
+            state = step(rule, state, rng.random() < share_right(compute_level_n(rule, state)))
         shares.append(share_right(to_newton(float(np.mean(state.reversal_levels_db[-90:])))))
     assert np.mean(shares) == pytest.approx(target, abs=0.012)
 

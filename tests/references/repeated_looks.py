@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
-from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step
+from protocols.procedure.staircase import begin_staircase, compute_level_n, is_finished, step
 from protocols.trial import Phase
 from study.participants.observer import PerceivedStimulus
 from study.participants.observer_catalogue import find_observer
@@ -30,7 +30,7 @@ def run(name: str, seed: int, most: float) -> tuple[float, int]:
         attempt = 0
         while True:
             felt = PerceivedStimulus(
-                1, state.trials, attempt, Phase.TEST, HZ, level_n(RULE, state), shown, state.trials
+                1, state.trials, attempt, Phase.TEST, HZ, compute_level_n(RULE, state), shown, state.trials
             )
             reply = observer.reply(felt, seed)
             if not reply.ask_again or asked >= most:

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
-from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
+from protocols.procedure.staircase import begin_staircase, compute_level_n, is_finished, step, to_newton
 
 TRUE_DB = -10.0
 TARGET = 0.5 ** (1 / 3)
@@ -30,7 +30,7 @@ def thresholds_db(rule: StaircaseRule, slope: float, lapse: float, runs: int, se
     for _ in range(runs):
         state = begin_staircase(rule)
         while not is_finished(rule, state):
-            p = 0.5 + (0.5 - lapse) * -math.expm1(-((level_n(rule, state) / alpha_n) ** slope))
+            p = 0.5 + (0.5 - lapse) * -math.expm1(-((compute_level_n(rule, state) / alpha_n) ** slope))
             state = step(rule, state, bool(rng.random() < p))
         results.append(np.mean(state.reversal_levels_db[-10:]))
     return np.array(results)

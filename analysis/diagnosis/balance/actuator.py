@@ -1,10 +1,9 @@
 """Nonlinear laws of the actuator (dead band, saturation, curvature), found with the force balance inverted.
 
-A law of the command cannot be a column of a regression of the commanded force, because the command would then be on
-both sides and absorb the noise of the motion. In the balance solved for the acceleration, the command is a regressor
-without noise:
+A law of the command cannot be a column of a regression of that command, because it would reproduce the command. In the
+balance solved for the acceleration, the command is a regressor without noise:
 
-    a = g(u) / m - (c v + k x + sum of w phi) / m
+    a = (g(u) - B v - K x - sum of w phi) / M
 
 with the command's rate of change as a further regressor, for a short lag. g(u) is tried in place of u, together with
 the best sums of laws of the motion, and is named where it explains most of their residual. Called by `balances`.
@@ -38,9 +37,9 @@ from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
 from analysis.diagnosis.data.correlated_residuals import bootstrap_gain, draw_bootstrap_blocks
 from analysis.diagnosis.settings import (
-    COMMAND_LAW_LEAVES,
-    COMMAND_RIVAL_LEAVES_MORE,
-    FURTHER_LAW_OF_ALL,
+    COMMAND_LAW_GAIN,
+    COMMAND_RIVAL_MARGIN,
+    FURTHER_LAW_SHARE,
     LARGEST_CLASS,
     SUMS_BESIDE_COMMAND_LAW,
 )
@@ -48,8 +47,8 @@ from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 MOST_PASSES = 8
-"""Largest number of passes of the coordinate search over a law's nonlinear parameters."""
-UNNECESSARY_REASON = "a law of the command reaches as small an error without it"
+"""Largest number of passes of the coordinate search over a law's nonlinear parameters; chosen by hand."""
+UNNECESSARY_REASON = "a law of the command reaches as small an error without it"  # objection to a law of the motion
 CURVE_LIKE_LAW = "quadratic_damping"
 """Law of the motion that resembles an actuator's curve when the speed follows the command."""
 HOLDING_LAWS = (*SLIDING, "presliding_hysteresis")
@@ -57,18 +56,17 @@ HOLDING_LAWS = (*SLIDING, "presliding_hysteresis")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Actuator:
-    """The law of the command that fits best, and its test on held-out data."""
+class ActuatorFit:
+    """The law of the command that fits best, with its test on held-out data and comparisons with laws of the motion."""
 
     law: CommandLaw
     judged_law: JudgedLaw
     needs_no_motion_law: bool
-    """Whether its error is as small without laws of the motion."""
+    """Whether there are laws of the motion, and its error is about as small without them."""
     replaces_motion_laws: bool = False
-    """Whether its error alone is smaller than that of the named laws of the motion."""
+    """Whether its error alone is smaller than that of the laws of the motion named before."""
     suffices: bool = False
-    """Whether its error alone is no larger than that of the best sum of laws of the motion with the unchanged
-    command."""
+    """Whether its error alone is at most that of the best laws of the motion with the unchanged command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +82,11 @@ class DrivenAxis:
 def find_balance(
     motions: Sequence[Motion], driven: DrivenAxis, excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> Balance:
-    """The balance of one axis: laws of the motion and, where it is significant, a law of the command, through which the
-    commanded force is then passed before the laws of the motion are searched again."""
+    """Find the balance of one axis: laws of the motion and, where it is significant, a law of the command, through
+    which the commanded force is then passed before the laws of the motion are searched again."""
     axis, rotational = driven.number, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
-    actuator = find_actuator(balance, driven, excluded, map_) if balance.tested else None
+    actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
     if actuator is None:
         return balance
     judged_law = actuator.judged_law
@@ -97,9 +95,9 @@ def find_balance(
         passed_motions = [_pass_through_law(motion, axis, driven_channel, actuator.law) for motion in motions]
         second_balance = judge_laws(search_with_linear_part(passed_motions, axis, rotational, excluded, time_left))
         return replace(second_balance, laws=(judged_law, *second_balance.laws), linear=balance.linear)
-    if judged_law.gain_low <= 0 or judged_law.gain < FURTHER_LAW_OF_ALL:
+    if judged_law.gain_low <= 0 or judged_law.gain < FURTHER_LAW_SHARE:
         return balance
-    if judged_law.gain < COMMAND_LAW_LEAVES and not actuator.replaces_motion_laws:
+    if judged_law.gain < COMMAND_LAW_GAIN and not actuator.replaces_motion_laws:
         motion_laws = tuple(_withdraw_if_curved(law, actuator) for law in balance.laws)
         further_laws = tuple(sorted((*balance.further_laws, judged_law), key=lambda item: -item.gain))
         return replace(balance, laws=motion_laws, further_laws=further_laws)
@@ -111,22 +109,24 @@ def find_balance(
     return replace(balance, laws=(judged_law, *laws))
 
 
-def _withdraw_if_curved(law: JudgedLaw, actuator: Actuator) -> JudgedLaw:
+def _withdraw_if_curved(law: JudgedLaw, actuator: ActuatorFit) -> JudgedLaw:
+    """Object to a named law that resembles an actuator's curve, where the law of the command suffices without it."""
     is_unnecessary = law.named and law.law.effect == CURVE_LIKE_LAW and actuator.suffices
     return replace(law, objection=UNNECESSARY_REASON) if is_unnecessary else law
 
 
 def _pass_through_law(motion: Motion, axis: int, driven_channel: int, law: CommandLaw) -> Motion:
+    """Replace the command of an axis by the force that the law gives for it."""
     force = motion.force.copy()
     force[:, [axis]] = law.compute_columns(force[:, axis], motion.position[:, driven_channel])
     return replace(motion, force=force)
 
 
-def find_actuator(
+def find_command_law(
     balance: Balance, driven: DrivenAxis, excluded: frozenset[str], map_: Mapper = map
-) -> Actuator | None:
-    """The law of the command with the smallest error; None where the balance has no time axis, no command varies, no
-    law of the command is allowed, or none can explain enough."""
+) -> ActuatorFit | None:
+    """Find the law of the command with the smallest error; None where the balance has no time axis, no command varies,
+    no law of the command is allowed, or none can explain enough."""
     search, target = balance.search, driven.target
     # A limited rate is tried for servo targets only: for forces, hardening springs and friction resemble it.
     excluded_effects = excluded if target is not None else excluded | {"slew_limit"}
@@ -134,25 +134,25 @@ def find_actuator(
     if not np.isfinite(search.regression.motions[0].band_hz) or not kinds:
         return None
     inverse = InverseBalance(
-        search, map_, any(entry.law.effect in HOLDING_LAWS and entry.gain_low > 0 for entry in balance.laws), target
+        search, map_, any(judged.law.effect in HOLDING_LAWS and judged.gain_low > 0 for judged in balance.laws), target
     )
-    replacement = _replace_motion_laws(inverse, kinds, tuple(entry.law_index for entry in balance.named))
+    replacement = _replace_motion_laws(inverse, kinds, tuple(named_law.law_index for named_law in balance.named))
     if replacement is not None:
         return replacement
     # Laws of the position are left out where the balance is solved for it: they would reproduce it.
     sums = _list_sums(search) if target is None else [()]
-    unchanged_error, motion_laws = min((inverse.sum_errors(IDEAL_ACTUATOR, entry), entry) for entry in sums)
-    laws = _select_promising(inverse, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * unchanged_error, motion_laws)
+    unchanged_error, motion_laws = min((inverse.sum_errors(IDEAL_ACTUATOR, law_sum), law_sum) for law_sum in sums)
+    laws = _select_promising(inverse, kinds, (1 - FURTHER_LAW_SHARE / 2) * unchanged_error, motion_laws)
     if not laws:
         return None
-    best = _refine_best_per_effect(inverse, laws, motion_laws)
-    law = min(best, key=lambda entry: entry[0])[1]
-    error_alone, error_with_laws = (inverse.sum_errors(law, entry) for entry in ((), motion_laws))
-    rivals = [rival_law for _, rival_law in best if rival_law is not law]
+    best_laws = _refine_best_per_effect(inverse, laws, motion_laws)
+    law = min(best_laws, key=lambda candidate: candidate[0])[1]
+    error_alone, error_with_laws = (inverse.sum_errors(law, law_sum) for law_sum in ((), motion_laws))
+    rivals = [rival_law for _, rival_law in best_laws if rival_law is not law]
     law = _scale_to_command(law, search.regression)
     judged_law = _judge_law(inverse, law, rivals, (motion_laws, motion_laws))
-    is_as_small = error_alone <= error_with_laws / (1 - COMMAND_RIVAL_LEAVES_MORE)
-    return Actuator(
+    is_as_small = error_alone <= error_with_laws / (1 - COMMAND_RIVAL_MARGIN)
+    return ActuatorFit(
         law, judged_law, bool(motion_laws) and is_as_small, suffices=is_as_small and error_alone <= unchanged_error
     )
 
@@ -162,8 +162,7 @@ LawKinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
 
 
 def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozenset[str]) -> LawKinds:
-    """Kinds of laws to try. Those of coils need the measured position of a translation. Empty where the command is
-    zero."""
+    """List the kinds of laws to try; of coils only with a measured translation; none where the command is zero."""
     motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
@@ -183,8 +182,8 @@ def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozense
 def _select_promising(
     inverse: InverseBalance, kinds: LawKinds, limit: float, motion_laws: tuple[int, ...]
 ) -> list[CommandLaw]:
-    """Laws of those kinds whose approximating sum has an error of at most `limit` on the samples that it is fitted to:
-    the laws of other kinds need not be tried one by one."""
+    """Select the laws of those kinds whose approximating sum has an error of at most `limit` on the samples that it is
+    fitted to: the laws of other kinds need not be tried one by one."""
     return [
         law
         for approx, laws in kinds
@@ -193,35 +192,36 @@ def _select_promising(
     ]
 
 
-def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: tuple[int, ...]) -> Actuator | None:
-    """Whether a law of the command alone explains most of the residual of the named laws of the motion, or has a
-    smaller error than several of them: they had compensated for it, as a drag does for an actuator whose gain falls."""
+def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: tuple[int, ...]) -> ActuatorFit | None:
+    """Find a law of the command that alone explains most of the residual of the named law of the motion, or has a
+    smaller error than several, which had compensated for it, as a drag does for a falling gain; else None."""
     if not named_laws:
         return None
     # Half of the gain required below, because the sums only approximate the laws.
-    error_share = 1 - COMMAND_LAW_LEAVES / 2 if len(named_laws) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    error_share = 1 - COMMAND_LAW_GAIN / 2 if len(named_laws) == 1 else 1 / (1 - COMMAND_RIVAL_MARGIN)
     largest_error = error_share * inverse.sum_errors(IDEAL_ACTUATOR, named_laws)
     laws = _select_promising(inverse, kinds, largest_error, ())
     if not laws:
         return None
-    best = _refine_best_per_effect(inverse, laws, ())
-    law = min(best, key=lambda candidate: candidate[0])[1]
-    rivals = [rival_law for _, rival_law in best if rival_law is not law]
+    best_laws = _refine_best_per_effect(inverse, laws, ())
+    law = min(best_laws, key=lambda candidate: candidate[0])[1]
+    rivals = [rival_law for _, rival_law in best_laws if rival_law is not law]
     law = _scale_to_command(law, inverse.search.regression)
     judged_law = _judge_law(inverse, law, rivals, (named_laws, ()))
-    explains_more = judged_law.gain >= COMMAND_LAW_LEAVES or len(named_laws) > 1
-    return Actuator(law, judged_law, True, True) if explains_more and judged_law.gain_low > 0 else None
+    explains_more = judged_law.gain >= COMMAND_LAW_GAIN or len(named_laws) > 1
+    return ActuatorFit(law, judged_law, True, True) if explains_more and judged_law.gain_low > 0 else None
 
 
 def _scale_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
+    """Scale the force of a law with a formula to the command (`CommandLaw.scale_to`), on the samples to fit."""
     motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     return law.scale_to(command, np.concatenate([motion.position[motion.fit, driven_channel] for motion in motions]))
 
 
 def _list_sums(search: StructureSearch) -> list[tuple[int, ...]]:
-    """The best sums of laws of the motion, first none. Laws that are linear in the motion are left out: as filters of
-    the acceleration they would reproduce it."""
+    """List the best sums of laws of the motion, first none. Laws that are linear in the motion are left out: as filters
+    of the acceleration they would reproduce it."""
     laws = search.regression.laws
     sums = [s.laws for s in search.ranked if s.laws and not any(laws[k].linear for k in s.laws)]
     return [(), *sums[:SUMS_BESIDE_COMMAND_LAW]]
@@ -230,6 +230,7 @@ def _list_sums(search: StructureSearch) -> list[tuple[int, ...]]:
 def _refine_best_per_effect(
     inverse: InverseBalance, laws: Sequence[CommandLaw], motion_laws: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
+    """Refine the best law of each effect: errors and laws. Flexible laws need a clearly smaller error than others."""
     best: dict[str, tuple[float, CommandLaw]] = {}
     for law, error in zip(laws, inverse.sum_errors_per_law(laws, motion_laws), strict=True):
         if law.effect not in best or error < best[law.effect][0]:
@@ -242,15 +243,13 @@ def _refine_best_per_effect(
         (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), results, strict=True)
     ]
     limit = min((error for error, law in refined if not law.flexible), default=np.inf)
-    return [
-        (error, law) for error, law in refined if not law.flexible or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * limit
-    ]
+    return [(error, law) for error, law in refined if not law.flexible or error < (1 - COMMAND_RIVAL_MARGIN) * limit]
 
 
 def _refine_values(
     inverse: InverseBalance, motion_laws: tuple[int, ...], start: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
-    """Error and parameters of a law after a coordinate search over its parameters."""
+    """Search the values of a law along coordinates until a pass lowers its error by less than 0.1 %."""
     error, law = start
     for _ in range(MOST_PASSES):
         neighbours = [(inverse.sum_errors(neighbour, motion_laws), neighbour) for neighbour in vary_parameters(law)]
@@ -266,34 +265,35 @@ def _judge_law(
     rivals: Sequence[CommandLaw],
     sums: tuple[tuple[int, ...], tuple[int, ...]],
 ) -> JudgedLaw:
-    """The law with its gain and rivals. sums: laws of the motion fitted without and with the law of the command."""
+    """Test the law against its rivals, on held-out blocks or by cross-validation. sums: laws of the motion fitted
+    without and with the law of the command."""
     laws_without, laws_with = sums
     reduced, full = inverse.evaluate_law(IDEAL_ACTUATOR, laws_without, True), inverse.evaluate_law(law, laws_with, True)
-    linear = float(inverse.evaluate_law(IDEAL_ACTUATOR, (), True).sum())
+    linear_error = float(inverse.evaluate_law(IDEAL_ACTUATOR, (), True).sum())
     draws = draw_bootstrap_blocks(len(full))
     rival_errors = [(inverse.evaluate_law(rival, laws_with, True), rival.effect) for rival in rivals]
-    largest_error = float(full.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    largest_error = float(full.sum()) / (1 - COMMAND_RIVAL_MARGIN)
     equivalents = tuple(effect for errors, effect in rival_errors if float(errors.sum()) <= largest_error)
-    is_first = [errors[draws].sum(axis=1) >= full[draws].sum(axis=1) for errors, _ in rival_errors]
-    gain, low = bootstrap_gain(reduced, full)
+    is_best = [errors[draws].sum(axis=1) >= full[draws].sum(axis=1) for errors, _ in rival_errors]
+    gain, gain_low = bootstrap_gain(reduced, full)
     placeholder_law = Law(law.effect, inverse.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
     return JudgedLaw(
-        NO_COLUMN, placeholder_law, dict(law.values), gain, low,
-        float((reduced - full).sum()) / max(linear, 1e-300), equivalents,
-        float(np.mean(np.all(is_first, axis=0))) if is_first else 1.0, _find_objection(law, gain, low, equivalents),
+        NO_COLUMN, placeholder_law, dict(law.values), gain, gain_low,
+        float((reduced - full).sum()) / max(linear_error, 1e-300), equivalents,
+        float(np.mean(np.all(is_best, axis=0))) if is_best else 1.0, _find_objection(law, gain, gain_low, equivalents),
         formula=law.as_formula(),
     )  # fmt: skip
 
 
-def _find_objection(law: CommandLaw, gain: float, low: float, equivalents: tuple[str, ...]) -> str:
-    """Reason not to name the law, as a sentence; empty where it is to be named."""
-    if gain < COMMAND_LAW_LEAVES or low <= 0:
+def _find_objection(law: CommandLaw, gain: float, gain_low: float, equivalents: tuple[str, ...]) -> str:
+    """Find the reason not to name the law, as a clause; empty where it is to be named."""
+    if gain < COMMAND_LAW_GAIN or gain_low <= 0:
         return (
             f"in place of the command it explains {100 * max(gain, 0.0):.0f} % of the error that laws of the motion "
             "leave, and not most of it"
         )
     # A curve of the command and a force that changes with the distance are different physics.
-    different = [effect for effect in equivalents if effect not in EFFECTS_BY_NAME or law.position_factor is not None]
-    if different or len(equivalents) >= LARGEST_CLASS:
+    unlike = [effect for effect in equivalents if effect not in EFFECTS_BY_NAME or law.position_factor is not None]
+    if unlike or len(equivalents) >= LARGEST_CLASS:
         return f"these data cannot distinguish it from {', '.join(equivalents)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "hapteq cannot simulate it yet"

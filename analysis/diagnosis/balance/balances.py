@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.linear_part import find_driven_channels, search_
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, SECOND_BAND_NARROWER, STILL_SHARE
+from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, SECOND_BAND_SHARE, STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
@@ -27,10 +27,11 @@ from equalizer.signals.recording import Recording
 def find_balances(
     recordings: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
-    """One force balance per command; empty where no motion was measured, or too little of it. excluded: names of
-    effects that are left out, of the catalogue or of `FREE_LAWS`. Where no law is named in the band that noise allows,
-    the narrower band in which the device moves is tried, because power of the command above that band hides laws; then
-    the samples in motion alone. Laws outside the catalogue are compared with the result."""
+    """Find the force balance of each command; empty where no motion was measured, or too little of it. recordings: at
+    least one, with the same channels. excluded: names of effects that are left out, of the catalogue or of `FREE_LAWS`.
+    Where no law is named in the band that noise allows, the narrower band in which the device moves is tried, because
+    power of the command above that band hides laws; then the samples in motion alone. Laws outside the catalogue are
+    compared with the result."""
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = compute_motions(records)
@@ -42,10 +43,10 @@ def find_balances(
             break
         balances = balance_selected_motions(select, records, motions, excluded, time_left, map_) or balances
     is_imposed = any(recording.meta.get("imposed") for recording in recordings)
-    compared = [compare_with_free_laws(balance, excluded) if time_left() else balance for balance in balances]
+    compared_balances = [compare_with_free_laws(balance, excluded) if time_left() else balance for balance in balances]
     return tuple(
-        balance if balance is given or is_imposed else withdraw_ambiguous_names(balance)
-        for balance, given in zip(compared, balances, strict=True)
+        balance if balance is catalogue_balance or is_imposed else withdraw_ambiguous_names(balance)
+        for balance, catalogue_balance in zip(compared_balances, balances, strict=True)
     )
 
 
@@ -61,7 +62,7 @@ def balance_selected_motions(
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
-    """The balances of the motions that `select` returns; empty where these name no law, or cannot be fitted."""
+    """Compute the balances of the motions that `select` returns; empty where these name no law, or cannot be fitted."""
     try:
         selected = select(records, motions)
         recordings = [record.recording for record in records]
@@ -72,15 +73,17 @@ def balance_selected_motions(
 
 
 def restrict_to_motion_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """The motions filtered to the band of the driven motions; empty where that band is hardly narrower. A further
-    measured motion, such as the deflection of a beam, may be mere noise at high frequencies. Raises NoMotionError."""
+    """Filter the motions to the band of the driven motions; empty where that band is hardly narrower. A further
+    measured motion, such as the deflection of a beam, may be mere noise at high frequencies. Raises NoMotionError where
+    a record contains no motion."""
     narrow_hz = compute_motion_band_hz(motions, find_driven_channels(motions))
-    return compute_motions(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
+    return compute_motions(records, narrow_hz) if narrow_hz < SECOND_BAND_SHARE * motions[0].band_hz else ()
 
 
 def select_samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """The motions with masks of the samples in which the device moves; empty where it moves most of the time. At rest,
-    friction balances any applied force: no law predicts that force, and linear terms would be fitted to it."""
+    """Restrict the masks of the motions to the samples in which the device moves; empty where it moves most of the
+    time. At rest, friction balances any applied force: no law predicts that force, and linear terms would be fitted to
+    it."""
     moving_masks = [_find_moving_samples(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving_masks)) > MOVES_MOST_OF_THE_TIME:
         return ()
@@ -91,9 +94,12 @@ def select_samples_in_motion(records: Sequence[Observed], motions: Sequence[Moti
 
 
 def _find_moving_samples(motion: Motion, motions: Sequence[Motion]) -> Mask:
-    """(n,): whether the squared velocity of any channel exceeds `STILL_SHARE` of its mean square over all motions."""
-    squares = np.concatenate([fitted_motion.velocity[fitted_motion.fit] ** 2 for fitted_motion in motions]).mean(axis=0)
-    return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))
+    """Find (n,): whether the squared velocity of any channel exceeds `STILL_SHARE` of its mean square over all
+    motions."""
+    mean_square_velocity = np.concatenate(
+        [fitted_motion.velocity[fitted_motion.fit] ** 2 for fitted_motion in motions]
+    ).mean(axis=0)
+    return np.asarray((motion.velocity**2 > STILL_SHARE * mean_square_velocity).any(axis=1))
 
 
 def _fit_balances(
@@ -103,6 +109,7 @@ def _fit_balances(
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
+    """Fit the balance of each command. Raises numpy.linalg.LinAlgError where the motion does not determine it."""
     # With an imposed motion, the force is the response of the device, so that no actuator needs to be tested.
     rotational = any(unit.startswith("rad") for unit in recordings[0].response.units)
     rotational |= any(unit.startswith("N m") for unit in recordings[0].command.units)

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from analysis.diagnosis.balance.law import Formula
-from analysis.diagnosis.settings import SLEW_REACHED
+from analysis.diagnosis.settings import SLEW_REACHED_SHARE
 from equalizer.effects.force_nonlinearity import apply_square_law
 from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
@@ -32,14 +32,14 @@ SQUARE_SHARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
 GAP_SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Smallest distances of a magnet from its armature, relative to the travel. Beyond the largest, the force falls by less
-than half over the travel. Against a linear spring, a magnet is stable over a third of its gap only (pull-in), where
-the smallest distance is twice the travel."""
+than half over the travel. Against a linear spring, a magnet is stable over a third of its gap only (pull-in), where the
+smallest distance is twice the travel."""
 REFINING_FACTORS = (0.95, 0.98, 1.02, 1.05)
-"""Factors on a parameter in a coordinate search."""
+"""Factors by which a coordinate search multiplies a parameter, in turn."""
 REFINED_PARAMETERS = ("width", "limit", "square", "gap", "power", "rate")
-"""Parameters on a grid; others are switches or scales."""
+"""Names of the parameters that the search varies; others are switches or scales."""
 SLEW_LIMIT_COUNT = 20
-"""Number of slew limits that are tried, in a geometric series."""
+"""Number of slew limits in a geometric series; the last, which limits nothing, is not tried."""
 NODE_QUANTILES = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Quantiles at which a piecewise linear function has its nodes; at those of the command's magnitude it may also
 jump."""
@@ -67,7 +67,7 @@ class CommandLaw:
     """From values and scale: formula that a simulation uses for the command, where the catalogue has no such effect."""
 
     @property
-    def sloped(self) -> int:
+    def lag_column_count(self) -> int:
         """Number of leading columns whose time derivative is a further regressor (a short lag): the first only."""
         return 1
 
@@ -124,9 +124,9 @@ def make_command_laws(command: FloatArray) -> Iterator[CommandLaw]:
 
 def make_slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
     """Make slew-rate limits: the output follows the command at a limited rate, as of a servo. commands: (n,) each. The
-    rates range from the full stroke within the longest command to its fastest change. A rate is left out where the
-    limited output rarely reaches the command (`SLEW_REACHED`), because the force would then depend on the command's
-    sign only."""
+    rates range from the full stroke within the longest command up to, but without, the fastest change of any command;
+    none where these do not differ. A rate is left out where the limited output rarely reaches the command
+    (`SLEW_REACHED_SHARE`), because the force would then depend on the command's sign only."""
     fastest_rate = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
     slowest_rate = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
     for rate in (
@@ -136,7 +136,7 @@ def make_slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[C
         reaches_command = [
             np.abs(law.columns(command, law.values)[:, 0] - command) < rate / rate_hz for command in commands
         ]
-        if np.mean(np.concatenate(reaches_command)) > SLEW_REACHED:
+        if np.mean(np.concatenate(reaches_command)) > SLEW_REACHED_SHARE:
             yield law
 
 
@@ -218,7 +218,7 @@ class PiecewiseCommandLaw:
 
     columns: Callable[[FloatArray, FloatArray], FloatArray]
     """(n, k) of command and position (n,) each; the command itself first."""
-    sloped: int
+    lag_column_count: int
     """Number of leading columns whose time derivative is a further regressor: a short lag, to first order."""
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
@@ -232,6 +232,7 @@ def make_piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
     nodes = np.unique(np.quantile(np.abs(command), NODE_QUANTILES))
 
     def compute_columns(u: FloatArray, position: FloatArray) -> FloatArray:
+        """Compute (n, 2 + 4 nodes): command, positive part, hinges and jumps. position: not used."""
         one_sided_commands = (np.maximum(u, 0.0), np.maximum(-u, 0.0))
         hinges = [np.maximum(one_sided - node, 0.0) for one_sided in one_sided_commands for node in nodes]
         jumps = [np.where(one_sided > node, 1.0, 0.0) for one_sided in one_sided_commands for node in nodes]
@@ -246,6 +247,7 @@ def make_piecewise_attraction(position: FloatArray) -> PiecewiseCommandLaw:
     nodes = np.unique(np.quantile(position, NODE_QUANTILES))
 
     def compute_columns(u: FloatArray, x: FloatArray) -> FloatArray:
+        """Compute (n, 4 + 2 nodes): command, then its square, each times the gains."""
         gains = [np.ones_like(x), x - nodes[0], *(np.maximum(x - node, 0.0) for node in nodes)]
         return np.stack([force * gain for force in (u, u**2) for gain in gains], axis=1)
 

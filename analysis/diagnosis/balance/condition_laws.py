@@ -84,10 +84,12 @@ def _format_deviation(condition: Condition) -> str:
     """Format a condition's deviation from its mean, in standard deviations, as a formula. Its numbers are integers,
     because integers in a formula are constants that are not fitted. The standard deviation, above 0, is rounded to
     about four digits, fewer where the mean would exceed 15 digits, and the mean to the same decimal place."""
-    factor = 10 ** max(0, min(3 - math.floor(math.log10(condition.spread)), 15 - _count_integer_digits(condition.mean)))
-    mean, spread = round(condition.mean * factor), max(round(condition.spread * factor), 1)
+    factor = 10 ** max(
+        0, min(3 - math.floor(math.log10(condition.standard_deviation)), 15 - _count_integer_digits(condition.mean))
+    )
+    mean, deviation = round(condition.mean * factor), max(round(condition.standard_deviation * factor), 1)
     scaled = condition.name if factor == 1 else f"{factor}*{condition.name}"
-    return f"(({scaled} {'-' if mean >= 0 else '+'} {abs(mean)})/{spread})"
+    return f"(({scaled} {'-' if mean >= 0 else '+'} {abs(mean)})/{deviation})"
 
 
 def _count_integer_digits(value: float) -> int:

@@ -1,19 +1,21 @@
 """Laws without a name in the catalogue as terms of the force balance: powers, saturation, products and attraction.
 
-`compare_free_laws` compares them with the sum of catalogue laws that was chosen before. With position q and velocity
-v of the driven axis, weight w, and nonlinear parameters p (exponent), s (scale) and c (position), the force that
-resists the motion is
+`compare_free_laws` compares them with the sum of catalogue laws that was chosen before. With position q and velocity v
+of the driven axis, weight w, and nonlinear parameters p (exponent), s (scale) and a (position), the force that resists
+the motion is
 
     power_of_speed           w sgn(v) |v|^p         power_of_position        w sgn(q) |q|^p
     even_power_of_speed      w |v|^p                even_power_of_position   w |q|^p
     saturating_damping       w tanh(v / s)          exponential_spring       w exp(q / s)
-    damping_beyond_speed     w sgn(v) max(|v| - s, 0)   contact_beyond_position  w max(q - c, 0) or w max(c - q, 0)
+    damping_beyond_speed     w sgn(v) max(|v| - s, 0)   contact_beyond_position  w max(q - a, 0) or w max(a - q, 0)
     falling_friction         w sgn(v) exp(-(v / s)^2)
     product_of_position_and_speed   w g(q, v), for each g in `PRODUCTS`
-    inverse_distance         w / (q - c)^n, n = 1 or 2, with c outside the travel
+    inverse_distance         w / (q - a)^n, n = 1 or 2, with a outside the travel
 
 Each depends on one axis alone, which is what the formula of a `judged_law` can express. Nonlinear parameters are tried
-on grids over the motion and refined like those of the catalogue's laws (`structures`).
+on grids over the motion and refined like those of the catalogue's laws (`structures`), within bounds chosen so wide
+that they only exclude columns that are zero or linear. In the code, c is the index of the driven channel in the motion
+m, n are the nonlinear parameters and w the weights, as in `law`.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,6 +39,7 @@ FREE_SPEED_LAWS = {"power_of_speed", "even_power_of_speed", "saturating_damping"
                    "falling_friction"}  # fmt: skip
 FREE_POSITION_LAWS = {"power_of_position", "even_power_of_position", "exponential_spring", "inverse_distance",
                       "contact_beyond_position"}  # fmt: skip
+"""Laws of the speed alone, and of the position alone: each group is a family of similar laws (`judged_law`)."""
 FREE_LAWS = frozenset({*FREE_SPEED_LAWS, *FREE_POSITION_LAWS, "product_of_position_and_speed"})
 """Names of all laws of this file; a diagnosis reports their formulas as `discovered_law`."""
 POWERS, POWER_BOUNDS = (0.3, 0.6, 1.5, 2.0, 3.0, 4.5), ((0.05, 6.0),)
@@ -48,7 +51,7 @@ TRAVEL_SHARES = (0.1, 0.3, 1.0)
 LARGEST_EXPONENT = 30.0
 """Largest |q / s| of an exponential: beyond it, the column is one spike at the end of the travel."""
 STOP_SHARES = (0.05, 0.15, 0.3, 0.5)
-"""Tried begins of a contact: distances from either end of the travel, relative to the travel."""
+"""Tried onsets of a contact: distances from either end of the travel, relative to the travel."""
 PRODUCTS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
     "q*v": lambda q, v, _: q * v,
     "abs(q)*v": lambda q, v, _: np.abs(q) * v,
@@ -119,9 +122,9 @@ def _make_position_laws(c: int, scales: Scales) -> Iterator[Law]:
             "even_power_of_position", c, (power,), lambda m, n: np.abs(m.position[:, [c]]) ** n[0], _read_weight,
             bounds=POWER_BOUNDS, formula=_make_formula("-p0*abs(q)**p1"),
         )  # fmt: skip
-    largest = max(abs(scales.low), abs(scales.high))
+    largest_position = max(abs(scales.low), abs(scales.high))
     for scale in (sign * share * scales.travel for share in TRAVEL_SHARES for sign in (1.0, -1.0)):
-        if largest < LARGEST_EXPONENT * abs(scale):
+        if largest_position < LARGEST_EXPONENT * abs(scale):
             yield Law(
                 "exponential_spring", c, (scale,), lambda m, n: np.exp(m.position[:, [c]] / n[0]), _read_weight,
                 bounds=((min(0.3 * scale, 3 * scale), max(0.3 * scale, 3 * scale)),),

@@ -1,8 +1,8 @@
 """Force balance solved for the acceleration, in which nonlinear laws of the actuator are fitted and compared.
 
-The force balance M a + D v + K x + (laws of the motion) = f(u) is a regression of the command u on the motion. A
+The force balance M a + B v + K x + (laws of the motion) = f(u) is a regression of the command u on the motion. A
 nonlinear actuator f(u) cannot be a regressor there, because u is the predicted quantity. Therefore the balance is
-solved for the acceleration, a = (f(u) - D v - K x - ...) / M: functions of the command then are regressors. Used by
+solved for the acceleration, a = (f(u) - B v - K x - ...) / M: functions of the command then are regressors. Called by
 `actuator`.
 """
 
@@ -31,11 +31,11 @@ from analysis.diagnosis.types import Mapper, Mask
 from equalizer.signals.signal import FloatArray
 
 
-class ForceOfCommand(Protocol):
+class CommandForce(Protocol):
     """A law of the command, or a sum of functions that approximates all laws of a kind."""
 
     @property
-    def sloped(self) -> int:
+    def lag_column_count(self) -> int:
         """Number of leading columns whose time derivative is a further regressor: a short lag, to first order."""
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
@@ -60,8 +60,8 @@ class InverseBalance:
 
     @property
     def solved_column(self) -> int:
-        """Column of the regression that the balance is solved for: the acceleration, or the quantity of a servo's
-        command."""
+        """Column of the regression that the balance is solved for: the acceleration of the driven channel, or the
+        quantity of a servo's command where the regression has its column."""
         regression = self.search.regression
         driven_channel, channel_count = regression.base_terms.driven_channel, len(regression.motions[0].channels)
         column = (
@@ -69,7 +69,7 @@ class InverseBalance:
             if self.commanded_order is None
             else (2 - self.commanded_order) * channel_count + driven_channel
         )
-        return column if column < regression.matrices else driven_channel
+        return column if column < regression.matrix_column_count else driven_channel
 
     def sum_errors_per_law(self, laws: Sequence[CommandLaw], motion_laws: Sequence[int]) -> list[float]:
         """Sum the cross-validated squared errors of each law. motion_laws: indices of laws of the motion fitted with
@@ -81,14 +81,14 @@ class InverseBalance:
         it."""
         return float(self.evaluate_law(law, motion_laws, False).sum())
 
-    def fit_lower_bound(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> float:
+    def fit_lower_bound(self, law: CommandForce, motion_laws: Sequence[int]) -> float:
         """Compute the sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
-        fit, _ = self._build_blocks(self._build_rows(law, motion_laws), False)
-        products = [select_products(block, range(len(fit[0].cross))) for block in fit]
-        weights = solve_normal_equations(sum_products(fit, range(len(fit[0].cross))), RIDGE)
+        fit_blocks, _ = self._build_blocks(self._build_regressors(law, motion_laws), False)
+        products = [select_products(block, range(len(fit_blocks[0].cross))) for block in fit_blocks]
+        weights = solve_normal_equations(sum_products(fit_blocks, range(len(fit_blocks[0].cross))), RIDGE)
         return sum(
             compute_squared_error(block_sums, weights, block.power)
-            for block_sums, block in zip(products, fit, strict=True)
+            for block_sums, block in zip(products, fit_blocks, strict=True)
         )
 
     def evaluate_law(self, law: CommandLaw, motion_laws: Sequence[int], on_held_out: bool) -> FloatArray:
@@ -96,31 +96,31 @@ class InverseBalance:
         on_held_out: on the held-out blocks if they are a valid test (`select_test_blocks`); else on each block to fit,
         with weights fitted to the others (cross-validation)."""
         uses_held_out = on_held_out and select_test_blocks(self.search.regression) is self.search.regression.test
-        fit, test = self._build_blocks(self._build_rows(law, motion_laws), uses_held_out)
-        columns = list(range(len(fit[0].cross)))
-        total = sum_products(fit, columns)
+        fit_blocks, test_blocks = self._build_blocks(self._build_regressors(law, motion_laws), uses_held_out)
+        columns = list(range(len(fit_blocks[0].cross)))
+        total_products = sum_products(fit_blocks, columns)
         if uses_held_out:
-            weights = solve_normal_equations(total, RIDGE)
+            weights = solve_normal_equations(total_products, RIDGE)
             return np.array(
-                [compute_squared_error(select_products(block, columns), weights, block.power) for block in test]
+                [compute_squared_error(select_products(block, columns), weights, block.power) for block in test_blocks]
             )
-        squares = []
-        for block in fit:
+        block_errors = []
+        for block in fit_blocks:
             products = select_products(block, columns)
-            squares.append(
+            block_errors.append(
                 compute_squared_error(
                     products,
-                    solve_normal_equations((total[0] - products[0], total[1] - products[1]), RIDGE),
+                    solve_normal_equations((total_products[0] - products[0], total_products[1] - products[1]), RIDGE),
                     block.power,
                 )
             )
-        return np.array(squares)
+        return np.array(block_errors)
 
     def _build_blocks(
         self, regressors: Sequence[FloatArray], uses_held_out: bool
     ) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        """Build blocks of samples to fit and, if `uses_held_out`, of held-out samples. regressors: (n, k) per
-        motion."""
+        """Build the blocks of samples to fit and those of held-out samples, which are none unless `uses_held_out`.
+        regressors: (n, k) per motion."""
         regression = self.search.regression
         motions, solved_column = regression.motions, self.solved_column
         predicted = [columns[:, solved_column] for columns in regression.columns]
@@ -133,13 +133,14 @@ class InverseBalance:
             for masks in ([m.fit for m in motions], [m.test for m in motions])
         )
         mean = float(np.concatenate([target[mask] for target, mask in zip(predicted, fit_masks, strict=True)]).mean())
-        units = compute_scale(regressors, fit_masks), mean
-        return build_blocks(regressors, predicted, fit_masks, units), build_blocks(
-            regressors, predicted, test_masks, units
+        scale_and_mean = compute_scale(regressors, fit_masks), mean
+        return build_blocks(regressors, predicted, fit_masks, scale_and_mean), build_blocks(
+            regressors, predicted, test_masks, scale_and_mean
         ) if uses_held_out else ()
 
     def _find_moving_samples(self) -> list[Mask]:
-        """Find the samples at which the axis moves: masks (n,) per motion; all samples without friction."""
+        """Find the samples whose squared speed exceeds `STILL_SHARE` of its mean: masks (n,) per motion; all samples
+        without friction."""
         regression = self.search.regression
         speeds = [motion.velocity[:, regression.base_terms.driven_channel] for motion in regression.motions]
         fit_velocity = np.concatenate(
@@ -148,12 +149,15 @@ class InverseBalance:
         least_squared_speed = STILL_SHARE * float(np.mean(fit_velocity**2)) if self.has_friction else -1.0
         return [speed**2 > least_squared_speed for speed in speeds]
 
-    def _build_rows(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> list[FloatArray]:
-        """Build the columns (n, columns) of each motion: those of the law, their time derivatives, the other axes'
-        commands, and the laws of the motion."""
+    def _build_regressors(self, law: CommandForce, motion_laws: Sequence[int]) -> list[FloatArray]:
+        """Build the regressors (n, columns) of each motion: the columns of the law, their time derivatives, the other
+        axes' commands, and the laws of the motion."""
         regression, regressors = self.search.regression, []
         # Columns of the base that are filtered copies of the predicted quantity would reproduce it.
-        excluded_columns = {self.solved_column, *range(regression.matrices, regression.base - 1)}
+        excluded_columns = {
+            self.solved_column,
+            *range(regression.matrix_column_count, regression.base_column_count - 1),
+        }
         law_columns = [column for column in regression.select_columns(motion_laws) if column not in excluded_columns]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
             force = law.compute_columns(
@@ -161,7 +165,7 @@ class InverseBalance:
             )
             other_commands = np.delete(motion.force, regression.axis, axis=1)
             command_columns = np.hstack(
-                [force, np.gradient(force[:, : law.sloped], 1 / motion.rate_hz, axis=0), other_commands]
+                [force, np.gradient(force[:, : law.lag_column_count], 1 / motion.rate_hz, axis=0), other_commands]
             )
             regressors.append(np.hstack([motion.decimate(command_columns), columns[:, law_columns]]))
         return regressors

@@ -1,8 +1,9 @@
 """Test the laws of a force balance on held-out data. Called by `balances`, `actuator` and `confirm.balance_with_model`.
 
-No model of a real device reaches the sensor noise. A law is named by the relative decrease of the held-out squared
-error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat. 17:1217, 1989), by its share of the
-decrease by all laws together, which leave the error `ceiling`, and unless other effects fit equally well (its class).
+No model of a real device reaches the sensor noise, so that a test against the noise rejects all. A law is named by the
+relative decrease of the held-out squared error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat.
+17:1217, 1989), by its share of the decrease by all laws together, which leave the error `ceiling`, and unless other
+effects fit equally well (its class).
 """
 
 from collections.abc import Sequence
@@ -34,21 +35,24 @@ from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     FREE_LAW_GAIN,
     FURTHER_LAW_GAIN,
-    FURTHER_LAW_OF_ALL,
+    FURTHER_LAW_SHARE,
     LARGEST_CLASS,
     LARGEST_LAW_FORCE,
-    LAW_OF_CEILING,
-    LAW_OF_SIGNAL,
-    NAMED_OF_CEILING,
-    RIVAL_STAYS_BEHIND,
-    SECOND_OF_FAMILY,
+    LAW_CEILING_SHARE,
+    LAW_FORCE_SHARE,
+    NAMED_CEILING_SHARE,
+    RIVAL_MARGIN,
+    SECOND_OF_FAMILY_SHARE,
 )
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-SIMILAR = "it acts like a named law, and may only correct the shape of that law"
-WEAK_GAINS = ("its gain is too small to be named", "its gain varies too much from stretch to stretch of the recording")
-"""Objections: to a second law of a family; to a further law whose gain is not above, or above `FURTHER_LAW_GAIN`."""
+SHAPE_OBJECTION = "it acts like a named law, and may only correct the shape of that law"
+WEAK_GAIN_OBJECTIONS = (
+    "its gain is too small to be named",
+    "its gain varies too much from stretch to stretch of the recording",
+)
+"""Objections: to a second law of a family; to a further law with a gain of at most, and above, `FURTHER_LAW_GAIN`."""
 CONDITION_LAWS = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws that depend on a recorded condition. They may form a class, although they belong to different families."""
 
@@ -83,7 +87,7 @@ class Balance:
         return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.linear))
 
     def withdraw_names(self, reason: str) -> "Balance":
-        """Copy the balance without named laws. reason: objection, as a clause, to each law that has none."""
+        """Copy the balance with no law named. reason: objection, as a clause, to each law that has none yet."""
         return replace(self, laws=tuple(replace(law, objection=law.objection or reason) for law in self.laws))
 
     def compute_error(self, law_indices: Sequence[int]) -> float:
@@ -101,22 +105,22 @@ def judge_laws(search: StructureSearch) -> Balance:
     balance = judge_structure(search, choose_simplest_structure(search))
     if balance.named or not _has_two_frictions(regression, balance.chosen.laws):
         return balance
-    # Either of two frictions could explain the same error, so that neither seems necessary: try with one of them.
-    one_friction = tuple(structure for structure in search.ranked if not _has_two_frictions(regression, structure.laws))
-    best = min(one_friction, key=lambda structure: structure.error, default=search.linear)
-    simpler = judge_structure(search, choose_simplest_structure(replace(search, ranked=one_friction, best=best)))
-    return simpler if simpler.named else balance
+    # Either of two frictions could explain the same error, so that neither seems necessary: try structures with one.
+    candidates = tuple(structure for structure in search.ranked if not _has_two_frictions(regression, structure.laws))
+    best = min(candidates, key=lambda structure: structure.error, default=search.linear)
+    simpler_balance = judge_structure(search, choose_simplest_structure(replace(search, ranked=candidates, best=best)))
+    return simpler_balance if simpler_balance.named else balance
 
 
 def _has_two_frictions(regression: Regression, law_indices: Sequence[int]) -> bool:
     """Whether laws (indices in the regression) contain two different frictions of the same channel."""
-    keys = [regression.laws[law_index].key for law_index in law_indices]
-    channels = [channel for effect, channel in set(keys) if effect in find_family("coulomb_friction")]
+    law_keys = [regression.laws[law_index].key for law_index in law_indices]
+    channels = [channel for effect, channel in set(law_keys) if effect in find_family("coulomb_friction")]
     return len(channels) > len(set(channels))
 
 
 def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
-    """Test each law of `chosen`, and further laws; the decrease is at least 1e-6 of the linear error (a divisor)."""
+    """Test each law of `chosen`, and further laws. The divisor of shares is at least 1e-6 of the linear error."""
     regression = search.regression
     errors, linear_errors = _compute_errors(regression, chosen.laws), _compute_errors(regression, ())
     ceiling = _compute_ceiling(regression, errors)
@@ -130,13 +134,17 @@ def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
-    """Object to each further named law of a family whose gain is below `SECOND_OF_FAMILY`: it may only correct the
-    shape of the first. laws: the largest gain first."""
-    checked: list[JudgedLaw] = []
+    """Object to each further named law of a family whose gain is below `SECOND_OF_FAMILY_SHARE`: it may only correct
+    the shape of the first. laws: the largest gain first."""
+    results: list[JudgedLaw] = []
     for law in laws:
-        family = [prior for prior in checked if prior.named and find_family(prior.law.effect) & {law.law.effect}]
-        checked.append(replace(law, objection=SIMILAR) if law.named and family and law.gain < SECOND_OF_FAMILY else law)
-    return tuple(checked)
+        similar = [judged for judged in results if judged.named and find_family(judged.law.effect) & {law.law.effect}]
+        results.append(
+            replace(law, objection=SHAPE_OBJECTION)
+            if law.named and similar and law.gain < SECOND_OF_FAMILY_SHARE
+            else law
+        )
+    return tuple(results)
 
 
 def _sum_power(regression: Regression) -> float:
@@ -146,14 +154,14 @@ def _sum_power(regression: Regression) -> float:
 
 def _compute_errors(regression: Regression, law_indices: Sequence[int]) -> FloatArray:
     """Compute the sum of squared force errors with laws (indices in the regression) on each test block, (blocks,)."""
-    columns, tested = regression.select_columns(law_indices), select_test_blocks(regression)
-    return regression.compute_test_errors(columns) if tested is regression.test else regression.cross_validate(columns)
+    columns, blocks = regression.select_columns(law_indices), select_test_blocks(regression)
+    return regression.compute_test_errors(columns) if blocks is regression.test else regression.cross_validate(columns)
 
 
 def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float:
     """Compute the sum of squared errors with all laws together, but at most that of the chosen structure."""
-    cross_validated, blocks = fit_all_laws(regression, range(regression.columns[0].shape[1]))
-    error = float(blocks.sum()) if select_test_blocks(regression) is regression.test else cross_validated
+    cross_validated, test_errors = fit_all_laws(regression, range(regression.columns[0].shape[1]))
+    error = float(test_errors.sum()) if select_test_blocks(regression) is regression.test else cross_validated
     return min(error, float(chosen_errors.sum()))
 
 
@@ -172,7 +180,7 @@ def _judge_law(
     force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_power(regression)))
     weakness = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
     objection = _find_objection(law, values, (gain, gain_low, share, coverage), equivalents) or (
-        weakness if force_share < LAW_OF_SIGNAL else ""
+        weakness if force_share < LAW_FORCE_SHARE else ""
     )
     ratio = compute_force_ratio(regression, laws, law_index)
     if not objection and ratio > LARGEST_LAW_FORCE:
@@ -220,8 +228,8 @@ def _find_equivalents(
         if tested_law.effect not in list_simpler(effect):
             is_best &= increases[draws].sum(axis=1) >= 0
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
-        is_richer = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
-        limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * decrease
+        has_more_parameters = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
+        limit = 0.0 if has_more_parameters and effect not in find_family(tested_law.effect) else RIVAL_MARGIN * decrease
         if tested_law.effect in FREE_LAWS:  # rivals of a strong law leave less than four times as much
             limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
         if float(increases.sum()) <= limit:
@@ -240,11 +248,11 @@ def _find_objection(
         return "its parameters have signs that such physics cannot have"
     if gain_low <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
-    if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:
+    if share < LAW_CEILING_SHARE and gain < FURTHER_LAW_SHARE:
         return f"it explains {100 * share:.1f} % of what all laws together explain"
     if law.effect in FREE_LAWS and gain < FREE_LAW_GAIN:
         return "a law that the catalogue lacks is named only where it halves the error on held-out data"
-    if coverage < NAMED_OF_CEILING:
+    if coverage < NAMED_CEILING_SHARE:
         return (f"even with it, {100 * (1 - coverage):.0f} % of what all laws together explain remain: the main cause "
                 "is another")  # fmt: skip
     family = find_family(law.effect) | (CONDITION_LAWS if law.effect in CONDITION_LAWS else set())
@@ -262,23 +270,25 @@ def _judge_further_laws(
 ) -> tuple[JudgedLaw, ...]:
     """Test the best law of each other effect, the best eight (chosen): those with a significant gain, largest first."""
     chosen_errors, decrease = reference
-    effects = {regression.laws[index].effect for index in chosen.laws}
+    chosen_effects = {regression.laws[index].effect for index in chosen.laws}
     best_by_effect: dict[str, tuple[float, int]] = {}
     for index, law in enumerate(regression.laws):
-        if law.effect in effects or fit_values(regression, (*chosen.laws, index))[-1] is None:
+        if law.effect in chosen_effects or fit_values(regression, (*chosen.laws, index))[-1] is None:
             continue
         error = float(regression.cross_validate(regression.select_columns((*chosen.laws, index))).sum())
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
             best_by_effect[law.effect] = error, index
-    judged = []
+    further_laws = []
     for _, index in sorted(best_by_effect.values())[:8]:
         errors = _compute_errors(regression, laws := (*chosen.laws, index))
-        gain, low = bootstrap_gain(chosen_errors, errors)
+        gain, gain_low = bootstrap_gain(chosen_errors, errors)
         values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
-        reason = ("it explains too little in addition to the named laws" if chosen.laws
-                  else WEAK_GAINS[gain > FURTHER_LAW_GAIN])  # fmt: skip
-        if gain > 0 and low > 0:
+        objection = ("it explains too little in addition to the named laws" if chosen.laws
+                  else WEAK_GAIN_OBJECTIONS[gain > FURTHER_LAW_GAIN])  # fmt: skip
+        if gain > 0 and gain_low > 0:
             law, is_physical = regression.laws[index], compute_force_ratio(regression, laws, index) <= LARGEST_LAW_FORCE
-            tested = JudgedLaw(index, law, values, gain, low, share, (), 0.0, reason, is_physical=is_physical)
-            judged.append(replace(tested, formula=law.make_formula(values)))
-    return tuple(sorted(judged, key=lambda judged_law: -judged_law.gain))
+            further_law = JudgedLaw(
+                index, law, values, gain, gain_low, share, (), 0.0, objection, is_physical=is_physical
+            )
+            further_laws.append(replace(further_law, formula=law.make_formula(values)))
+    return tuple(sorted(further_laws, key=lambda judged_law: -judged_law.gain))

@@ -20,7 +20,7 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 NO_COLUMN = -1
-"""Value of `JudgedLaw.place` for a law of the command: it changes the force itself and has no column."""
+"""Value of `JudgedLaw.law_index` for a law of the command: it changes the force itself and has no column."""
 FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
@@ -34,8 +34,8 @@ FAMILIES = (
     FREE_SPEED_LAWS,
     FREE_POSITION_LAWS,
 )  # fmt: skip
-"""Families of effects with similar forces. A law whose equally good rivals are all of its own family is named, with
-the rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a family of its
+"""Families of effects with similar forces. A law whose equally good rivals are all of its own family is named, with the
+rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a family of its
 own."""
 
 
@@ -61,7 +61,7 @@ class JudgedLaw:
     """Share of bootstrap draws in which no other effect in its place has a smaller error, apart from effects that
     contain it as a special case."""
     objection: str
-    """Reason not to name the law, as a sentence; empty where it is named."""
+    """Reason not to name the law, as a clause; empty where it is named."""
     stands_for: str = ""
     """Effect that was chosen but has no simulation, where `law` replaces it; else empty."""
 
@@ -97,7 +97,7 @@ class JudgedLaw:
 def compute_force_ratio(regression: Regression, laws: Sequence[int], law_index: int) -> float:
     """Compute the standard deviation of a law's force over that of the recorded force, on the samples to fit. laws:
     indices, fitted together. law_index: the law among them."""
-    columns, law_columns = regression.select_columns(laws), regression.places[law_index]
+    columns, law_columns = regression.select_columns(laws), regression.column_ranges[law_index]
     weights = np.zeros(regression.columns[0].shape[1])
     weights[columns] = regression.fit_weights(columns)
     masks = [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
@@ -120,22 +120,28 @@ def find_family(effect: str) -> set[str]:
 
 
 def select_test_blocks(regression: Regression) -> tuple[Block, ...]:
-    """Select the blocks for tests: the held-out ones if enough and moving; else, by cross-validation, the fit blocks if
-    motion is in several or held-out ones are few; else none, as a single movement cannot test a law."""
+    """Select the blocks for tests. Held-out blocks: where there are `LEAST_JUDGED_BLOCKS` of them, with motion. Else
+    the fit blocks, by cross-validation: where the held-out ones are fewer, or the motion is spread over the equivalent
+    of `LEAST_JUDGED_BLOCKS` fit blocks. Else none, because a single movement cannot test a law."""
     if len(regression.test) >= LEAST_JUDGED_BLOCKS and has_held_out_motion(regression):
         return regression.test
-    fit_speeds = _measure_speeds(regression, regression.fit)
-    moves_often = float(fit_speeds.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(fit_speeds @ fit_speeds)
+    fit_squared_speeds = _compute_mean_square_speeds(regression, regression.fit)
+    moves_often = float(fit_squared_speeds.sum()) ** 2 >= LEAST_JUDGED_BLOCKS * float(
+        fit_squared_speeds @ fit_squared_speeds
+    )
     return regression.fit if moves_often or len(regression.test) < LEAST_JUDGED_BLOCKS else ()
 
 
 def has_held_out_motion(regression: Regression) -> bool:
-    """Whether the mean square speed in the held-out blocks, at least one, is `STILL_SHARE` or more of the fitted."""
-    fit_speed, test_speed = (_measure_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
-    return bool(test_speed >= STILL_SHARE * fit_speed)
+    """Whether the mean square speed in the held-out blocks, at least one, is `STILL_SHARE` or more of that in the fit
+    blocks."""
+    fit_squared_speed, test_squared_speed = (
+        _compute_mean_square_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test)
+    )
+    return bool(test_squared_speed >= STILL_SHARE * fit_squared_speed)
 
 
-def _measure_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
+def _compute_mean_square_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
     """Compute the mean square speed of the driven channel in each block, (blocks,), relative to its scale."""
-    speed = len(regression.motions[0].channels) + regression.base_terms.driven_channel
-    return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
+    speed_column = len(regression.motions[0].channels) + regression.base_terms.driven_channel
+    return np.array([block.gram[speed_column, speed_column] / max(len(block.rows), 1) for block in blocks])

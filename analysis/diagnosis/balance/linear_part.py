@@ -162,7 +162,7 @@ def _is_worth_adding(base: Structure, extended: Structure) -> bool:
 
 def is_freely_turning(regression: Regression) -> bool:
     """Whether the base has two columns per motion, mass and damping: a shaft that turns freely has no stiffness."""
-    return regression.matrices == 2 * len(regression.motions[0].channels)
+    return regression.matrix_column_count == 2 * len(regression.motions[0].channels)
 
 
 def _find_delay_s(regression: Regression) -> float:

@@ -19,8 +19,8 @@ from analysis.diagnosis.balance.regression import Regression, build_regression, 
 from equalizer.signals.signal import FloatArray
 
 FIXED_WEIGHT_PRECISION = 1e6
-"""Precision of the prior that fixes the first weight at 1, relative to its precision by the data. Chosen so large
-that the data do not change the weight."""
+"""Precision of the prior that fixes the first weight at 1, relative to its precision by the data. Chosen so large that
+the data do not change the weight."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +39,12 @@ class ModelBase:
 def build_regression_with_model(
     motions: Sequence[Motion], axis: int, laws: Sequence[Law], model_base: ModelBase
 ) -> Regression:
-    """Build a regression as `build_regression`, with the model's required force and its sensitivities as the base.
-    Free parameters that change the force by no more than 1e-9 of its rms (rounding) are left out."""
+    """Build a regression as `build_regression`, with the model's required force and its sensitivities as the base. Free
+    parameters that change the force by no more than 1e-9 of its rms (rounding) are left out."""
     sensitive_columns = _find_sensitive_columns(model_base)
     columns = [motion_columns[:, sensitive_columns] for motion_columns in model_base.columns]
     regression = replace(build_regression(motions, axis, laws, False, None, columns), mass=model_base.mass)
-    base_scales = regression.scale[: regression.base - 1]
+    base_scales = regression.scale[: regression.base_column_count - 1]
     precision, precision_times_mean = np.zeros(len(base_scales)), np.zeros(len(base_scales))
     precision[0] = FIXED_WEIGHT_PRECISION * sum(block.gram[0, 0] for block in regression.fit)
     precision_times_mean[0] = precision[0] * base_scales[0]

@@ -38,7 +38,7 @@ class Condition:
     name: str
     """Name in a formula."""
     mean: float
-    spread: float
+    standard_deviation: float
     """Standard deviation."""
 
 
@@ -60,6 +60,7 @@ class Motion:
     """(n, d): as measured, or integrated: a velocity by summation from the first sample on, an acceleration in the
     frequency domain."""
     velocity: FloatArray
+    """(n, d); without a time axis, the change of the position per sample."""
     acceleration: FloatArray
     force: FloatArray
     """(n, m): as commanded or measured."""
@@ -145,9 +146,9 @@ def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -
 
 
 def compute_motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
-    """Compute the frequency in Hz below which `MOVING_BAND_SHARE` of a channel's mean square velocity lies, the highest
-    over the channels; infinite without a time axis. motions: at least one; columns: indices of the channels, at least
-    one."""
+    """Compute the frequency in Hz below which `MOVING_BAND_SHARE` of the variance of a channel's velocity lies, the
+    highest over the channels; infinite without a time axis. motions: at least one; columns: indices of the channels, at
+    least one."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
     channel_ends_hz = []
@@ -159,11 +160,14 @@ def compute_motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) ->
             motion_frequencies_hz.append(rfftfreq(len(speed), 1 / motion.rate_hz))
         all_power, all_frequencies_hz = np.concatenate(motion_power), np.concatenate(motion_frequencies_hz)
         ascending = np.argsort(all_frequencies_hz)
-        cumulative = np.cumsum(all_power[ascending])
+        cumulative_power = np.cumsum(all_power[ascending])
         channel_ends_hz.append(
             float(
                 all_frequencies_hz[ascending][
-                    min(np.searchsorted(cumulative, MOVING_BAND_SHARE * cumulative[-1]), len(all_frequencies_hz) - 1)
+                    min(
+                        np.searchsorted(cumulative_power, MOVING_BAND_SHARE * cumulative_power[-1]),
+                        len(all_frequencies_hz) - 1,
+                    )
                 ]
             )
         )
@@ -231,7 +235,8 @@ def _differentiate_in_band(
     end_line, slope = _fit_end_line(samples, rate_hz)
 
     def compute_gain(frequency_hz: FloatArray) -> FloatArray:
-        i_omega = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
+        """Compute the frequency response (lines,) of differentiation, band limit and advance."""
+        i_omega = 2j * np.pi * np.maximum(frequency_hz, 1e-12)  # above 0: a negative power of it is finite
         band_gain = _compute_band_gain(frequency_hz, band_hz, lowest_hz if order < 0 else 0.0)
         return np.asarray(band_gain * np.exp(i_omega * advance_s) * i_omega**order)
 
@@ -287,8 +292,8 @@ def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Conditio
         return (), [np.zeros((len(record.command), 0)) for record in records]
     filled_samples = [fill_gaps(signal.samples) for signal in signals if signal is not None]
     stacked = np.vstack(filled_samples)
-    mean, spread = stacked.mean(axis=0), stacked.std(axis=0)
+    mean, deviation = stacked.mean(axis=0), stacked.std(axis=0)
     names = name_conditions(collect_channels(records[0].recording))
-    varying = np.flatnonzero(spread > 0)
-    conditions = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
-    return conditions, [(samples[:, varying] - mean[varying]) / spread[varying] for samples in filled_samples]
+    varying = np.flatnonzero(deviation > 0)
+    conditions = tuple(Condition(names[k], float(mean[k]), float(deviation[k])) for k in varying)
+    return conditions, [(samples[:, varying] - mean[varying]) / deviation[varying] for samples in filled_samples]

@@ -48,16 +48,15 @@ class Regression:
     laws: tuple[Law, ...]
     base_terms: BaseTerms
     """Terms of the base in addition to mass, damping and stiffness."""
-    base: int
-    """Number of columns of the base, which come first: mass, damping, stiffness, further linear laws, and a
-    constant."""
-    matrices: int
+    base_column_count: int
+    """Number of leading columns, the base: mass, damping, stiffness, further linear laws, and a constant."""
+    matrix_column_count: int
     """Number of mass, damping and stiffness columns, or of columns of a given model."""
-    positive: tuple[int, ...]
+    nonnegative_columns: tuple[int, ...]
     """Columns whose weights must not be negative: mass and damping of the driven motion. `_solve_nonnegative` makes one
-    step fewer than there are entries, so that the mass is listed twice; the single entry of a given model means no
-    step, because its prior fixes that weight."""
-    places: tuple[slice, ...]
+    step fewer than there are entries. Therefore the mass is listed twice, and a given model, whose prior fixes that
+    weight, has a single entry."""
+    column_ranges: tuple[slice, ...]
     """Range of columns of each law, by its index in `laws`."""
     scale: FloatArray
     """(k,): rms of each column, by which the columns are divided in the products."""
@@ -75,10 +74,11 @@ class Regression:
     """Mass of a given model in kg (kg m^2); None = it is estimated, as the weight of the driven acceleration."""
 
     def select_columns(self, laws: Sequence[int]) -> list[int]:
-        """Select the indices of the columns of the base and of these laws. A law of the command has a negative index
-        and no columns."""
-        law_columns = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
-        return [*range(self.base), *law_columns]
+        """Select the columns (indices) of the base and of these laws; a law of the command (index < 0) has none."""
+        law_columns = [
+            k for law in laws if law >= 0 for k in range(self.column_ranges[law].start, self.column_ranges[law].stop)
+        ]
+        return [*range(self.base_column_count), *law_columns]
 
     def fit_weights(self, columns: Sequence[int]) -> FloatArray:
         """Fit weights (len(columns),) to all fit blocks, in the columns' own units."""
@@ -107,7 +107,7 @@ class Regression:
         freed again."""
         gram, cross = products = with_prior(products, self.prior)
         weights = solve_normal_equations(products, RIDGE)
-        nonnegative = list(self.positive)
+        nonnegative = list(self.nonnegative_columns)
         is_fixed: Mask = np.zeros_like(weights, dtype=np.bool_)
         for _ in range(len(nonnegative) - 1):
             is_negative = weights[..., nonnegative] < 0
@@ -145,27 +145,27 @@ def build_regression(
     forces = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
     linear = [_make_linear_columns(motion, turns, base_terms.laws) for motion in motions] if bases is None else bases
     column_parts = [[_make_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
-    kept_laws, places, next_column = [], [], column_parts[0][0].shape[1]
-    base_count = next_column
+    kept_laws, column_ranges, next_column = [], [], column_parts[0][0].shape[1]
+    base_column_count = next_column
     for law in laws:
         columns = _make_law_columns(motions, law)
         if columns is not None:
             column_parts.append(columns)
             kept_laws.append(law)
-            places.append(slice(next_column, next_column + columns[0].shape[1]))
-            next_column = places[-1].stop
+            column_ranges.append(slice(next_column, next_column + columns[0].shape[1]))
+            next_column = column_ranges[-1].stop
     rows = tuple(np.hstack([part[motion_index] for part in column_parts]) for motion_index in range(len(motions)))
-    fit = [motion.mask_valid_samples(motion.fit) for motion in motions]
-    scale = compute_scale(rows, fit)
-    test = [motion.mask_valid_samples(motion.test) for motion in motions]
-    mean = float(np.concatenate([target[mask] for target, mask in zip(forces, fit, strict=True)]).mean())
+    fit_masks = [motion.mask_valid_samples(motion.fit) for motion in motions]
+    scale = compute_scale(rows, fit_masks)
+    test_masks = [motion.mask_valid_samples(motion.test) for motion in motions]
+    mean = float(np.concatenate([target[mask] for target, mask in zip(forces, fit_masks, strict=True)]).mean())
     driven = base_terms.driven_channel
     return Regression(
-        tuple(motions), axis, tuple(kept_laws), base_terms, base_count,
-        (2 if turns else 3) * channel_count if bases is None else base_count - 1,
-        (driven, channel_count + driven, driven) if bases is None else (0,), tuple(places),
+        tuple(motions), axis, tuple(kept_laws), base_terms, base_column_count,
+        (2 if turns else 3) * channel_count if bases is None else base_column_count - 1,
+        (driven, channel_count + driven, driven) if bases is None else (0,), tuple(column_ranges),
         scale, rows, tuple(forces),
-        build_blocks(rows, forces, fit, (scale, mean)), build_blocks(rows, forces, test, (scale, mean)),
+        build_blocks(rows, forces, fit_masks, (scale, mean)), build_blocks(rows, forces, test_masks, (scale, mean)),
     )  # fmt: skip
 
 
@@ -189,8 +189,8 @@ def _make_base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
 def _make_law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
     """Make a law's filtered and decimated columns per motion; None where any is zero or not finite."""
     columns = [motion.decimate(law.columns(motion, law.numbers)) for motion in motions]
-    usable = all(np.isfinite(column).all() for column in columns) and all(_is_above_rounding(columns))
-    return columns if usable else None
+    is_usable = all(np.isfinite(column).all() for column in columns) and all(_is_above_rounding(columns))
+    return columns if is_usable else None
 
 
 def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
@@ -202,7 +202,7 @@ def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
 def replace_law(regression: Regression, law_index: int, law: Law) -> Regression | None:
     """Replace the law of this index; None where the new law's columns are zero, not finite or differ in number from
     those of the old law."""
-    column_range = regression.places[law_index]
+    column_range = regression.column_ranges[law_index]
     columns = _make_law_columns(regression.motions, law)
     if columns is None or columns[0].shape[1] != column_range.stop - column_range.start:
         return None
@@ -235,39 +235,39 @@ def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
             for column_parts, new_columns in zip(rows, columns, strict=True):
                 column_parts.append(new_columns)
     extended = tuple(np.hstack(part) for part in rows)
-    fit = [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
-    test = [motion.mask_valid_samples(motion.test) for motion in regression.motions]
-    scale = np.concatenate([regression.scale, compute_scale([part[:, ends[0] :] for part in extended], fit)])
-    mean = np.concatenate([target[mask] for target, mask in zip(regression.force, fit, strict=True)]).mean()
+    fit_masks = [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
+    test_masks = [motion.mask_valid_samples(motion.test) for motion in regression.motions]
+    scale = np.concatenate([regression.scale, compute_scale([part[:, ends[0] :] for part in extended], fit_masks)])
+    mean = np.concatenate([target[mask] for target, mask in zip(regression.force, fit_masks, strict=True)]).mean()
     normalisation = scale, float(mean)
     return replace(
         regression,
         laws=(*regression.laws, *added_laws),
-        places=(*regression.places, *(slice(start, end) for start, end in pairwise(ends))),
+        column_ranges=(*regression.column_ranges, *(slice(start, end) for start, end in pairwise(ends))),
         scale=scale,
         columns=extended,
-        fit=build_blocks(extended, regression.force, fit, normalisation),
-        test=build_blocks(extended, regression.force, test, normalisation),
+        fit=build_blocks(extended, regression.force, fit_masks, normalisation),
+        test=build_blocks(extended, regression.force, test_masks, normalisation),
     )
 
 
 def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
     """Reduce a regression to the laws of these indices, in this order."""
     columns = regression.select_columns(laws)
-    widths = [regression.places[k].stop - regression.places[k].start for k in laws]
-    ends = np.cumsum([regression.base, *widths]).tolist()
+    widths = [regression.column_ranges[k].stop - regression.column_ranges[k].start for k in laws]
+    ends = np.cumsum([regression.base_column_count, *widths]).tolist()
     return replace(
         regression,
         laws=tuple(regression.laws[k] for k in laws),
-        places=tuple(slice(start, end) for start, end in pairwise(ends)),
+        column_ranges=tuple(slice(start, end) for start, end in pairwise(ends)),
         scale=regression.scale[columns],
         columns=tuple(part[:, columns] for part in regression.columns),
-        fit=tuple(_select_columns(block, columns) for block in regression.fit),
-        test=tuple(_select_columns(block, columns) for block in regression.test),
+        fit=tuple(_select_block_columns(block, columns) for block in regression.fit),
+        test=tuple(_select_block_columns(block, columns) for block in regression.test),
     )
 
 
-def _select_columns(block: Block, columns: Sequence[int]) -> Block:
+def _select_block_columns(block: Block, columns: Sequence[int]) -> Block:
     """Reduce a block to the products of these columns, in this order."""
     return replace(block, gram=block.gram[np.ix_(columns, columns)], cross=block.cross[list(columns)])
 
@@ -283,10 +283,10 @@ def _update_products(regression: Regression, block: Block, column_range: slice) 
 
 
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:
-    """Ridge regression on all these columns: the cross-validated sum of squares, and that of each test block (blocks,).
-    The ridge parameter is the one of `RIDGE_PARAMETERS` with the least cross-validated error; it does not act on the
-    base. The result estimates the least error that a sum of a few laws can reach."""
-    is_base = np.array([k < regression.base for k in columns])
+    """Fit all these columns by ridge regression: the cross-validated sum of squares, and that of each test block
+    (blocks,). The ridge parameter is the one of `RIDGE_PARAMETERS` with the least cross-validated error; it does not
+    act on the base. The result estimates the least error that a sum of a few laws can reach."""
+    is_base = np.array([k < regression.base_column_count for k in columns])
     products = stack_products(regression.fit, columns)
     total_products = products[0].sum(axis=0), products[1].sum(axis=0)
     training = with_prior((total_products[0] - products[0], total_products[1] - products[1]), regression.prior)

@@ -1,9 +1,9 @@
 """Beam search for sums of one to three laws that explain a force along a measured motion.
 
-Each structure in the beam, at first mass, damping and stiffness alone, is extended by each further law; weights are
-least squares, nonlinear parameters of the best are refined, and the best `STRUCTURES_BEAM` are kept, as long as each
-size improves significantly. The error of a structure is the sum over folds of the squared force error with weights
-fitted to the other folds. `choose_simplest_structure` then selects the fewest parameters at about the least error.
+Each structure in the beam, first the base alone, is extended by each further law (weights by least squares); nonlinear
+parameters of the best are refined, and the best `STRUCTURES_BEAM` are kept, as long as each size improves
+significantly. The error of a structure is the sum over folds of the squared force error with weights fitted to the
+other folds. `choose_simplest_structure` selects the result. Called by `linear_part` and `confirm.balance_with_model`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,20 +27,20 @@ from analysis.diagnosis.balance.regression import (
 )
 from analysis.diagnosis.settings import (
     FURTHER_LAW_ERRORS,
+    FURTHER_LAW_EXCESS,
     FURTHER_LAW_GAIN,
-    FURTHER_LAW_OF_ALL,
-    FURTHER_LAW_OF_REST,
+    FURTHER_LAW_SHARE,
     MOST_SUMMED_LAWS,
-    PLAINER_LEAVES,
+    PLAINER_SHORTFALL,
     STRUCTURES_BEAM,
 )
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 STEP_FACTORS = (0.8, 0.93, 1.075, 1.25)
-"""Factors on a nonlinear parameter in one pass of a coordinate search."""
+"""Factors on a nonlinear parameter in one pass of a coordinate search; chosen by hand."""
 MOST_PASSES = 6
-"""Largest number of passes of the coordinate search over the nonlinear parameters of one law."""
+"""Largest number of passes of the coordinate search over the nonlinear parameters of one law; chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,11 +49,11 @@ class Structure:
 
     laws: tuple[int, ...]
     """Indices in a regression's `laws`."""
-    errors: FloatArray
-    """(folds,): sums of squares."""
+    errors: FloatArray  # (folds,): sums of squares
 
     @property
     def error(self) -> float:
+        """Sum of squares over all folds."""
         return float(self.errors.sum())
 
 
@@ -61,14 +61,12 @@ class Structure:
 class StructureSearch:
     """Result of the search for sums of laws."""
 
-    regression: Regression
-    """The regression with refined laws."""
-    linear: Structure
-    best: Structure
+    regression: Regression  # with refined laws
+    linear: Structure  # the base alone, without laws
+    best: Structure  # of all sizes, the last that improves significantly
     ranked: tuple[Structure, ...]
     """The best structure of each set of effects, of all sizes, the best first."""
-    complete: bool
-    """Whether the search was completed."""
+    complete: bool  # whether the search ended before the time limit
 
 
 def search_structures(
@@ -79,17 +77,17 @@ def search_structures(
     time_left: TimeBudget,
     base: BaseTerms | ModelBase | None = None,
 ) -> StructureSearch:
-    """Beam search for the sum of at most three laws with the least cross-validated error. excluded: effects that are
-    left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
+    """Search the sum of at most `MOST_SUMMED_LAWS` laws with the least cross-validated error. excluded: effects left
+    out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [measure_scales(motions, c, rotational) for c in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
-    fixed = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
+    base_laws = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
     laws = [
         law
         for law in make_laws(motions, rotational)
-        if excluded.isdisjoint((law.effect, SIMULATED_AS.get(law.effect))) and (law.key, law.numbers) not in fixed
+        if excluded.isdisjoint((law.effect, SIMULATED_AS.get(law.effect))) and (law.key, law.numbers) not in base_laws
     ]
     if isinstance(base, ModelBase):
         regression = build_regression_with_model(motions, axis, laws, base)
@@ -105,33 +103,35 @@ def search_structures(
     return StructureSearch(regression, linear, best, tuple(sorted(ranked, key=lambda s: s.error)), time_left())
 
 
-def _search(fit: Regression, linear: Structure, time_left: TimeBudget) -> tuple[Regression, list[Structure], Structure]:
-    """The regression with its laws refined, the structures of all sizes, and the best."""
+def _search(
+    regression: Regression, linear: Structure, time_left: TimeBudget
+) -> tuple[Regression, list[Structure], Structure]:
+    """Search the beam: the regression with its laws refined, the structures of all sizes, and the best."""
     beam, ranked, best = [linear], [linear], linear
     for _ in range(MOST_SUMMED_LAWS):
-        sums = _add_law_to_each(fit, beam) if time_left() else []
+        sums = _add_law_to_each(regression, beam) if time_left() else []
         if not sums:
             break
-        fit = refine_parameters(fit, sums[:STRUCTURES_BEAM])
-        sums = [replace(s, errors=fit.cross_validate(fit.select_columns(s.laws))) for s in sums]
+        regression = refine_parameters(regression, sums[:STRUCTURES_BEAM])
+        sums = [replace(s, errors=regression.cross_validate(regression.select_columns(s.laws))) for s in sums]
         ranked += sums
         beam = sorted(sums, key=lambda s: s.error)[:STRUCTURES_BEAM]
         if not improves_significantly(best, beam[0]):
             break
         best = beam[0]
-    return fit, ranked, best
+    return regression, ranked, best
 
 
 def improves_significantly(base: Structure, extended: Structure) -> bool:
     """Whether the laws that `extended` adds are significant. With fold errors p_i of `base` and r_i of `extended`, the
     total must fall by `FURTHER_LAW_GAIN`, and one of three sums must exceed `FURTHER_LAW_ERRORS` standard errors: of
     p_i - r_i; of log(p_i / r_i), for folds with unequal errors; of p_i - r_i with the error of a ratio estimate."""
-    floor = 1e-12 * base.error / len(base.errors)
-    shares = np.log(np.maximum(base.errors, floor) / np.maximum(extended.errors, floor)) if floor > 0 else np.zeros(1)
+    floor = 1e-12 * base.error / len(base.errors)  # against division by zero
+    logs = np.log(np.maximum(base.errors, floor) / np.maximum(extended.errors, floor)) if floor > 0 else np.zeros(1)
     gains = base.errors - extended.errors
     # Residuals of the gains about their ratio to the errors (Cochran, Sampling Techniques, 3rd ed., equation 6.4).
-    about_ratio = gains - (1 - extended.error / max(base.error, 1e-300)) * base.errors
-    passes = _is_significant(gains, gains) or _is_significant(shares, shares) or _is_significant(gains, about_ratio)
+    residuals = gains - (1 - extended.error / max(base.error, 1e-300)) * base.errors
+    passes = _is_significant(gains, gains) or _is_significant(logs, logs) or _is_significant(gains, residuals)
     return extended.error < (1 - FURTHER_LAW_GAIN) * base.error and passes
 
 
@@ -142,18 +142,19 @@ def _is_significant(gains: FloatArray, residuals: FloatArray) -> bool:
 
 
 def _fit_linear_structure(regression: Regression) -> Structure:
+    """Cross-validate the base alone."""
     return Structure((), regression.cross_validate(regression.select_columns(())))
 
 
 def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[Structure]:
-    """Each structure with one more law: the best physical one of each set of effects, sorted by error."""
+    """Add one more law to each structure: the best physical one of each set of effects, sorted by error."""
     best: dict[tuple[tuple[str, int], ...], Structure] = {}
     for structure in beam:
         keys = {regression.laws[k].key for k in structure.laws}
-        for number, law in enumerate(regression.laws):
-            if law.key in keys or any(_overlaps(law.key, key) for key in keys):
+        for law_index, law in enumerate(regression.laws):
+            if law.key in keys or any(_have_common_column(law.key, key) for key in keys):
                 continue
-            laws = tuple(sorted((*structure.laws, number)))
+            laws = tuple(sorted((*structure.laws, law_index)))
             extended = Structure(laws, regression.cross_validate(regression.select_columns(laws)))
             effects = tuple(sorted(regression.laws[k].key for k in laws))
             if (effects not in best or extended.error < best[effects].error) and _is_physical(regression, laws):
@@ -167,37 +168,39 @@ SLIDING = (
 """Laws that share the column of dry friction: two of them along one channel have no unique levels."""
 
 
-def _overlaps(first: tuple[str, int], second: tuple[str, int]) -> bool:
+def _have_common_column(first: tuple[str, int], second: tuple[str, int]) -> bool:
+    """Whether two laws (effect and channel each) share the column of dry friction."""
     return first[1] == second[1] and first[0] in SLIDING and second[0] in SLIDING
 
 
 def _is_physical(regression: Regression, laws: Sequence[int]) -> bool:
+    """Whether the fitted weights of all these laws have physical signs."""
     return all(values is not None for values in fit_values(regression, laws))
 
 
 def fit_values(regression: Regression, laws: Sequence[int]) -> list[dict[str, float] | None]:
-    """Parameters of each law, all fitted together; None where the signs of its weights are not physical."""
+    """Fit the parameters of each law, all together; None where the signs of its weights are not physical."""
     columns = regression.select_columns(laws)
     weights = regression.fit_weights(columns)
     mass = float(weights[regression.base_terms.driven_channel]) if regression.mass is None else regression.mass
-    first, values = regression.base, []
-    for number in laws:
-        law, place = regression.laws[number], regression.places[number]
-        count = place.stop - place.start
-        values.append(law.values(weights[first : first + count], law.numbers, mass))
-        first += count
+    first_weight, values = regression.base_column_count, []
+    for law_index in laws:
+        law, column_range = regression.laws[law_index], regression.column_ranges[law_index]
+        count = column_range.stop - column_range.start
+        values.append(law.values(weights[first_weight : first_weight + count], law.numbers, mass))
+        first_weight += count
     return values
 
 
 def _add_cogging_laws(regression: Regression, scales: Sequence[Scales]) -> Regression:
-    """The regression with cogging at the pitches in the residual without laws, and in that with the best one."""
+    """Add cogging at the pitches in the residual without laws, then at those in the residual with the best law."""
     regression = _add_pitches(regression, scales, ())
     extended = _add_law_to_each(regression, [_fit_linear_structure(regression)])
     return _add_pitches(regression, scales, extended[0].laws) if extended else regression
 
 
 def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:
-    """The regression with cogging at the pitches that the residual of these laws shows."""
+    """Add cogging at the pitches that the residual of these laws shows."""
     residuals = regression.compute_residuals(regression.select_columns(laws))
     cogging = [
         make_cogging_law(c, pitch, scale)
@@ -208,44 +211,44 @@ def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequenc
 
 
 def refine_parameters(regression: Regression, structures: Sequence[Structure]) -> Regression:
-    """The regression with the nonlinear parameters of the structures' laws refined to the least cross-validated error,
-    each law in the first structure that has it."""
+    """Refine the nonlinear parameters of the structures' laws to the least cross-validated error, each law in the first
+    structure that has it."""
     refined: set[int] = set()
     for structure in structures:
-        for place, number in enumerate(structure.laws):
-            if number not in refined and regression.laws[number].bounds:
-                refined.add(number)
-                fitted = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
-                replaced = replace_law(regression, number, _refine_law(fitted, place))
-                regression = replaced or regression
+        for position, law_index in enumerate(structure.laws):
+            if law_index not in refined and regression.laws[law_index].bounds:
+                refined.add(law_index)
+                reduced = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
+                updated = replace_law(regression, law_index, _refine_law(reduced, position))
+                regression = updated or regression
     return regression
 
 
-def _refine_law(regression: Regression, place: int) -> Law:
-    """One law of a structure, refined by steps to its best neighbour. regression: with the structure's laws alone."""
+def _refine_law(regression: Regression, position: int) -> Law:
+    """Refine one law of a structure by steps to its best neighbour. regression: with the structure's laws alone."""
     laws = tuple(range(len(regression.laws)))
-    best = float(regression.cross_validate(regression.select_columns(laws)).sum())
+    least_error = float(regression.cross_validate(regression.select_columns(laws)).sum())
     for _ in range(MOST_PASSES):
         trials = []
-        for neighbour in _list_neighbours(regression.laws[place]):
-            trial = replace_law(regression, place, neighbour)
+        for neighbour in _list_neighbours(regression.laws[position]):
+            trial = replace_law(regression, position, neighbour)
             if trial is not None and _is_physical(trial, laws):
                 trials.append((float(trial.cross_validate(trial.select_columns(laws)).sum()), trial))
-        if not trials or min(trials, key=lambda pair: pair[0])[0] >= best * (1 - 1e-4):
+        if not trials or min(trials, key=lambda pair: pair[0])[0] >= least_error * (1 - 1e-4):  # converged
             break
-        best, regression = min(trials, key=lambda pair: pair[0])
-    return regression.laws[place]
+        least_error, regression = min(trials, key=lambda pair: pair[0])
+    return regression.laws[position]
 
 
 def _list_neighbours(law: Law) -> Iterator[Law]:
-    """The law with each nonlinear parameter moved by each factor, within its bounds."""
-    for place, (low, high) in enumerate(law.bounds):
+    """List the law with each nonlinear parameter moved by each factor, within its bounds."""
+    for index, (low, high) in enumerate(law.bounds):
         # Over a travel of many pitches, the phase of cogging turns by a multiple of a pitch's relative change.
-        share = 0.05 if law.effect == "cogging" else 1.0
+        step_scale = 0.05 if law.effect == "cogging" else 1.0
         for factor in STEP_FACTORS:
-            value = law.numbers[place] * (1 + (factor - 1) * share)
+            value = law.numbers[index] * (1 + (factor - 1) * step_scale)
             if low <= value <= high:
-                numbers = (*law.numbers[:place], float(value), *law.numbers[place + 1 :])
+                numbers = (*law.numbers[:index], float(value), *law.numbers[index + 1 :])
                 yield replace(law, numbers=numbers)
 
 
@@ -254,26 +257,23 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 
 
 def choose_simplest_structure(search: StructureSearch) -> Structure:
-    """The structure with the fewest parameters at about the least error, extended by laws that explain most of the
-    remaining error."""
-    allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
-    candidates = [s for s in search.ranked if s.error <= allowed]
-    simplest = min(
-        candidates, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=search.linear
-    )
+    """Choose the fewest parameters at about the least error, and add laws that explain most of the remaining error."""
+    limit = search.best.error + PLAINER_SHORTFALL * (search.linear.error - search.best.error)
+    sums = [s for s in search.ranked if s.error <= limit]
+    simplest = min(sums, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=search.linear)
     least_error = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
     while (extended := add_further_laws(search, simplest, least_error)) is not None:
         simplest = extended
     return simplest
 
 
-def add_further_laws(search: StructureSearch, base: Structure, least_error: float) -> Structure | None:
-    """The structure with further laws that explain most of what all laws (least_error) could; None without any."""
-    allowed = base.error - max(FURTHER_LAW_OF_REST * (base.error - least_error), FURTHER_LAW_OF_ALL * base.error)
+def add_further_laws(search: StructureSearch, base: Structure, ceiling: float) -> Structure | None:
+    """Add laws to `base` that explain most of what all laws (error: ceiling) could explain; None without such laws."""
+    limit = base.error - max(FURTHER_LAW_EXCESS * (base.error - ceiling), FURTHER_LAW_SHARE * base.error)
     extensions = [
         s
         for s in search.ranked
-        if _extends(search.regression, base.laws, s.laws) and s.error <= allowed and improves_significantly(base, s)
+        if _extends(search.regression, base.laws, s.laws) and s.error <= limit and improves_significantly(base, s)
     ]
     return min(extensions, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=None)
 
@@ -281,20 +281,20 @@ def add_further_laws(search: StructureSearch, base: Structure, least_error: floa
 def _extends(regression: Regression, base: Sequence[int], extended: Sequence[int]) -> bool:
     """Whether `extended` contains all laws of `base` and more; Coulomb friction may be replaced by friction that
     depends on a condition."""
-    covered, keys = set(extended), {regression.laws[number].key for number in extended}
-    for number in base:
-        effect, channel = regression.laws[number].key
+    covered, keys = set(extended), {regression.laws[law_index].key for law_index in extended}
+    for law_index in base:
+        effect, channel = regression.laws[law_index].key
         if effect == "coulomb_friction" and ("condition_dependent_friction", channel) in keys:
-            covered.add(number)
+            covered.add(law_index)
     return set(base) < covered
 
 
 def count_parameters(regression: Regression, laws: Sequence[int]) -> int:
-    """Number of parameters of these laws. The width of a smoothed sign is not counted; a gravity torque counts as a
+    """Count the parameters of these laws. The width of a smoothed sign is not counted; a gravity torque counts as a
     parameter less, because it replaces the spring, and a law outside the catalogue as one more (description length)."""
     count = 0
-    for number in laws:
-        law, place = regression.laws[number], regression.places[number]
-        count += place.stop - place.start + (0 if law.effect in WIDTH_ALONE else len(law.numbers))
+    for law_index in laws:
+        law, column_range = regression.laws[law_index], regression.column_ranges[law_index]
+        count += column_range.stop - column_range.start + (0 if law.effect in WIDTH_ALONE else len(law.numbers))
         count += (law.effect in FREE_LAWS) - (law.effect == "gravity_torque")
     return count

@@ -3,7 +3,7 @@
 Inverse dynamics give the force that the model requires for the measured motion, with its actuator, modes and effects.
 The base of the regression (`balance.model_base`) consists of that force and its derivatives with respect to the model's
 free parameters, which have the prior of their calibration. Laws are then tested as for a fitted model
-(`balance.judge_laws`), by their gain on held-out data over the re-tuned model.
+(`balance.judge_laws`), by their gain on held-out data over the re-tuned model. Called by `decide_with_model`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
-from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
+from analysis.diagnosis.settings import LAW_FORCE_SHARE, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
 from equalizer.effects.placing import place_recorded_effects
@@ -34,16 +34,18 @@ from equalizer.signals.signal import FloatArray
 
 LEAST_SAMPLES_PER_PERIOD = 6.0
 """Least samples per period of the band's upper end at which laws are computed, so that harmonics of nonlinear laws are
-not aliased into the band."""
+not aliased into the band. Chosen by hand."""
 DIFFERENCE_STEP = 0.1
-"""Step of the finite differences for the parameters of modes, in standard deviations of the calibration."""
+"""Step of the finite differences for the parameters of modes, in standard deviations of the calibration. Chosen by
+hand."""
 
 
 def find_balances_with_model(
     recordings: Sequence[Recording], model: MechanicalModel, excluded: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
-    """One balance per command; empty where a command drives no measured position or velocity, where there is no time
-    axis, or where the model's inverse dynamics cannot be computed. excluded: names of effects that are not tested."""
+    """Find the balance of each command; empty where a command drives no measured position or velocity, where there is
+    no time axis, or where the motion or the model's inverse dynamics cannot be computed. excluded: names of effects
+    that are not tested."""
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         return ()
@@ -51,15 +53,15 @@ def find_balances_with_model(
         motions = compute_motions(records)
         if len(motions[0].channels) < model.inputs or motions[0].order == 2 or not np.isfinite(motions[0].band_hz):
             return ()
-        data = [_prepare_axis_data(record, motion, model) for record, motion in zip(records, motions, strict=True)]
+        prepared = [_prepare_record(record, motion, model) for record, motion in zip(records, motions, strict=True)]
         axis_directions = compute_driven_axes(model)
         mass = np.einsum("nm,nk,km->m", axis_directions, model.mass, axis_directions)
         return tuple(
             judge_laws(
                 search_structures(
-                    [_select_axis(axis_data.motion, axis) for axis_data in data], axis, model.rotational, excluded,
+                    [_select_axis(entry.motion, axis) for entry in prepared], axis, model.rotational, excluded,
                     time_left,
-                    ModelBase(tuple(axis_data.columns[axis] for axis_data in data), float(mass[axis]), LAW_OF_SIGNAL),
+                    ModelBase(tuple(entry.columns[axis] for entry in prepared), float(mass[axis]), LAW_FORCE_SHARE),
                 )
             )
             for axis in range(model.inputs)
@@ -69,13 +71,13 @@ def find_balances_with_model(
 
 
 def _select_axis(motion: Motion, axis: int) -> Motion:
-    """The motion of one axis alone: laws that depend on the motion of another axis are not tested."""
+    """Select the motion of one axis: laws that depend on the motion of another axis are not tested."""
     selected = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
     return replace(motion, channels=motion.channels[axis : axis + 1], **selected)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _AxisData:
+class _PreparedRecord:
     """One record along the m driven axes, decimated to at least `LEAST_SAMPLES_PER_PERIOD` samples per period of the
     band's upper end."""
 
@@ -85,37 +87,38 @@ class _AxisData:
     """Per axis, the columns of `ModelBase`, (n, 1 + parameters)."""
 
 
-def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel) -> _AxisData:
-    """Motion, force and base columns of one record. Raises LinAlgError where the model's outputs do not determine its
-    motion."""
+def _prepare_record(record: Observed, motion: Motion, model: MechanicalModel) -> _PreparedRecord:
+    """Compute motion, force and base columns of one record. Raises numpy.linalg.LinAlgError where the model's outputs
+    do not determine its motion."""
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known_effects = apply_conditions(place_recorded_effects(model, recording), recording)
     structure = _apply_structural_effects(add_payload(model, recording), known_effects)
     required = compute_required_force(structure, compute_band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
-    applied = compute_actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
+    actuator_force = compute_actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
     effect_force = compute_effect_forces_along_motion(
-        structure, known_effects, axis_motion, (motion.force, applied - required.force), rate_hz
+        structure, known_effects, axis_motion, (motion.force, actuator_force - required.force), rate_hz
     )
     stride = max(int(rate_hz / (LEAST_SAMPLES_PER_PERIOD * motion.band_hz)), 1)
     position, velocity, acceleration = (series[::stride] for series in axis_motion)
     decimated = replace(
         motion, rate_hz=rate_hz / stride, step=max(int(rate_hz / stride / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
         channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
-        force=motion.filter_to_band(applied + effect_force)[::stride], condition=motion.condition[::stride],
+        force=motion.filter_to_band(actuator_force + effect_force)[::stride], condition=motion.condition[::stride],
         fit=motion.fit[::stride], test=motion.test[::stride],
     )  # fmt: skip
-    changes = [
+    parameter_columns = [
         *_compute_grounded_columns(decimated, model, recording),
         *_compute_mode_columns(decimated, model, recording, known_effects),
     ]
-    columns = np.stack([required.force[::stride], *changes], axis=1)
-    return _AxisData(decimated, tuple(columns[:, :, axis] for axis in range(m)))
+    columns = np.stack([required.force[::stride], *parameter_columns], axis=1)
+    return _PreparedRecord(decimated, tuple(columns[:, :, axis] for axis in range(m)))
 
 
 def _compute_grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
-    """(n, m) each: change of the required force per standard deviation of each entry of mass, damping and stiffness at
-    the driven axes, in the order of `Tuning`. It is exact, because the force is linear in these entries."""
+    """Compute (n, m) each: change of the required force per standard deviation of each entry of mass, damping and
+    stiffness at the driven axes, in the order of `Tuning`. It is exact, because the force is linear in these
+    entries."""
     tuning, m = make_tuning(model, recording.command.channels), model.inputs
     entries = [(i, j) for i in range(m) for j in range(i, m)]
     input_norms = np.linalg.norm(model.input, axis=0)
@@ -130,8 +133,8 @@ def _compute_grounded_columns(motion: Motion, model: MechanicalModel, recording:
 def _compute_mode_columns(
     motion: Motion, model: MechanicalModel, recording: Recording, known_effects: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
-    """(n, m) each: change of the required force per standard deviation of each parameter of the modes, by forward
-    differences."""
+    """Compute (n, m) each: change of the required force per standard deviation of each parameter of the modes, by
+    forward differences."""
     tuning, m = make_tuning(model, recording.command.channels), model.inputs
     first_mode_parameter = 3 * m * (m + 1) // 2
     if first_mode_parameter == len(tuning.names):

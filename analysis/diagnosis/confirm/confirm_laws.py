@@ -1,15 +1,15 @@
 """Confirm, by output-error fits (simulation), the laws that a force balance named.
 
-Theory of operation. Called by `diagnose` and `decide_with_model` where the model itself was fitted to the recordings.
-Without a calibration the size of the model's errors is unknown, so that a residual in units of noise is no evidence,
-but the gain on held-out data is. The balance compares forces, where a wrong law may explain the model's own errors; a
+Called by `diagnose` for a model that was fitted to the recordings, and by `decide_with_model` for a given one. Without
+a calibration, the size of the model's errors is unknown, so that a residual in units of noise is no evidence, but the
+gain on held-out data is. The balance compares forces, where a wrong law may explain the model's own errors; a
 simulation compares responses.
 
 1. The named laws are added to the re-tuned model one after the other and fitted by output error, starting from the
    balance's parameters, or from the model's own where these fail (`_fit_from_starts`).
 2. With E the mean over channels of the log rms error on held-out samples, the laws are confirmed if
 
-       E(with laws) <= E(without) + ln(CONFIRMED_LEAVES)         (a tenth less error)
+       E(with laws) <= E(without) + ln(CONFIRMED_RATIO)          (a tenth less error)
 
    and if the model with the laws explains more than half of the held-out power (`held_out_gain.explains_half`).
 3. A law whose amplitude's 95 % interval contains zero is withdrawn, or replaced by the special case that lacks the
@@ -44,8 +44,8 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement, SearchResult, as_good_as_noise
-from analysis.diagnosis.settings import CONFIRMED_LEAVES, HELD_OUT_ERROR, INTERVAL_FACTOR
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, is_near_noise
+from analysis.diagnosis.settings import CONFIRMED_RATIO, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
@@ -63,10 +63,10 @@ class _ConfirmationStart:
 
     search_context: SearchContext
     """Shared state of the search, with samples to fit and to choose by."""
-    context: SearchContext
+    full_context: SearchContext
     """`search_context`, fitted to all samples but the held-out ones."""
     balances: tuple[Balance, ...]
-    repeats: bool
+    noise_known: bool
     """Whether the noise is known from repeats."""
     constant_count: int
     """Number of constant forces, which come before the laws."""
@@ -80,9 +80,10 @@ class _ConfirmationStart:
     """The better of `as_given` and `confirmed` on the held-out samples."""
 
 
-def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
+def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise_known: bool) -> SearchResult | None:
     """Convert the named laws of the balances (one per axis) to a search result; None where none can be simulated, or
-    simulations confirm none. repeats: whether repeats show the noise; else the verdict is not `explained`."""
+    simulations confirm none. noise_known: whether the noise is known from repeats; else the verdict is not
+    `explained`."""
     named_laws = [
         (axis, law)
         for axis, balance in enumerate(balances)
@@ -92,7 +93,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     ]
     if not named_laws:
         return None
-    full_context = context.fit_to_all()
+    full_context = context.with_choosing_samples_fitted()
     forces = estimate_constant_forces(balances)
     given_fit = evaluate_fit(
         full_context.measure, full_context.tuning, np.zeros(len(full_context.tuning.names)), forces
@@ -104,7 +105,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     confirmed = full_context.with_test_score(retuned)
     baseline = Explanation(as_given, confirmed, confirmed, (), ()).plain
     start = _ConfirmationStart(
-        context, full_context, tuple(balances), repeats, len(forces.claims), as_given, retuned, confirmed, baseline
+        context, full_context, tuple(balances), noise_known, len(forces.claims), as_given, retuned, confirmed, baseline
     )
     confirmed_laws = _confirm_by_simulation(start, named_laws)
     return None if confirmed_laws is None else _prefer_special_case(start, *confirmed_laws)
@@ -115,7 +116,7 @@ def _confirm_by_simulation(
 ) -> tuple[SearchResult, _NamedLaws] | None:
     """Fit the laws, dropping undetermined ones, until all are confirmed; returns the result and these laws, None where
     there are none."""
-    context, named_laws = start.context, refit_laws(start.balances, named_laws)
+    context, named_laws = start.full_context, refit_laws(start.balances, named_laws)
     while named_laws:
         steps, with_laws = _fit_from_starts(context, start.balances, (start.retuned, start.baseline), named_laws)
         explanation = Explanation(
@@ -130,7 +131,7 @@ def _confirm_by_simulation(
             )
         if undetermined is None:
             test_error = float(np.nanmax(with_laws.score.test, initial=0.0))
-            is_complete = start.repeats and as_good_as_noise(explanation) and test_error <= HELD_OUT_ERROR
+            is_complete = start.noise_known and is_near_noise(explanation) and test_error <= HELD_OUT_ERROR
             judgement = Judgement("explained" if is_complete else "partly_explained", True)
             return SearchResult(start.search_context, explanation, judgement, errors=errors), named_laws
         special_case = (
@@ -144,8 +145,7 @@ def _confirm_by_simulation(
 
 def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_laws: _NamedLaws) -> SearchResult:
     """Replace a law by its special case where its further parameters are undetermined (such as a stiffness before
-    sliding), no law is lost, and the held-out error rises by at most the factor 1 / CONFIRMED_LEAVES; else
-    unchanged."""
+    sliding), no law is lost, and the held-out error rises by at most the factor 1 / CONFIRMED_RATIO; else unchanged."""
     for index in find_open_refinements(result, start.constant_count):
         special_case = find_special_case(start.balances, _remove_law(named_laws, index), named_laws[index])
         alternative = (
@@ -155,7 +155,7 @@ def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_
         )
         if alternative is None or len(alternative[1]) < len(named_laws):
             continue
-        if alternative[0].found.after.held_out_error <= result.found.after.held_out_error - np.log(CONFIRMED_LEAVES):
+        if alternative[0].found.after.held_out_error <= result.found.after.held_out_error - np.log(CONFIRMED_RATIO):
             return alternative[0]
     return result
 
@@ -293,8 +293,8 @@ def _find_open_parameters(result: SearchResult) -> list[int]:
 
 
 def _lowers_held_out_error(baseline: FittedCandidate, with_laws: FittedCandidate) -> bool:
-    """Whether the laws reduce the held-out error to `CONFIRMED_LEAVES` times the baseline's or less; True where nothing
+    """Whether the laws reduce the held-out error to `CONFIRMED_RATIO` times the baseline's or less; True where nothing
     was held out. `held_out_error` is the log rms error of the module docstring."""
     return not np.isfinite(baseline.held_out_error) or with_laws.held_out_error <= baseline.held_out_error + np.log(
-        CONFIRMED_LEAVES
+        CONFIRMED_RATIO
     )

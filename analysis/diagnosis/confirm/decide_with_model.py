@@ -1,5 +1,5 @@
-"""Decide, by the error on held-out samples, which of the effects that a search with a given model found are reported
-as named.
+"""Decide, by the error on held-out samples, which of the effects that a search with a given model found are reported as
+named.
 
 Called by `diagnose` after the search, where residuals exceed the noise. Where repeats show that the noise is about as
 large as the residual, the decision by likelihood (`verdict`) is kept. Otherwise the residual of a real device is far
@@ -23,12 +23,12 @@ from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, estimate_held_
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.parsimony import is_refined_candidate
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement, SearchResult, Unconfirmed
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, UnconfirmedEffect
 from analysis.diagnosis.settings import (
     CANDIDATES_WITH_GAIN,
-    FURTHER_LAW_OF_ALL,
+    FURTHER_LAW_SHARE,
+    NAMED_CEILING_SHARE,
     NAMED_ERROR,
-    NAMED_OF_CEILING,
 )
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
@@ -47,15 +47,17 @@ def decide_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
 ) -> ResultWithModel:
     """Decide which effects are named. result: of the search by simulation, with errors compared sample by sample, after
-    which some error is unexplained; it is returned unchanged if it names effects already. If its effects cannot be
-    named, those of a search by force balance are tried; if these cannot be named either, the best candidates are listed
-    as unconfirmed, with the reason. Also returns the force balances, with the given model as their base."""
-    is_noise_known = all(floor.method == "repeats" for floor in fitting.chosen.floors)
+    which some error is unexplained; it is returned unchanged if it names effects already, or only refinements of an
+    excluded effect explain as much (`Explanation.excluded_name`). Where the noise is known and the residual near it,
+    no effect is named, and candidates are listed as unconfirmed. Else, if its effects cannot be named, those of a
+    search by force balance are tried; if these cannot be named either, the best candidates are listed as unconfirmed,
+    with the reason. Also returns the force balances, with the given model as their base."""
+    noise_known = all(floor.method == "repeats" for floor in fitting.chosen.floors)
     balances = find_balances_with_model(recordings, fitting.model, result.context.excluded, time_left)
-    is_residual_near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
-    if result.judgement.named or result.found.barred:
+    residual_near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
+    if result.judgement.named or result.found.excluded_name:
         return ResultWithModel(result, balances)
-    if is_noise_known and is_residual_near_noise:
+    if noise_known and residual_near_noise:
         reason = "the noise is known here, and the residual with it is larger than the noise"
         return ResultWithModel(
             replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, reason))), balances
@@ -63,7 +65,7 @@ def decide_with_model(
     reason = find_objection(result, balances)
     if result.found.steps and not reason:
         return ResultWithModel(replace(result, judgement=Judgement("partly_explained", True)), balances)
-    balance_result = search_by_balance(result.context, balances, is_noise_known) if balances else None
+    balance_result = search_by_balance(result.context, balances, noise_known) if balances else None
     if balance_result is not None and not find_objection(balance_result, balances):
         judgement = replace(balance_result.judgement, verdict="partly_explained")
         return ResultWithModel(replace(balance_result, judgement=judgement, remarks=result.remarks), balances)
@@ -73,23 +75,24 @@ def decide_with_model(
 
 
 def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
-    """Find the reason not to name the effects that were found, as a sentence; empty where they are named. Conditions in
-    order: data held out; gain above its variation and above `FURTHER_LAW_OF_ALL`; no parameter at its tolerance; better
-    than the best rival; confirmed by the force balance, where the gain is below `NAMED_OF_CEILING`."""
+    """Find the reason not to name the effects that were found, as a clause; empty where they are named. Conditions in
+    order: an effect; data held out; gain above its variation and above `FURTHER_LAW_SHARE`; no parameter at its
+    tolerance; better than the best rival; confirmed by the force balance, where the gain is below
+    `NAMED_CEILING_SHARE`."""
     context, explanation = result.context, result.found
     if not explanation.steps:
         return "it explains too little of the error to be added"
     total_gain = estimate_held_out_gain(context.full_measure, explanation.plain, explanation.after)
-    previous = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
-    last_gain = estimate_held_out_gain(context.full_measure, previous, explanation.after)
+    previous_step = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
+    last_gain = estimate_held_out_gain(context.full_measure, previous_step, explanation.after)
     if total_gain is None or last_gain is None:
         return "too little data was held out to confirm it"
     if min(total_gain.low, last_gain.low) <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
-    if min(total_gain.gain, last_gain.gain) < FURTHER_LAW_OF_ALL:
+    if min(total_gain.gain, last_gain.gain) < FURTHER_LAW_SHARE:
         return (
             f"on held-out data it explains {100 * min(total_gain.gain, last_gain.gain):.1f} % of the error's power, "
-            f"and {100 * FURTHER_LAW_OF_ALL:.0f} % are required"
+            f"and {100 * FURTHER_LAW_SHARE:.0f} % are required"
         )
     if context.tuning.is_at_bound(explanation.after.fitted.deviations):
         return "with it, the fit moves a parameter of the model to the limit of its tolerance"
@@ -97,7 +100,7 @@ def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     if rival is not None and _is_indistinguishable(context, rival, explanation.after):
         return f"these data cannot distinguish it from {rival.newest.replace('_', ' ')}"
     claims = explanation.after.fitted.hypothesis.claims
-    if total_gain.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
+    if total_gain.gain < NAMED_CEILING_SHARE and not all(_is_named_by_balance(claim, balances) for claim in claims):
         return "it explains less than half of the error's power, and the force balance does not confirm it"
     return ""
 
@@ -135,7 +138,7 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
     return claim.effect.name in names
 
 
-def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[Unconfirmed, ...]:
+def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[UnconfirmedEffect, ...]:
     """List the best candidates of the round in which the search ended that have a positive held-out gain, at most one
     per effect, the largest gain first. reason: why the best of them is not named."""
     rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
@@ -152,13 +155,15 @@ def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[Unconfirmed, .
         )
         if gain is not None and gain.gain > 0:
             unconfirmed.append(
-                Unconfirmed(candidate.fitted.hypothesis, gain.gain, reason if rank == 0 else _explain_not_best(gain))
+                UnconfirmedEffect(
+                    candidate.fitted.hypothesis, gain.gain, reason if rank == 0 else _explain_not_best(gain)
+                )
             )
     return tuple(sorted(unconfirmed, key=lambda item: -item.gain))
 
 
 def _explain_not_best(gain: HeldOutGain) -> str:
-    """Explain, as a sentence, why a candidate other than the best is not named."""
+    """Explain, as a clause, why a candidate other than the best is not named."""
     if gain.low <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
     return "another candidate has a smaller error on the data that were fitted"

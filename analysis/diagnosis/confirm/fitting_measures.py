@@ -2,8 +2,8 @@
 
 A linear model that was fitted to deviations from the mean has no constants: neither the command at the operating point
 nor the zero of a sensor. Without them, its simulation has an offset far larger than the errors of its dynamics.
-Therefore a constant is added to the commands: for positions K x = B u at rest (`shift_to_operating_point`), for
-forces the mean error (`shift_to_mean_force`).
+Therefore a constant is added to the commands: for positions K x = B u at rest (`shift_to_operating_point`), for forces
+the mean error (`shift_to_mean_force`). Called by `diagnose`, `search_by_simulation` and `force_balance_measures`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.settings import CONSTANT_LEAVES
+from analysis.diagnosis.settings import CONSTANT_ERROR_RATIO
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -27,6 +27,7 @@ CONSTANT_ADDED = (
     "The fitted model contains no constants, so a constant was added to the command that makes the mean error on the "
     "fitted data zero. It includes weights, offsets of sensor and amplifier, and the operating point of the device."
 )
+"""Remark of a diagnosis whose measure has such a constant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,9 +49,9 @@ def choose_fitting_measure(
     compared: Compared,
     about_mean: bool = False,
 ) -> FittingMeasure:
-    """The measure that `errors.choose_measure` selects. clean: recordings without the fault. compared: motion, force or
-    automatic. about_mean: whether the model was fitted to deviations from the mean; a constant command is then added
-    where that lowers the error."""
+    """Choose the measure that `errors.choose_measure` selects. clean: recordings without the fault. compared: motion,
+    force or automatic. about_mean: whether the model was fitted to deviations from the mean; a constant command is then
+    added where that lowers the error."""
     fitting = FittingMeasure(model, make_measure(recordings, model, clean, compared))
     if not about_mean or clean:
         return fitting
@@ -65,7 +66,7 @@ def choose_fitting_measure(
     shifted_choice = make_measure(shifted_recordings, model, clean, compared)
     if shifted_choice.measure.name != measure.name or _compute_error_over_noise(
         model, shifted_choice
-    ) > CONSTANT_LEAVES * _compute_error_over_noise(model, fitting.chosen):
+    ) > CONSTANT_ERROR_RATIO * _compute_error_over_noise(model, fitting.chosen):
         return fitting
     return FittingMeasure(model, replace(shifted_choice, remarks=(*shifted_choice.remarks, CONSTANT_ADDED)))
 
@@ -73,8 +74,8 @@ def choose_fitting_measure(
 def shift_to_mean_force(
     recordings: Sequence[Recording], model: MechanicalModel, measure: PredictedForce
 ) -> tuple[Recording, ...]:
-    """The recordings with a constant added to their commands, so that the mean error of the predicted force is zero
-    over the samples to fit and to choose by."""
+    """Add a constant to the commands of the recordings, so that the mean error of the predicted force is zero over the
+    samples to fit and to choose by."""
     residuals = measure.residuals(model, ())
     errors = np.concatenate(
         [residual[record.fit | record.choose] for residual, record in zip(residuals, measure.records, strict=True)]
@@ -83,7 +84,8 @@ def shift_to_mean_force(
 
 
 def _compute_error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> float:
-    """Error of the unchanged model over the noise, on the samples to fit and to choose by."""
+    """Compute the error of the unchanged model over the noise in its worst channel, on the samples to fit and to choose
+    by."""
     measure = chosen.measure
     tuning = make_tuning(model, measure.records[0].recording.command.channels)
     nominal_fit = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
@@ -91,12 +93,13 @@ def _compute_error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> 
 
 
 LEAST_STIFFNESS_RATIO = 1e-6
-"""Least ratio of the smallest to the largest singular value of the stiffness at which a position is held; heuristic."""
+"""Least ratio of the smallest to the largest singular value of the stiffness at which a position is held; chosen by
+hand."""
 
 
 def shift_to_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:
-    """The recordings with a constant added to their commands, for which the model at rest is at the mean measured
-    position: u = pinv(C K^-1 B) mean(y) - mean(command), over the samples to fit and to choose by. None where the
+    """Add to the commands of the recordings the constant u = pinv(C K^-1 B) mean(y) - mean(command), for which the
+    model at rest is at the mean measured position; means over the samples to fit and to choose by. None where the
     response is not a position, or no stiffness holds it."""
     if DERIVATIVE_OF_QUANTITY[model.quantity] != 0:
         return None
@@ -109,7 +112,7 @@ def shift_to_operating_point(recordings: Sequence[Recording], model: MechanicalM
 
 
 def add_to_commands(recordings: Sequence[Recording], constant: FloatArray) -> tuple[Recording, ...]:
-    """The recordings with a constant, (m,), added to every sample of their commands."""
+    """Add a constant (m,) to every sample of the commands."""
     return tuple(
         replace(recording, command=replace(recording.command, samples=recording.command.samples + constant))
         for recording in recordings
@@ -117,7 +120,7 @@ def add_to_commands(recordings: Sequence[Recording], constant: FloatArray) -> tu
 
 
 def _compute_means(recordings: Sequence[Recording], responses: int) -> tuple[FloatArray, FloatArray]:
-    """Means of commands (m,) and responses (p,) over the samples to fit and to choose by."""
+    """Compute the means of commands (m,) and responses (p,) over the samples to fit and to choose by."""
     records = observe_parts(recordings, responses)
     masks = [record.fit | record.choose for record in records]
     commands = np.vstack([record.command[mask] for record, mask in zip(records, masks, strict=True)])

@@ -20,7 +20,7 @@ from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, ma
 from analysis.diagnosis.first_model.model_from_balance import build_first_model, compute_law_power_share
 from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.settings import LAWS_WITHIN
+from analysis.diagnosis.settings import LAW_BAND_POWER_SHARE
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
@@ -38,9 +38,9 @@ def list_fitting_measures(
 
     A recording without a time axis, or of a free motion, has a single measure. Else first a free simulation, or a
     simulation in windows, where the fitted model allows it. Then the force predicted along the measured motion with the
-    linear parameters of the balances: in the band where noise is small, if that contains at least `LAWS_WITHIN` of each
-    law's power, and in the band of the balances. compared: "motion" or "force" restricts the measures to that quantity.
-    """
+    linear parameters of the balances: in the band where noise is small, if that contains at least
+    `LAW_BAND_POWER_SHARE` of each law's power, and in the band of the balances. compared: "motion" or "force" restricts
+    the measures to that quantity."""
     if not any(balance.named for balance in balances):
         return
     motion_choice = make_measure(recordings, model)
@@ -60,7 +60,7 @@ def list_fitting_measures(
             power_share = 0.0
             if isinstance(narrow_band_choice.measure, PredictedForce):
                 power_share = compute_law_power_share(balances, narrow_band_choice.measure.band_hz)
-            if power_share >= LAWS_WITHIN:
+            if power_share >= LAW_BAND_POWER_SHARE:
                 yield FittingMeasure(linear_model, narrow_band_choice, narrow=True)
             band_hz = balances[0].search.regression.motions[0].band_hz
             yield FittingMeasure(linear_model, make_force_measure(reduced_recordings, linear_model, band_hz))

@@ -1,7 +1,8 @@
 """Convert laws named by a force balance to hypotheses for output-error fits, with starting parameters.
 
 A law of the catalogue becomes the effect of the same name with the fitted parameters; a law outside the catalogue
-becomes a formula in the language of `equalizer.laws`. Called by `confirm_laws`, which fits these hypotheses.
+becomes a formula in the language of `equalizer.laws`. Called by `confirm_laws`, which fits these hypotheses;
+`result.candidates` calls `write_law`.
 """
 
 import re
@@ -42,14 +43,14 @@ def write_law(formula: Formula, axis_letter: str) -> Law:
     return Law(law_text, formula.numbers, (), formula.acts_on, axis_letter)
 
 
-def can_be_simulated(own_channel: int, judged_law: JudgedLaw) -> bool:
+def can_be_simulated(driven_channel: int, judged_law: JudgedLaw) -> bool:
     """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue that depends on the
-    motion along its force and has values of all parameters within their bounds (included). own_channel: index of the
+    motion along its force and has values of all parameters within their bounds (included). driven_channel: index of the
     channel of that motion."""
     if judged_law.formula is not None:
         return True
     effect = EFFECTS.get(judged_law.law.effect)
-    if effect is None or judged_law.law.channel != own_channel:
+    if effect is None or judged_law.law.channel != driven_channel:
         return False
     return all(
         parameter.name in judged_law.values and parameter.lower <= judged_law.values[parameter.name] <= parameter.upper
@@ -137,8 +138,8 @@ def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> H
 def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Compute the starting deviations of mass, damping and stiffness, in standard deviations: from the model's values
     to those that the balance fits together with the laws. Zeros unless there is a single balance, without a given
-    model, and the model has one coordinate. A mass is at least a tenth of the model's (chosen); deviations are
-    clipped to 3.9, just within `RETUNING_BOUND` = 4. laws: indices of the named laws in the regression."""
+    model, and the model has one coordinate. A mass is at least a tenth of the model's (chosen); deviations are clipped
+    to 3.9, just within `RETUNING_BOUND` = 4. laws: indices of the named laws in the regression."""
     deviations = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
         return deviations
@@ -146,7 +147,7 @@ def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], law
     if len(balances) != 1 or model.coordinates != 1:
         return deviations
     regression = balances[0].search.regression
-    weights = regression.fit_weights(regression.select_columns(laws))[: regression.matrices]
+    weights = regression.fit_weights(regression.select_columns(laws))[: regression.matrix_column_count]
     matrices = (model.mass, model.damping, model.stiffness)
     for parameter_index, (weight, matrix) in enumerate(zip(weights, matrices, strict=False)):
         if tuning.deviation[parameter_index] == 0:  # the parameter is not tuned

@@ -1,10 +1,9 @@
 """Withdraws the names of effects of a search whose model was fitted to the same recordings.
 
 The parameters of such a model have absorbed part of a missing law, and a wrong law may imitate the remainder. Therefore
-an effect must remove at least `FURTHER_LAW_OF_ALL` of the held-out error power, as the laws of a force balance must
-(`require_enough_gain`); effects of actuator and sensor become candidates, unless the signal itself shows them
-(`withdraw_doubtful_names`). Called by `search_by_simulation` and `diagnose`.
-"""
+an effect must remove at least `FURTHER_LAW_SHARE` of the held-out error power, as the laws of a force balance
+must (`require_enough_gain`); effects of actuator and sensor become candidates, unless the signal itself shows them
+(`withdraw_doubtful_names`). Called by `search_by_simulation` and `diagnose`."""
 
 from dataclasses import replace
 
@@ -14,8 +13,8 @@ from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain, pre
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
-from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
+from analysis.diagnosis.search.verdict import SearchResult, UnconfirmedEffect, judge
+from analysis.diagnosis.settings import FURTHER_LAW_SHARE
 
 CONSTANT_FORCE = "constant_force"
 """Name of the effect of a constant force."""
@@ -52,11 +51,11 @@ def require_enough_gain(result: SearchResult, noise_is_measured: bool) -> Search
 
 
 def _removes_enough(context: SearchContext, explanation: Explanation) -> bool:
-    """Whether the last effect removes at least `FURTHER_LAW_OF_ALL` of the held-out error power that remains with the
-    effects before it. True where nothing is held out: both errors are then infinite."""
+    """Whether the last effect removes at least `FURTHER_LAW_SHARE` of the held-out error power that remains with
+    the effects before it. True where nothing is held out: both errors are then infinite."""
     previous_step = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
     # `held_out_error` is a logarithm of rms errors, and thus half of the logarithm of the error power.
-    return not explanation.after.held_out_error > previous_step.held_out_error + np.log(1 - FURTHER_LAW_OF_ALL) / 2
+    return not explanation.after.held_out_error > previous_step.held_out_error + np.log(1 - FURTHER_LAW_SHARE) / 2
 
 
 def withdraw_doubtful_names(result: SearchResult) -> SearchResult:
@@ -77,7 +76,7 @@ def withdraw_doubtful_names(result: SearchResult) -> SearchResult:
         gain = estimate_held_out_gain(context.full_measure, explanation.plain, context.with_test_score(step))
         if gain is not None and gain.gain > 0:
             reason = MODEL_DIVERGES_REASON if step.newest in EFFECTS_VISIBLE_IN_SIGNAL else MODEL_FITTED_REASON
-            candidates.append(Unconfirmed(step.fitted.hypothesis, gain.gain, reason))
+            candidates.append(UnconfirmedEffect(step.fitted.hypothesis, gain.gain, reason))
         explanation = remove_effect(context, explanation, step_index)
     ranked_candidates = tuple(sorted(candidates, key=lambda candidate: -candidate.gain))
     return replace(

@@ -1,4 +1,5 @@
-"""Faults of an actuator, each as the change of the recorded command that undoes it. Called by `rank_faults`.
+"""Faults of an actuator, each as the change of the recorded command that undoes it. Called by `rank_faults`;
+`sensor_faults` uses its grids.
 
 A recording holds the command u that was sent; a faulty actuator delivered a force g(u) instead. The faulty recording is
 explained by the intact device where u is replaced by g(u): "undoing" a fault therefore means to put the delivered force
@@ -9,6 +10,9 @@ in the place of the command. The laws g at size 1 are as listed; other sizes s u
     transport_delay   u(t - T)                       amplifier_lag     u / (T s + 1)
     force_saturation  u clipped to +-limit           slew_limit        u with |du/dt| <= rate
     force_deadband    sgn(u) max(|u| - width, 0)
+
+Grids and bounds of sizes are chosen by hand: they span the magnitudes at which a fault alters the command noticeably,
+but does not suppress it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -39,9 +43,9 @@ SIZE_RANGE = (0.75, 1.35)
 """Range of sizes within which a change that is nonlinear in its size is scaled, before it is linearised about another
 size. By hand."""
 GRID_SIZE = 12
-"""Number of sizes on the logarithmic grid of a fault that is nonlinear in its size."""
+"""Number of sizes on the logarithmic grid of a fault that is nonlinear in its size; for delays, the least number."""
 EARLIER_DRIFT_SHARES = (0.0, 0.25, 0.5)
-"""Shares of a drift that are assumed to have occurred before the recording began."""
+"""Shares of a drift that are assumed to have occurred before the recording began. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +59,12 @@ class _Axis:
         """Make a fault of this axis's actuator with these variants."""
         return Fault(effect, "actuator", self.name, self.index, tuple(variants))
 
-    def make_undo(self, delivered: CommandChange) -> Undo:
+    def make_undo(self, compute_delivered: CommandChange) -> Undo:
         """Make the function that replaces this axis's command by the force that the faulty actuator delivered."""
 
         def undo(part: Part) -> Part:
             command = part.command.copy()
-            command[:, self.index] = delivered(command[:, self.index], part.rate_hz)
+            command[:, self.index] = compute_delivered(command[:, self.index], part.rate_hz)
             return replace(part, command=command)
 
         return undo
@@ -91,10 +95,13 @@ def make_actuator_faults(
     command_shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / peak
     limits = sorted(peak * share for share in (*command_shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
     yield axis.make_fault("force_saturation", [_make_saturation(axis, limit) for limit in limits])
-    fastest = max(float(np.abs(np.diff(part.command[:, axis_index])).max(initial=0.0)) * part.rate_hz for part in parts)
-    if fastest > 0:
+    fastest_rate = max(
+        float(np.abs(np.diff(part.command[:, axis_index])).max(initial=0.0)) * part.rate_hz for part in parts
+    )
+    if fastest_rate > 0:
         yield axis.make_fault(
-            "slew_limit", [_make_slew_limit(axis, float(rate)) for rate in fastest * np.geomspace(0.01, 0.9, GRID_SIZE)]
+            "slew_limit",
+            [_make_slew_limit(axis, float(rate)) for rate in fastest_rate * np.geomspace(0.01, 0.9, GRID_SIZE)],
         )
     yield axis.make_fault(
         "force_deadband", [_make_deadband(axis, float(width)) for width in rms * np.geomspace(0.02, 1.5, GRID_SIZE)]
@@ -106,6 +113,7 @@ def _make_gain_faults(axis: _Axis, by_force: bool) -> Iterator[Fault]:
     is 1 / (1 + s), and the delivered force elsewhere, so that it is 1 + s."""
 
     def compute_gain(size: float) -> float:
+        """Compute the gain of the faulty actuator."""
         return 1 / (1 + size) if by_force else 1 + size
 
     yield axis.make_fault("force_gain", [
@@ -120,11 +128,11 @@ def _make_gain_faults(axis: _Axis, by_force: bool) -> Iterator[Fault]:
 
 
 def _make_gain_drift(axis: _Axis, earlier_share: float, parameters_of: ParametersOf) -> Variant:
-    """A gain that drifts linearly. earlier_share: share of the drift before the file began. parameters_of: maps the
-    size to the parameter of the effect."""
+    """Make the variant of a gain that drifts linearly. earlier_share: share of the drift before the file began.
+    parameters_of: maps the size to the parameter of the effect."""
 
     def compute_gain_ramp(part: Part, count: int) -> FloatArray:
-        """(count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
+        """Compute (count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
         gain = 1 + compute_drift_shape(part, earlier_share)
         return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(gain)), gain)[:, None]
 
@@ -145,7 +153,7 @@ def compute_drift_shape(part: Part, earlier_share: float) -> FloatArray:
 
 
 def _make_delay(axis: _Axis, time_s: float) -> Variant:
-    """A transport delay by `time_s`: samples before it are no longer known."""
+    """Make the variant of a transport delay by `time_s`: samples before it are not known any more."""
     # The command at t acts on the motion at t + T.
     change: ColumnChange = lambda x, rate, part: shift_samples(x, -time_s * rate)  # noqa: E731
 
@@ -160,7 +168,7 @@ def _make_delay(axis: _Axis, time_s: float) -> Variant:
 
 
 def _make_lag(axis: _Axis, time_s: float) -> Variant:
-    """A first-order lag of the amplifier with the time constant `time_s`."""
+    """Make the variant of a first-order lag of the amplifier with the time constant `time_s`."""
     # The command is (1 + T s) times the delivered force.
     undo = axis.make_undo(lambda u, rate: apply_lag(u, time_s * rate))
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
@@ -171,18 +179,18 @@ def _make_lag(axis: _Axis, time_s: float) -> Variant:
 
 
 def _make_saturation(axis: _Axis, limit: float) -> Variant:
-    """A saturation at +-limit, in the command's unit."""
+    """Make the variant of a saturation at +-limit, in the command's unit."""
     return Variant((axis.make_undo(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
 
 
 def _make_slew_limit(axis: _Axis, limit: float) -> Variant:
-    """A slew-rate limit, in the command's unit per second."""
+    """Make the variant of a slew-rate limit, in the command's unit per second."""
     undo = axis.make_undo(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
     return Variant((undo,), lambda s: {"rate": limit}, 0.6, 1.5)
 
 
 def _make_deadband(axis: _Axis, width: float) -> Variant:
-    """A dead band from -width to width, in the command's unit."""
+    """Make the variant of a dead band from -width to width, in the command's unit."""
     undo = axis.make_undo(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
     at_size = lambda size: _make_deadband(axis, size * width)  # noqa: E731
     return Variant((undo,), scale_parameter("width", width), *SIZE_RANGE, at_size=at_size)

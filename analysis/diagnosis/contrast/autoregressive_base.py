@@ -3,7 +3,7 @@ from the past of all responses y and of all commands u,
 
     y_i(t) = sum over k = 1..n of a_k' y(t - k) + sum over k = 0..n of b_k' u(t - k) + c + e(t).
 
-Used by `bases` for devices that no force balance describes: voltages as responses, many modes.
+Called by `bases` for devices that no force balance describes: voltages as responses, many modes.
 """
 
 from collections.abc import Sequence
@@ -91,7 +91,8 @@ class AutoregressiveBase:
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
-    """Low-pass filter samples (n, k) to 0.4 times the new rate (anti-aliasing), then keep every `step`-th one."""
+    """Low-pass filter samples (n, k) to 0.4 times the new rate, below its half (anti-aliasing), then keep every
+    `step`-th one."""
     return samples if step == 1 else filter_low_pass(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 

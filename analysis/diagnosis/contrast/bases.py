@@ -10,16 +10,16 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, choose_decimation_step
-from analysis.diagnosis.contrast.compared_base import FEWEST_ROWS, Base
+from analysis.diagnosis.contrast.compared_base import LEAST_ROWS, Base
 from analysis.diagnosis.contrast.force_base import build_force_base
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
+from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, CONSTANT_SIGNAL, MISFIT_SHARE, MOST_MOTION_RATIO
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 
 def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
-    """Build force balances, one per axis, where all explain the clean set to within `BALANCE_HOLDS`; then
+    """Build force balances, one per axis, where all explain the clean set to within `MISFIT_SHARE`; then
     autoregressive models, one per response. Each list comes with the motions of both sets, which are empty where no
     motion was measured. clean: at least one part; faulty: may be empty."""
     recording = clean[0].recording
@@ -37,11 +37,11 @@ def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[t
             bases: list[Base] = [
                 build_force_base(motions, axis, is_rotational) for axis in range(len(recording.command.channels))
             ]
-            force_bases = bases if all(compute_unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
+            force_bases = bases if all(compute_unexplained_share(base, clean) < MISFIT_SHARE for base in bases) else []
     if force_bases:
         yield force_bases, motions
     fewest_known_samples = min(sum(len(part.known) for part in part_set) for part_set in (clean, faulty) if part_set)
-    step = max(min(choose_decimation_step((*clean, *faulty)), fewest_known_samples // (2 * FEWEST_ROWS)), 1)
+    step = max(min(choose_decimation_step((*clean, *faulty)), fewest_known_samples // (2 * LEAST_ROWS)), 1)
     response_count = len(recording.response.channels)
     yield (
         [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step, response_count) for channel in range(response_count)],
@@ -50,7 +50,7 @@ def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[t
 
 
 def have_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
-    """Whether the rms of each detrended response differs between the two sets by at most a factor `MOTIONS_APART`.
+    """Whether the rms of each detrended response differs between the two sets by at most a factor `MOST_MOTION_RATIO`.
     Neither set is empty."""
     response_rms = np.array(
         [
@@ -58,7 +58,7 @@ def have_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bo
             for part_set in (clean, faulty)
         ]
     )
-    return bool(np.all(response_rms.max(axis=0) <= MOTIONS_APART * response_rms.min(axis=0)))
+    return bool(np.all(response_rms.max(axis=0) <= MOST_MOTION_RATIO * response_rms.min(axis=0)))
 
 
 def _compute_detrended_mean_squares(part: Part) -> FloatArray:

@@ -21,13 +21,13 @@ from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     BOOTSTRAP_LEVEL,
-    FAULT_BEYOND,
-    FAULT_MAIN_PART,
-    FAULT_RIVAL_BEHIND,
-    FAULT_RIVAL_WORSE,
-    FAULT_STEADY,
+    FAULT_GAIN_FACTOR,
+    FAULT_INTERVAL_RATIO,
+    FAULT_RIVAL_ERROR_MARGIN,
+    FAULT_RIVAL_GAIN_MARGIN,
     LARGEST_FAULT_CLASS,
     LEAST_FAULT_GAIN,
+    LEAST_FAULT_SHARE,
 )
 
 T_QUANTILE = float(stdtrit(FOLDS - 1, 0.975))
@@ -63,7 +63,7 @@ class Decision:
 
 def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     """Choose the fault or class to name, and list the other candidates. response_count: number of response channels."""
-    tested = [(fault, _find_objection(fault, comparison.sets_differ_without(fault))) for fault in comparison.faults]
+    tested = [(fault, _find_objection(fault, comparison.has_difference_without(fault))) for fault in comparison.faults]
     accepted = [fault for fault, flaw in tested if flaw == ""]
     unnamed = tuple((fault, flaw) for fault, flaw in tested if fault.gain > 0 and flaw)
     if not accepted:
@@ -88,7 +88,7 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     reason = ""
     if better_faults:
         reason = f"{get_noun(better_faults[0].fault.effect)} explains more, but is not significant itself"
-    elif best.share < FAULT_MAIN_PART:
+    elif best.share < LEAST_FAULT_SHARE:
         reason = (
             f"it explains {100 * best.share:.0f} % of the difference between these recordings: the main cause is "
             "another"
@@ -137,19 +137,22 @@ def _choose_simplest(accepted_faults: Sequence[JudgedFault], comparison: Compari
 def _find_objection(fault: JudgedFault, sets_differ: bool) -> str:
     """Find the reason not to name a fault; empty if it passes all tests. sets_differ: whether the clean and the faulty
     set differ by more than stretches of a single set do. If not, the gain must be steady: its lower bound at least
-    `FAULT_STEADY` of it, and the fault constant during a recording."""
+    `FAULT_INTERVAL_RATIO` of it, and the fault constant during a recording."""
     if fault.gain < LEAST_FAULT_GAIN or fault.gain_low <= 0:
         return "its gain is not larger than its variation between stretches of the recordings"
-    is_steady = fault.gain_low >= FAULT_STEADY * fault.gain and not fault.fault.varies
+    is_steady = fault.gain_low >= FAULT_INTERVAL_RATIO * fault.gain and not fault.fault.varies
     if not sets_differ and not is_steady:
         return "stretches of one set differ as much as the sets do"
-    if fault.gain <= FAULT_BEYOND * fault.control_gain:
+    if fault.gain <= FAULT_GAIN_FACTOR * fault.control_gain:
         return (
             f"its gain between stretches of one set is {fault.control_gain:.2g} already, and {fault.gain:.2g} between "
             "the two sets"
         )
     main_parameter = next(iter(fault.values))
-    if abs(_compute_distance_from_no_fault(fault, main_parameter)) <= T_QUANTILE * fault.spread[main_parameter]:
+    if (
+        abs(_compute_distance_from_no_fault(fault, main_parameter))
+        <= T_QUANTILE * fault.standard_errors[main_parameter]
+    ):
         return "the confidence interval of its parameter includes the value without the fault"
     return ""
 
@@ -186,11 +189,12 @@ def _sum_gap(rival: JudgedFault, best: JudgedFault) -> float:
 
 def _find_least_gap(best: JudgedFault, comparison: Comparison) -> float:
     """Find the difference between the error sums of a rival and the best above which they are distinguished: the
-    smaller of `FAULT_RIVAL_BEHIND` of the reduction by the best and `FAULT_RIVAL_WORSE` of its remaining error."""
+    smaller of `FAULT_RIVAL_GAIN_MARGIN` of the reduction by the best and `FAULT_RIVAL_ERROR_MARGIN` of its remaining
+    error."""
     remaining_error = float(best.block_squares.sum())
     return min(
-        FAULT_RIVAL_BEHIND * (float(comparison.block_squares.sum()) - remaining_error),
-        FAULT_RIVAL_WORSE * remaining_error,
+        FAULT_RIVAL_GAIN_MARGIN * (float(comparison.block_squares.sum()) - remaining_error),
+        FAULT_RIVAL_ERROR_MARGIN * remaining_error,
     )
 
 

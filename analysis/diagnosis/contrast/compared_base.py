@@ -29,11 +29,11 @@ from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
-Base = ForceBase | AutoregressiveBase | SensorBase
+Base = ForceBase | AutoregressiveBase | SensorBase  # model that predicts one signal
 REACH = 2 * CONTRAST_WHITENING_ORDER
 """Rows left out at the ends of a part and near rare gaps: the range of the whitening filter, which starts from rest,
 and of the differentiation. On real recordings, errors there were up to 20 times the rms."""
-FEWEST_ROWS = CONTRAST_BLOCKS * REACH
+LEAST_ROWS = CONTRAST_BLOCKS * REACH
 """Least rows of each set. A block must be longer than the correlation time of the errors: otherwise resampling is
 invalid."""
 
@@ -49,7 +49,7 @@ class RecordingSet:
     """Per part (n,): rows that are valid, and beyond the reach of gaps and ends."""
     scale: float
     """s: rms of the whitened error of a base fitted to this set alone, relative to the rms of the predicted signal."""
-    white: FloatArray
+    whitened: FloatArray
     """(valid samples, 1 + columns): the rows, whitened and scaled."""
 
     @property
@@ -79,10 +79,10 @@ class ComparedBase:
     """The recordings to diagnose."""
     whitening: FloatArray
     """(k,): impulse response of the whitening filter A(q); the first is 1."""
-    columns: FloatArray
+    column_rms: FloatArray
     """(1 + columns,): rms of each column, by which the rows are divided before products are formed."""
     gap_reach: int
-    """Number of rows next to a gap that are left out; see `_choose_gap_reach`."""
+    """Number of rows next to a gap that are left out: `REACH`, or 0 where gaps are frequent."""
 
     @property
     def row_s(self) -> float:
@@ -90,49 +90,49 @@ class ComparedBase:
         base = self.base
         return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
 
-    def compute_grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> GramBlocks:
-        """Gram matrices of a set's rows and of their changes by undone faults; see `GramBlocks`. side: the set."""
-        changed_columns = [_find_changed_columns(undone.rows, side.rows) for undone in changed]
+    def compute_grams(self, data: RecordingSet, changed: Sequence[UndoneRows]) -> GramBlocks:
+        """Compute the Gram matrices of a set's rows and of their changes by undone faults. data: the set."""
+        changed_columns = [_find_changed_columns(undone.rows, data.rows) for undone in changed]
         joint_rows = np.hstack(
-            [side.white, *(self._whiten_changes(side, *pair) for pair in zip(changed, changed_columns, strict=True))]
+            [data.whitened, *(self._whiten_changes(data, *pair) for pair in zip(changed, changed_columns, strict=True))]
         )
         return GramBlocks(
             np.array([block.T @ block for block in np.array_split(joint_rows, CONTRAST_BLOCKS)]),
             tuple(changed_columns),
-            len(self.columns),
+            len(self.column_rms),
         )
 
-    def _whiten_changes(self, side: RecordingSet, undone: UndoneRows, columns: ColumnIndices) -> FloatArray:
-        """(valid samples, k): the changes of the columns `columns`, whitened."""
+    def _whiten_changes(self, data: RecordingSet, undone: UndoneRows, columns: ColumnIndices) -> FloatArray:
+        """Compute (valid samples, k): the changes of the columns `columns`, whitened."""
         differences = [
-            part[:, columns] - original[:, columns] for part, original in zip(undone.rows, side.rows, strict=True)
+            part[:, columns] - original[:, columns] for part, original in zip(undone.rows, data.rows, strict=True)
         ]
-        white = _whiten(self.whitening, differences, side.masks) / (self.columns[columns] * side.scale)
+        white = _whiten(self.whitening, differences, data.masks) / (self.column_rms[columns] * data.scale)
         if undone.lost is not None:
-            white[np.concatenate([lost[mask] for lost, mask in zip(undone.lost, side.masks, strict=True)])] = 0.0
+            white[np.concatenate([lost[mask] for lost, mask in zip(undone.lost, data.masks, strict=True)])] = 0.0
         return np.asarray(white)
 
 
 def _whiten(whitening: FloatArray, rows: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
-    """(valid samples, k): rows of all parts through the whitening filter."""
+    """Filter the rows of all parts by the whitening filter: (valid samples, k)."""
     return np.concatenate([apply_filter(whitening, part)[mask] for part, mask in zip(rows, masks, strict=True)])
 
 
 def apply_filter(impulse_response: FloatArray, samples: FloatArray) -> FloatArray:
-    """(n, k): samples through a filter with a finite impulse response, from rest."""
+    """Filter samples (n, k) by a finite impulse response (m,), from rest."""
     length = next_fast_len(len(samples) + len(impulse_response) - 1, True)  # a linear, not a circular, convolution
     product = rfft(samples, length, axis=0) * rfft(impulse_response, length)[:, None]
     return np.asarray(irfft(product, length, axis=0)[: len(samples)])
 
 
 def _find_changed_columns(rows: Sequence[FloatArray], original: Sequence[FloatArray]) -> ColumnIndices:
-    """Indices of the columns in which the rows differ."""
-    largest = np.array([np.abs(a - b).max(axis=0) for a, b in zip(rows, original, strict=True)])
-    return np.flatnonzero(largest.max(axis=0) > 0.0)
+    """Find the indices of the columns in which the rows differ."""
+    changes = np.array([np.abs(new - old).max(axis=0) for new, old in zip(rows, original, strict=True)])
+    return np.flatnonzero(changes.max(axis=0) > 0.0)
 
 
 def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> ComparedBase:
-    """Both sets as whitened and scaled rows of a base. Raises ValueError where a set has too few valid rows,
+    """Compare both sets as whitened and scaled rows of a base. Raises ValueError where a set has too few valid rows,
     numpy.linalg.LinAlgError where the base cannot be fitted."""
     if isinstance(base, AutoregressiveBase):
         least_samples = (base.order + 2 * REACH) * base.step
@@ -140,25 +140,25 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     rows = base.build_rows(clean), base.build_rows(faulty)
     valid = tuple(base.mask_valid_samples(parts) for parts in (clean, faulty))
     gap_reach = min(_choose_gap_reach(side) for side in valid)
-    masks = tuple(tuple(_mark_interior(mask, gap_reach) for mask in side) for side in valid)
-    fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
-    if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
+    masks = tuple(tuple(_mask_interior(mask, gap_reach) for mask in side) for side in valid)
+    least_rows = max(LEAST_ROWS, 2 * rows[0][0].shape[1])
+    if any(sum(int(mask.sum()) for mask in side) < least_rows for side in masks):
         raise ValueError("too few samples of one of the two sets remain for a comparison")
     all_rows = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
-    columns = np.sqrt(np.mean(all_rows**2, axis=0))
-    columns = np.where(columns > 0, columns, 1.0)
-    residuals = [_compute_residuals(rows[side], masks[side], columns) for side in (0, 1)]
+    column_rms = np.sqrt(np.mean(all_rows**2, axis=0))
+    column_rms = np.where(column_rms > 0, column_rms, 1.0)
+    residuals = [_compute_residuals(rows[side], masks[side], column_rms) for side in (0, 1)]
     whitening = _fit_whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
     sides = []
     for parts, side_rows, side_masks in zip((clean, faulty), rows, masks, strict=True):
-        white = _whiten(whitening, side_rows, side_masks) / columns
+        white = _whiten(whitening, side_rows, side_masks) / column_rms
         scale = _compute_white_error(white)
         sides.append(RecordingSet(tuple(parts), side_rows, side_masks, scale, white / scale))
-    return ComparedBase(base, sides[0], sides[1], whitening, columns, gap_reach)
+    return ComparedBase(base, sides[0], sides[1], whitening, column_rms, gap_reach)
 
 
-def _mark_interior(valid: Mask, gap_reach: int) -> Mask:
-    """Valid rows that neither the ends of a part nor gaps reach."""
+def _mask_interior(valid: Mask, gap_reach: int) -> Mask:
+    """Mask the valid rows (n,) at least `gap_reach` rows from gaps and `REACH` rows from the ends of the valid rows."""
     invalid = np.pad(~valid, gap_reach)
     settled = np.array(np.convolve(invalid, np.ones(2 * gap_reach + 1), "valid") == 0)
     indices = np.flatnonzero(valid)
@@ -169,29 +169,30 @@ def _mark_interior(valid: Mask, gap_reach: int) -> Mask:
 
 
 def _choose_gap_reach(valid: Sequence[Mask]) -> int:
-    """`REACH`; 0 where single losses are so frequent that most of a set's rows would be lost: interpolation over a
-    sample or two is then good enough."""
-    all_rows, settled_rows = (sum(int(_mark_interior(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
+    """Choose `REACH`; 0 where single losses are so frequent that most of a set's rows would be lost: interpolation over
+    a sample or two is then good enough."""
+    all_rows, settled_rows = (sum(int(_mask_interior(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
     return REACH if settled_rows >= LEAST_GAPLESS_SHARE * all_rows else 0
 
 
-def _compute_residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:
-    """Per part (kept,): errors of a base fitted to the masked rows by ordinary least squares, in units of y."""
-    scaled = np.vstack([part[mask] for part, mask in zip(rows, masks, strict=True)]) / columns
+def _compute_residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], column_rms: FloatArray) -> list[FloatArray]:
+    """Compute per part (n,): errors of a base fitted to the masked rows by ordinary least squares, in units of y."""
+    scaled = np.vstack([part[mask] for part, mask in zip(rows, masks, strict=True)]) / column_rms
     weights = solve_residual_weights(scaled.T @ scaled)
-    return [part @ (weights / columns) * columns[0] for part in rows]
+    return [part @ (weights / column_rms) * column_rms[0] for part in rows]
 
 
 def _compute_white_error(white: FloatArray) -> float:
-    """Rms error of a base fitted to these whitened rows alone, over the rms of the predicted signal."""
+    """Compute the rms error of a base fitted to these whitened rows alone, over the rms of the predicted signal; at
+    least 1e-9."""
     gram = white.T @ white / len(white)
     weights = solve_residual_weights(gram)
     return max(float(np.sqrt(max(float(weights @ gram @ weights), 0.0))), 1e-9)
 
 
 def _fit_whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
-    """(k,): prediction-error filter of the autoregression of these errors, by the Yule-Walker equations; (1,) where all
-    errors are zero."""
+    """Fit (k,): prediction-error filter of the autoregression of these errors, by the Yule-Walker equations; (1,) where
+    all errors are zero."""
     masked = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
     autocovariance = np.sum(
         [
@@ -208,19 +209,19 @@ def _fit_whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -
     return np.asarray(np.concatenate([[1.0], -coefficients]))
 
 
-def undo_fault_in_rows(compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant) -> list[UndoneRows]:
-    """Rows of a set with a fault of size 1 undone, for each size parameter of the variant."""
+def undo_fault_in_rows(compared: ComparedBase, data: RecordingSet, fault: Fault, variant: Variant) -> list[UndoneRows]:
+    """Undo a fault of size 1 in the rows of a set, for each size parameter of the variant."""
     base = compared.base
     is_predicted = _is_predicted(base, fault)
     if is_predicted and variant.column_change is not None and isinstance(base, ForceBase):
-        return [_add_fault_to_regressors(base, side, variant.column_change)]
-    undone = [_undo_in_recordings(compared, side, undo) for undo in variant.undo]
+        return [_add_fault_to_regressors(base, data, variant.column_change)]
+    undone = [_undo_in_recordings(compared, data, undo) for undo in variant.undo]
     if not is_predicted:
         return undone
-    corrections = [_compute_error_factor(compared, side, fault, variant, undone_rows) for undone_rows in undone]
+    error_factors = [_compute_error_factor(compared, data, fault, variant, undone_rows) for undone_rows in undone]
     return [
         undone_rows if factor == 1.0 else replace(undone_rows, rows=tuple(factor * part for part in undone_rows.rows))
-        for undone_rows, factor in zip(undone, corrections, strict=True)
+        for undone_rows, factor in zip(undone, error_factors, strict=True)
     ]
 
 
@@ -230,68 +231,69 @@ def _is_predicted(base: Base, fault: Fault) -> bool:
     return fault.place == place and fault.site in (site, ALL_CHANNELS)
 
 
-def _add_fault_to_regressors(base: ForceBase, side: RecordingSet, change: ColumnChange) -> UndoneRows:
-    """The rows with the fault added to the predictors, not taken out of the command: the predicted signal stays as
-    recorded, so that no Jacobian is needed."""
-    changed = (change(rows[:, 1:], base.rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True))
-    return UndoneRows(tuple(np.hstack([rows[:, :1], x]) for rows, x in zip(side.rows, changed, strict=True)))
+def _add_fault_to_regressors(base: ForceBase, data: RecordingSet, change: ColumnChange) -> UndoneRows:
+    """Add the fault to the regressors instead of taking it out of the command: the predicted signal stays as recorded,
+    so that no Jacobian is needed."""
+    changed = (change(rows[:, 1:], base.rate_hz, part) for rows, part in zip(data.rows, data.parts, strict=True))
+    return UndoneRows(tuple(np.hstack([rows[:, :1], x]) for rows, x in zip(data.rows, changed, strict=True)))
 
 
-def _undo_in_recordings(compared: ComparedBase, side: RecordingSet, undo: Undo) -> UndoneRows:
-    """The rows of a set's parts after undoing a fault in them."""
-    undone = tuple(undo(part) for part in side.parts)
+def _undo_in_recordings(compared: ComparedBase, data: RecordingSet, undo: Undo) -> UndoneRows:
+    """Undo a fault in a set's parts and build their rows."""
+    undone = tuple(undo(part) for part in data.parts)
     same_motion = all(
-        undone_part.response is original.response for undone_part, original in zip(undone, side.parts, strict=True)
+        undone_part.response is original.response for undone_part, original in zip(undone, data.parts, strict=True)
     )
-    rows = compared.base.build_rows(undone, side.rows if same_motion else None)
+    rows = compared.base.build_rows(undone, data.rows if same_motion else None)
     has_same_known = all(
-        undone_part.known is original.known for undone_part, original in zip(undone, side.parts, strict=True)
+        undone_part.known is original.known for undone_part, original in zip(undone, data.parts, strict=True)
     )
-    return UndoneRows(rows, None if has_same_known else _find_lost_rows(compared, side, undone))
+    return UndoneRows(rows, None if has_same_known else _find_lost_rows(compared, data, undone))
 
 
-def _find_lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
-    """Per part: rows that were known, and that depend on samples which are unknown after undoing."""
+def _find_lost_rows(compared: ComparedBase, data: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
+    """Find, per part, the rows that were known, and that depend on samples which are unknown after undoing."""
     valid = compared.base.mask_valid_samples(undone)
     return tuple(
-        mask & ~_mark_interior(valid_mask, compared.gap_reach)
-        for mask, valid_mask in zip(side.masks, valid, strict=True)
+        mask & ~_mask_interior(valid_mask, compared.gap_reach)
+        for mask, valid_mask in zip(data.masks, valid, strict=True)
     )
 
 
 def _compute_error_factor(
-    compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant, undone: UndoneRows
+    compared: ComparedBase, data: RecordingSet, fault: Fault, variant: Variant, undone: UndoneRows
 ) -> float:
-    """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the module's
-    docstring. Interpolation alone scales the errors of an autoregression by `variant.noise_factor`: divided out."""
+    """Compute the factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the
+    module's docstring. The factor by which interpolation scales errors of an autoregression is divided out."""
     factor = variant.error_factor
     if variant.curve is not None:
-        factor *= _correct_for_slope(compared, side, variant.curve)
+        factor *= _compute_slope_factor(compared, data, variant.curve)
     if isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1:
         factor /= variant.noise_factor
-    return factor * _compute_spread_ratio(side, undone.rows) if fault.place == "actuator" else factor
+    return factor * _compute_spread_ratio(data, undone.rows) if fault.place == "actuator" else factor
 
 
-def _correct_for_slope(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
-    """Factor on the errors for a curve g, whose slope would scale them: the larger of 1 over the geometric mean of |g'|
-    (the Jacobian) and 1 over the factor by which g scales the errors of the set's own base. Either factor alone would
-    favour a curve that is flat where errors are large, or steep where the sets differ least."""
-    weights = solve_residual_weights(side.white.T @ side.white) * compared.columns[0] / compared.columns
-    rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
+def _compute_slope_factor(compared: ComparedBase, data: RecordingSet, curve: Curve) -> float:
+    """Compute the factor on the errors for a curve g, whose slope would scale them: the larger of 1 over the geometric
+    mean of |g'| (the Jacobian) and 1 over the factor by which g scales the errors of the set's own base. Either factor
+    alone would favour a curve that is flat where errors are large, or steep where the sets differ least. Slopes count
+    as at least 1e-6."""
+    weights = solve_residual_weights(data.whitened.T @ data.whitened) * compared.column_rms[0] / compared.column_rms
+    rows = np.concatenate([part[mask] for part, mask in zip(data.rows, data.masks, strict=True)])
     errors = rows @ weights
     predicted = (
         compared.base.reconstruct_response(rows) if isinstance(compared.base, AutoregressiveBase) else rows[:, 0]
     ) - errors
     rms = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
     slope = np.maximum(np.abs(curve(predicted + rms) - curve(predicted - rms)) / (2 * rms), 1e-6)
-    scaled = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)
-    return max(float(np.exp(-np.mean(np.log(slope)))), rms / float(np.sqrt(scaled)))
+    curve_error_power = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)
+    return max(float(np.exp(-np.mean(np.log(slope)))), rms / float(np.sqrt(curve_error_power)))
 
 
-def _compute_spread_ratio(side: RecordingSet, rows: Sequence[FloatArray]) -> float:
-    """Standard deviation of the predicted signal before undoing over that after it: a weaker actuator must not reduce
-    all errors."""
+def _compute_spread_ratio(data: RecordingSet, rows: Sequence[FloatArray]) -> float:
+    """Compute the standard deviation of the predicted signal before undoing over that after it (1 where that is 0): a
+    weaker actuator must not reduce all errors."""
     original_spread, undone_spread = (
-        float(np.std(np.concatenate([part[:, 0] for part in side_rows]))) for side_rows in (side.rows, rows)
+        float(np.std(np.concatenate([part[:, 0] for part in side_rows]))) for side_rows in (data.rows, rows)
     )
     return original_spread / undone_spread if undone_spread > 0 else 1.0

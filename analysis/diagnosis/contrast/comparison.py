@@ -4,13 +4,13 @@ A base is a linear model of the device (`bases`) that predicts a signal from oth
 errors of one base fitted to both sets, and E0 that of a separate base for each set, the excess is E / E0 - 1. It is
 compared with the excess between stretches of a single set (negative control), where the device is the same. Undoing a
 fault means to transform the recorded signals to those without it (`fault`). Made by `rank_faults`, read by
-`choose_fault`.
+`choose_fault` and the report (`result.contrast_findings`).
 """
 
 from dataclasses import dataclass
 
 from analysis.diagnosis.contrast.fault import Fault
-from analysis.diagnosis.settings import SETS_APART, SETS_AS_ONE
+from analysis.diagnosis.settings import SAME_DEVICE_EXCESS, SETS_EXCESS_FACTOR
 from equalizer.signals.signal import FloatArray
 
 
@@ -22,7 +22,7 @@ class JudgedFault:
     fault: Fault
     values: dict[str, float]
     """Fitted parameters of the effect by name, in SI units."""
-    spread: dict[str, float]
+    standard_errors: dict[str, float]
     """Standard error of each parameter: jackknife that leaves out a sixth of either set, so that the variation within
     the clean set counts as well as that within the faulty set."""
     block_squares: FloatArray
@@ -81,15 +81,15 @@ class Comparison:
         return float(self.block_squares.sum()) / self.sample_count - 1
 
     @property
-    def sets_differ(self) -> bool:
+    def has_difference(self) -> bool:
         """Whether the two sets differ by more than stretches of one set do."""
-        return self.excess > max(SETS_AS_ONE, SETS_APART * self.control_excess)
+        return self.excess > max(SAME_DEVICE_EXCESS, SETS_EXCESS_FACTOR * self.control_excess)
 
-    def sets_differ_without(self, fault: JudgedFault) -> bool:
+    def has_difference_without(self, fault: JudgedFault) -> bool:
         """Whether the two sets differ by more than stretches of one set do, where the stretches of the faulty set are
         compared with the fault undone: an intermittent fault makes them differ, too. The difference of the sets is the
         larger of `excess` and the lower bound of the gain of the fault: a fault that a separate base cannot fit raises
         all errors of the faulty set, and so does not raise `excess`."""
         return max(self.excess, fault.gain_low) > max(
-            SETS_AS_ONE, SETS_APART * max(self.clean_control_excess, fault.control_excess)
+            SAME_DEVICE_EXCESS, SETS_EXCESS_FACTOR * max(self.clean_control_excess, fault.control_excess)
         )

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from analysis.diagnosis.contrast.compared_base import ComparedBase, undo_fault_in_rows
 from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
 from analysis.diagnosis.contrast.joint_products import SetPair, SizeFit, fit_sizes
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, SIZE_IS_NEAR, UNDOING_ROUNDS
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, FAULT_SIZE_TOLERANCE, INVERSION_ROUNDS
 from analysis.diagnosis.types import TimeBudget
 
 ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))
@@ -119,14 +119,14 @@ def _choose_best_variant(
 def _iterate_linearisation(
     current: FittedVariant, unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase]
 ) -> FittedVariant:
-    """Return the best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size
-    that the last iteration found; in the linearised variant, that size is 1. They end where the fitted size differs
-    from 1 by less than `SIZE_IS_NEAR`, where undoing is linear or ill-conditioned, and, unless only size 1 is valid
-    (`Variant.one_size`), where the error no longer falls."""
+    """Return the best fit of at most `INVERSION_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the
+    size that the last iteration found; in the linearised variant, that size is 1. They end where the fitted size
+    differs from 1 by less than `FAULT_SIZE_TOLERANCE`, where undoing is linear or ill-conditioned, and, unless only
+    size 1 is valid (`Variant.one_size`), where the error no longer falls."""
     best = _fit_allowed_size(current)
-    for _ in range(UNDOING_ROUNDS):
+    for _ in range(INVERSION_ROUNDS):
         fit, fault, variant, _ = current
-        if variant.at_size is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
+        if variant.at_size is None or abs(float(fit.sizes[0]) - 1) < FAULT_SIZE_TOLERANCE:
             break
         relinearised = _fit_variant(unchanged_pairs, compared_bases, fault, variant.at_size(float(fit.sizes[0])))
         if relinearised is None:

@@ -47,8 +47,8 @@ def compute_noise_gain(positions: FloatArray | float) -> float:
 def _tabulate_log_gains() -> FloatArray:
     """Tabulate the mean over frequency of the natural logarithm of the interpolation's gain, at each of
     `DELAY_FRACTIONS`: by FFT, zero-padded to 4096, of a delayed unit impulse in the middle of 401 samples, where the
-    ends have no influence. Gains below 1e-6 count as 1e-6, because
-    the gain at half the sample rate is zero for a delay of half a sample."""
+    ends have no influence. Gains below 1e-6 count as 1e-6, because the gain at half the sample rate is zero for a delay
+    of half a sample."""
     impulse = np.zeros((401, 1))
     impulse[200] = 1.0
     gains = [np.abs(np.fft.rfft(shift_samples(impulse, fraction)[:, 0], 4096)) for fraction in DELAY_FRACTIONS]

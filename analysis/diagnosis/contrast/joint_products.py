@@ -26,7 +26,7 @@ LARGEST_PRODUCT = 1e16
 """Magnitude of an element of a Gram matrix, from which undoing a fault with bounded sizes counts as ill-conditioned. By
 hand."""
 MOST_NEWTON_STEPS = 3
-"""Largest number of Gauss-Newton steps. By hand."""
+"""Largest number of Gauss-Newton steps for the sizes. By hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,11 +133,13 @@ def fit_sizes(pairs: Sequence[SetPair], variant: Variant | None) -> SizeFit:
             gradient_sum += gradient
             hessian_sum += hessian
         hessian_sum += 1e-9 * max(float(np.trace(hessian_sum)) / len(hessian_sum), 1e-300) * np.eye(len(hessian_sum))
-        updated = np.clip(sizes - np.linalg.solve(hessian_sum, gradient_sum), variant.lower_bound, variant.upper_bound)
-        if np.allclose(updated, sizes, rtol=1e-6, atol=1e-12):
-            sizes = updated
+        updated_sizes = np.clip(
+            sizes - np.linalg.solve(hessian_sum, gradient_sum), variant.lower_bound, variant.upper_bound
+        )
+        if np.allclose(updated_sizes, sizes, rtol=1e-6, atol=1e-12):
+            sizes = updated_sizes
             break
-        sizes = updated
+        sizes = updated_sizes
     return _fit_bases(pairs, sizes)
 
 
@@ -165,7 +167,7 @@ def solve_residual_weights(products: FloatArray) -> FloatArray:
     return np.concatenate([[1.0], -weights])
 
 
-def compute_own_fit_error(gram: FloatArray) -> float:
+def compute_residual_squares(gram: FloatArray) -> float:
     """Compute the residual sum of squares of the ridge regression on this Gram matrix (width, width); at least 0."""
     weights = solve_residual_weights(gram)
     return max(float(weights @ gram @ weights), 0.0)
@@ -221,8 +223,8 @@ def _compute_error_growth(pair: SetPair, undoing_matrix: FloatArray) -> float:
     if pair.error_growth_limit <= 1.0:
         return 1.0
     gram = pair.undone_sum[: pair.undone.width, : pair.undone.width]
-    growth = compute_own_fit_error(undoing_matrix @ pair.undone_sum @ undoing_matrix.T) / max(
-        compute_own_fit_error(gram), 1e-300
+    growth = compute_residual_squares(undoing_matrix @ pair.undone_sum @ undoing_matrix.T) / max(
+        compute_residual_squares(gram), 1e-300
     )
     return float(np.clip(growth, 1.0, pair.error_growth_limit))
 

@@ -1,4 +1,4 @@
-"""Tests which fault explains the difference between faulty and clean recordings of one device.
+"""Test which fault explains the difference between faulty and clean recordings of one device.
 
 A base is a regression model of the recordings: a force balance or an autoregressive model. E(f) is the sum of squared
 whitened errors of a base that is fitted to both sets jointly, with fault f undone in the faulty set (`compared_base`,
@@ -37,7 +37,7 @@ from analysis.diagnosis.contrast.joint_products import (
     SizeFit,
     compute_error,
     compute_held_out_error,
-    compute_own_fit_error,
+    compute_residual_squares,
     fit_sizes,
 )
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
@@ -46,7 +46,7 @@ from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import build_sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import make_misalignment_fault, make_sensor_faults, make_shared_faults
 from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
-from analysis.diagnosis.settings import BALANCE_HOLDS, BOOTSTRAP_LEVEL, CONTRAST_BLOCKS, LATE_STEP, LEAST_FAULT_GAIN
+from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, CONTRAST_BLOCKS, DELAY_STEP, LEAST_FAULT_GAIN, MISFIT_SHARE
 from analysis.diagnosis.types import Mask, TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -66,9 +66,9 @@ other blocks as if they were separate recordings."""
 def rank_faults(
     recordings: Sequence[Recording], clean: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget
 ) -> Comparison | None:
-    """Comparison of the faulty recordings with the clean ones, by the first kind of base that fits: force balances,
-    else autoregressive models. excluded: names of effects that are not tested. None where there is too little data, no
-    base fits, or one set moves far less than the other."""
+    """Compare the faulty recordings with the clean ones, by the first kind of base that fits: force balances, else
+    autoregressive models. excluded: names of effects that are not tested. None where there is too little data, no base
+    fits, or one set moves far less than the other."""
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not have_similar_motion(*sides):
         return None
@@ -86,8 +86,8 @@ def rank_faults(
 def _prepare_bases(
     clean: tuple[Part, ...], faulty: tuple[Part, ...], bases: Sequence[Base], motions: tuple[Motion, ...]
 ) -> tuple[list[ComparedBase], list[Fault]]:
-    """The bases on both sets, including those that predict one sensor from another, and all faults to test. Faults of
-    the mechanism need velocities and so a time axis; an imposed motion was not produced by an actuator."""
+    """Prepare the bases on both sets, including those that predict one sensor from another, and all faults to test.
+    Faults of the mechanism need velocities and so a time axis; an imposed motion was not produced by an actuator."""
     recording = clean[0].recording
     by_force = isinstance(bases[0], ForceBase)
     has_time_axis = bool(motions) and np.isfinite(motions[0].band_hz)
@@ -100,7 +100,7 @@ def _prepare_bases(
             compared_bases.append(compare_base(base, clean, faulty))
     row_s = compared_bases[0].row_s
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
-    lags = Lags(lag_samples, suggest_delays_s(compared_bases), LATE_STEP * row_s, suggest_clock_rates(compared_bases))
+    lags = Lags(lag_samples, suggest_delays_s(compared_bases), DELAY_STEP * row_s, suggest_clock_rates(compared_bases))
     faults: list[Fault] = []
     rotational = recording.is_rotational
     for axis, name in enumerate(recording.command.channels):
@@ -118,7 +118,7 @@ def _prepare_bases(
 
 
 def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits) -> Comparison:
-    """All fitted faults with their gains, the smallest error first, and the errors with no fault undone."""
+    """Judge all fitted faults, the smallest error first, and compute the errors with no fault undone."""
     unchanged_pairs = fault_fits.unchanged_pairs
     baseline_fit = fit_sizes(unchanged_pairs, None)
     faulty_sample_count = sum(compared.faulty.count for compared in compared_bases)
@@ -157,13 +157,13 @@ def _are_forces_balanced(compared_bases: Sequence[ComparedBase], fitted_variants
     fitted_variants: the best first."""
     force_bases = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
     if all(
-        compute_unexplained_share_of_rows(axis_base.base, axis_base.faulty.rows, axis_base.faulty.masks) < BALANCE_HOLDS
+        compute_unexplained_share_of_rows(axis_base.base, axis_base.faulty.rows, axis_base.faulty.masks) < MISFIT_SHARE
         for axis_base in force_bases
     ):
         return True
     return any(
         all(
-            compute_unexplained_share_of_rows(axis_base.base, *_undo_fault(axis_base, best_variant)) < BALANCE_HOLDS
+            compute_unexplained_share_of_rows(axis_base.base, *_undo_fault(axis_base, best_variant)) < MISFIT_SHARE
             for axis_base in force_bases
         )
         for best_variant in fitted_variants[:1]
@@ -171,25 +171,25 @@ def _are_forces_balanced(compared_bases: Sequence[ComparedBase], fitted_variants
 
 
 def _undo_fault(compared: ComparedBase, fitted_variant: FittedVariant) -> tuple[list[FloatArray], list[Mask]]:
-    """Rows of the faulty set with a fault undone at its fitted sizes, and masks of the rows with known values."""
+    """Undo a fault in the faulty set at its fitted sizes: rows, and masks of the rows with known values."""
     fit, fault, variant, _ = fitted_variant
     undone_rows = undo_fault_in_rows(compared, compared.faulty, fault, variant)
     rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
-    for k, (unchanged_rows, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
-        rows[k] = unchanged_rows + sum(
-            fitted_size * (undone.rows[k] - unchanged_rows)
+    for part_index, (unchanged_rows, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
+        rows[part_index] = unchanged_rows + sum(
+            fitted_size * (undone.rows[part_index] - unchanged_rows)
             for fitted_size, undone in zip(fit.sizes, undone_rows, strict=True)
         )
-        masks[k] = mask & ~np.any([undone.lost[k] for undone in undone_rows if undone.lost], axis=0)
+        masks[part_index] = mask & ~np.any([undone.lost[part_index] for undone in undone_rows if undone.lost], axis=0)
     return rows, masks
 
 
 def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
-    """Relative excess error within one set: for each division into two stretches, the error of a single fit to both
-    over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
+    """Yield the relative excess error within one set: for each division into two stretches, the error of a single fit
+    to both over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
 
     def sum_errors(blocks: Sequence[int]) -> float:
-        return sum(compute_own_fit_error(products[list(blocks)].sum(axis=0)) for products in sides)
+        return sum(compute_residual_squares(products[list(blocks)].sum(axis=0)) for products in sides)
 
     joint_error = sum_errors(ALL_BLOCKS)
     for stretch in CONTROL_STRETCHES:
@@ -200,7 +200,7 @@ def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
 def _judge_fault(
     compared_bases: Sequence[ComparedBase], fitted_variant: FittedVariant, baseline_fit: SizeFit, sample_count: int
 ) -> JudgedFault:
-    """The fault with its values and their standard errors, its gain, and the gains of the negative control.
+    """Judge a fault by its values and their standard errors, its gain, and the gains of the negative control.
     baseline_fit: the fit with no fault undone. sample_count: in both sets, over all bases."""
     fit, fault, variant, pairs = fitted_variant
     folds = _leave_out_sixths(pairs)
@@ -227,7 +227,7 @@ def _judge_fault(
     return JudgedFault(
         fault=fault,
         values=variant.parameters_of(fit.sizes),
-        spread=_estimate_standard_errors(
+        standard_errors=_estimate_standard_errors(
             variant, [fold.sizes for fold in fold_fits], _fit_without_clean_sixths(pairs, variant)
         ),
         block_squares=errors,
@@ -243,8 +243,8 @@ def _judge_fault(
 def _estimate_standard_errors(
     variant: Variant, without_faulty: Sequence[FloatArray], without_clean: Sequence[FloatArray]
 ) -> dict[str, float]:
-    """Standard error of each value of a fault: root of the sum of the jackknife variances of both sets, from the sizes
-    with each sixth left out, and of the squared error due to the spacing of the variants."""
+    """Estimate the standard error of each value of a fault: root of the sum of the jackknife variances of both sets,
+    from the sizes with each sixth left out, and of the squared error due to the spacing of the variants."""
     sides = [[variant.parameters_of(sizes) for sizes in fold_sizes] for fold_sizes in (without_faulty, without_clean)]
     return {
         name: float(
@@ -255,7 +255,7 @@ def _estimate_standard_errors(
 
 
 def _fit_without_clean_sixths(pairs: Sequence[SetPair], variant: Variant) -> list[FloatArray]:
-    """The fault's sizes, with each sixth of the clean set left out in turn."""
+    """Fit the fault's sizes, with each sixth of the clean set left out in turn."""
     folds = [
         [
             replace(pair, unchanged=(*pair.unchanged[: left_out[0]], *pair.unchanged[left_out[-1] + 1 :]))
@@ -267,13 +267,13 @@ def _fit_without_clean_sixths(pairs: Sequence[SetPair], variant: Variant) -> lis
 
 
 def _estimate_variance(values: Sequence[float]) -> float:
-    """Jackknife variance of a number, from its g values with each of g groups left out: (g - 1) / g times the sum of
-    their squared deviations."""
+    """Estimate the jackknife variance of a number, from its g values with each of g groups left out: (g - 1) / g times
+    the sum of their squared deviations."""
     return float((len(values) - 1) * np.var(values))
 
 
 def _leave_out_sixths(pairs: Sequence[SetPair]) -> list[list[SetPair]]:
-    """The pairs with each sixth of the faulty set left out in turn."""
+    """Leave out each sixth of the faulty set of the pairs in turn."""
     return [
         [replace(pair, undone_blocks=tuple(block for block in ALL_BLOCKS if block not in left_out)) for pair in pairs]
         for left_out in SIXTHS
@@ -283,10 +283,10 @@ def _leave_out_sixths(pairs: Sequence[SetPair]) -> list[list[SetPair]]:
 def _yield_control_gains(
     compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant, sizes: FloatArray
 ) -> Iterator[float]:
-    """The fault's gains between stretches of one set (negative control). Clean set: error with nothing undone over
-    error with the stretch's own size undone, less 1. Faulty set: the same, with the size found there undone everywhere
-    first, because a base that does not fit the faulty rows would give a gain in any stretch. A fault that varies with
-    time also differs between stretches of the faulty set, which is then no control."""
+    """Yield the fault's gains between stretches of one set (negative control). Clean set: error with nothing undone
+    over error with the stretch's own size undone, less 1. Faulty set: the same, with the size found there undone
+    everywhere first, because a base that does not fit the faulty rows would give a gain in any stretch. A fault that
+    varies with time also differs between stretches of the faulty set, which is then no control."""
     for is_clean in (True,) if fault.varies else (True, False):
         common_sizes = np.zeros_like(sizes) if is_clean else sizes
         sides = [compared.clean if is_clean else compared.faulty for compared in compared_bases]

@@ -38,7 +38,7 @@ from analysis.diagnosis.contrast.fault import (
 )
 from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
+from analysis.diagnosis.settings import LARGEST_CLOCK_ERROR, REVERSAL_SHARE
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 
@@ -143,7 +143,7 @@ def _make_common_faults(channel: _Channel, parts: Sequence[Part], samples: Float
     clocks = [
         _make_skew(channel, rate, from_file_start, parts)
         for rate in rates
-        if abs(rate) < CLOCK_FASTEST
+        if abs(rate) < LARGEST_CLOCK_ERROR
         for from_file_start in clock_origins
     ]
     clocks += [
@@ -162,13 +162,13 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     """Estimate (n,): the motion that drives a reading y (n,) through a backlash. It leads the reading by half the gap,
     reverses at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead
     changes with the square of time."""
-    direction = np.sign(compute_bristle_deflection(y, REVERSAL_OF_GAP * gap))
+    direction = np.sign(compute_bristle_deflection(y, REVERSAL_SHARE * gap))
     lead = 0.5 * direction
     reversals = np.flatnonzero(direction[1:] * direction[:-1] < 0) + 1
     for start, reversal in pairwise([0, *reversals.tolist()]):
         excursion = direction[reversal - 1] * y[start:reversal]
         extreme = start + int(np.argmax(excursion))
-        end = extreme + int(np.flatnonzero(excursion[extreme - start :] > excursion.max() - REVERSAL_OF_GAP * gap)[-1])
+        end = extreme + int(np.flatnonzero(excursion[extreme - start :] > excursion.max() - REVERSAL_SHARE * gap)[-1])
         crossed_share = (np.arange(extreme, reversal) - extreme) / max(end - extreme, 1)
         lead[extreme:reversal] = direction[reversal - 1] * (0.5 - np.minimum(crossed_share, 1.0) ** 2)
     return np.asarray(y + gap * lead)

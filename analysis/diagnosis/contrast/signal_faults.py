@@ -1,4 +1,4 @@
-"""Detects faults from the spectrum or the values of a single signal, without a model of the device.
+"""Detect faults from the spectrum or the values of a single signal, without a model of the device.
 
 Mains hum and white noise in a response are faults where neither the clean recordings nor, for hum, the commands have
 them; a quantized command is one where its step is coarser than that of the clean commands. Called by
@@ -12,12 +12,12 @@ import numpy as np
 
 from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import (
-    LINE_IS_NEW,
-    LINE_STANDS_OUT,
+    LINE_PROMINENCE,
     MAINS_HZ,
-    MAINS_OFF_HZ,
-    NOISE_EVEN,
-    NOISE_LOUDER,
+    MAINS_TOLERANCE_HZ,
+    NEW_LINE_RATIO,
+    NOISE_BAND_RATIO,
+    NOISE_INCREASE,
     NOISE_STRETCHES,
     STEP_FACTOR,
 )
@@ -73,8 +73,8 @@ def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
         if not len(faulty_floors) or not len(clean_floors):
             continue
         added_power = np.median(faulty_floors, axis=0) - np.median(clean_floors, axis=0)
-        is_louder = bool(np.all(faulty_floors.min(axis=0) > NOISE_LOUDER * clean_floors.max(axis=0)))
-        if is_louder and 1 / NOISE_EVEN < added_power[0] / added_power[1] < NOISE_EVEN:
+        is_louder = bool(np.all(faulty_floors.min(axis=0) > NOISE_INCREASE * clean_floors.max(axis=0)))
+        if is_louder and 1 / NOISE_BAND_RATIO < added_power[0] / added_power[1] < NOISE_BAND_RATIO:
             noisy_channels.append((float(np.sqrt(added_power.mean())), channel))
     if not noisy_channels:
         return None
@@ -116,8 +116,10 @@ def _estimate_noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, 
     power = np.abs(np.fft.rfft(detrended * window)) ** 2 / float(np.sum(window**2))
     eighth = len(power) // 8
     # The median of a power with two degrees of freedom (exponential distribution) is log 2 times its mean.
-    highest, middle = (float(np.median(power[-k * eighth : (1 - k) * eighth or None])) / np.log(2) for k in (1, 4))
-    return highest, middle
+    highest_variance, middle_variance = (
+        float(np.median(power[-k * eighth : (1 - k) * eighth or None])) / np.log(2) for k in (1, 4)
+    )
+    return highest_variance, middle_variance
 
 
 def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
@@ -133,8 +135,8 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
         clean_ratios = [_measure_mains_line(part.response[:, channel], part.rate_hz, mains_hz)[0] for part in clean]
         command_ratios = [_measure_mains_line(column, longest.rate_hz, mains_hz)[0] for column in longest.command.T]
         if (
-            ratio > LINE_STANDS_OUT
-            and ratio > LINE_IS_NEW * max([1.0, *clean_ratios, *command_ratios])
+            ratio > LINE_PROMINENCE
+            and ratio > NEW_LINE_RATIO * max([1.0, *clean_ratios, *command_ratios])
             and (strongest is None or amplitude > strongest[0])
         ):
             strongest = amplitude, frequency_hz
@@ -142,8 +144,8 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
 
 
 def _measure_mains_line(samples: FloatArray, rate_hz: float, mains_hz: float) -> tuple[float, float, float]:
-    """Measure the largest spectral line within `MAINS_OFF_HZ` of `mains_hz` (Hann window): the ratio of its power to
-    the median power around it, its amplitude (unit of the samples) and its frequency (Hz). The median is over lines
+    """Measure the largest spectral line within `MAINS_TOLERANCE_HZ` of `mains_hz` (Hann window): the ratio of its power
+    to the median power around it, its amplitude (unit of the samples) and its frequency (Hz). The median is over lines
     within 6 Hz, or 24 lines if these are more, without those near the mains frequency. Ratio and amplitude are 0 where
     the spectrum has no line there, or none around it. samples: (n,)."""
     window = np.hanning(len(samples))
@@ -151,9 +153,9 @@ def _measure_mains_line(samples: FloatArray, rate_hz: float, mains_hz: float) ->
     power = np.abs(np.fft.rfft((detrended - detrended.mean()) * window)) ** 2
     frequency_hz = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     resolution_hz = rate_hz / len(samples)
-    line_mask = np.abs(frequency_hz - mains_hz) <= max(MAINS_OFF_HZ, 1.5 * resolution_hz)
+    line_mask = np.abs(frequency_hz - mains_hz) <= max(MAINS_TOLERANCE_HZ, 1.5 * resolution_hz)
     background_mask = (np.abs(frequency_hz - mains_hz) <= max(6.0, 24 * resolution_hz)) & (
-        np.abs(frequency_hz - mains_hz) > max(2 * MAINS_OFF_HZ, 4 * resolution_hz)
+        np.abs(frequency_hz - mains_hz) > max(2 * MAINS_TOLERANCE_HZ, 4 * resolution_hz)
     )
     if not line_mask.any() or not background_mask.any():
         return 0.0, 0.0, mains_hz

@@ -1,4 +1,4 @@
-"""Tests whether a recording was made in closed loop: commands depend on the responses (controller, virtual spring).
+"""Test whether a recording was made in closed loop: commands depend on the responses (controller, virtual spring).
 
 Where the excitation was recorded, its difference from the command is the feedback. Otherwise the test is that of
 Granger (Econometrica 37 (1969), 424): whether past responses improve the prediction of the command from its own past.
@@ -13,15 +13,16 @@ from equalizer.signals.signal import FloatArray
 
 PAST_SAMPLES = 6
 """Number of past samples of each signal from which the command is predicted. Set by hand."""
-_LEAST_SAMPLES = 200
-"""Fewest rows with all samples known, for `PAST_SAMPLES`; with fewer, the test is not made and the loop counts as open.
-Set by hand."""
+LEAST_ROWS = 200
+"""Least number of rows with all samples known; with fewer, the test is not made and the loop counts as open. Set by
+hand."""
 
 
 def is_in_closed_loop(recording: Recording) -> bool:
     """Whether the recording was made under feedback: by the difference of command and recorded excitation, else by
     whether the responses up to each sample help to predict the command that is written just after (Granger 1969).
-    Without excitation, False for other holds than zero-order: a command may then depend on the sample after it."""
+    Without excitation, False for other holds than zero-order: a command may then depend on the sample after it. With an
+    excitation, False where command or excitation has missing samples."""
     command = recording.command.samples
     if recording.excitation is not None:
         feedback = command - recording.excitation.samples
@@ -39,23 +40,25 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
     if recording.position is not None:
         signals.append(recording.position.samples)
     measured = np.hstack(signals)
-    complete = np.isfinite(measured).all(axis=1) & np.isfinite(command)
+    is_complete = np.isfinite(measured).all(axis=1) & np.isfinite(command)
     rows = np.arange(PAST_SAMPLES, len(command))
-    rows = rows[np.all([complete[rows - lag] for lag in range(PAST_SAMPLES + 1)], axis=0)]
-    if len(rows) < _LEAST_SAMPLES:
+    rows = rows[np.all([is_complete[rows - lag] for lag in range(PAST_SAMPLES + 1)], axis=0)]
+    if len(rows) < LEAST_ROWS:
         return False
-    own_past = np.column_stack([command[rows - lag] for lag in range(1, PAST_SAMPLES + 1)] + [np.ones(len(rows))])
+    command_past = np.column_stack([command[rows - lag] for lag in range(1, PAST_SAMPLES + 1)] + [np.ones(len(rows))])
     response_past = np.column_stack([measured[rows - lag] for lag in range(PAST_SAMPLES)])
-    own_past_rms, full_rms = (
-        _compute_residual_rms(command[rows], own_past),
-        _compute_residual_rms(command[rows], np.hstack([own_past, response_past])),
+    command_past_rms, full_rms = (
+        _compute_residual_rms(command[rows], command_past),
+        _compute_residual_rms(command[rows], np.hstack([command_past, response_past])),
     )
     # A smooth command is predicted by its own past to within rounding, so that the test has no power.
-    return bool(own_past_rms > 1e-6 * _compute_rms(command[:, None]) and full_rms < PREDICTED_SHARE * own_past_rms)
+    return bool(
+        command_past_rms > 1e-6 * _compute_rms(command[:, None]) and full_rms < PREDICTED_SHARE * command_past_rms
+    )
 
 
 def _compute_residual_rms(target: FloatArray, regressors: FloatArray) -> float:
-    """Rms residual of the least-squares fit of `target` (n,) by the columns of `regressors` (n, k)."""
+    """Compute the rms residual of the least-squares fit of `target` (n,) by the columns of `regressors` (n, k)."""
     scale = np.linalg.norm(regressors, axis=0)
     columns = regressors / np.where(scale > 0, scale, 1.0)
     coefficients = np.linalg.lstsq(columns, target, rcond=1e-12)[0]
@@ -63,5 +66,5 @@ def _compute_residual_rms(target: FloatArray, regressors: FloatArray) -> float:
 
 
 def _compute_rms(samples: FloatArray) -> float:
-    """Root mean square over all samples and channels, about zero."""
+    """Compute the root mean square over all samples and channels, about zero."""
     return float(np.sqrt(np.mean(samples**2)))

@@ -2,7 +2,8 @@
 
 The autocovariances are those to which the callers (`whitened_measure`, `compared_base`) fit an autoregression (Yule
 1927, Walker 1931). The lower bound of a gain on held-out data is found by resampling blocks of samples instead of
-single samples (Kunsch, Ann. Stat. 17:1217, 1989).
+single samples (Kunsch, Ann. Stat. 17:1217, 1989); it is called by `judge_laws` and `actuator` (laws of a force
+balance), by `rank_faults` and `choose_fault`, and by `held_out_gain`.
 """
 
 from collections.abc import Sequence
@@ -15,19 +16,19 @@ from equalizer.signals.signal import FloatArray
 
 
 def draw_bootstrap_blocks(block_count: int) -> npt.NDArray[np.int64]:
-    """(`BOOTSTRAP_DRAWS`, blocks): indices of blocks, drawn with replacement. The seed is fixed, so that the draws are
-    the same for the same number of blocks."""
+    """Draw indices of blocks (`BOOTSTRAP_DRAWS`, blocks) with replacement. The seed is fixed, so that the draws are the
+    same for the same number of blocks."""
     return np.random.default_rng(BOOTSTRAP_SEED).integers(block_count, size=(BOOTSTRAP_DRAWS, block_count))
 
 
 def bootstrap_gain(errors_without: FloatArray, errors_with: FloatArray) -> tuple[float, float]:
-    """Gain of a law, the share of the error power that it removes, and the lower bound of the gain: the quantile
-    `BOOTSTRAP_LEVEL` of a bootstrap over blocks. errors_without, errors_with: (blocks,), sums of squares without and
-    with the law."""
+    """Compute the gain of a law, the share of the error power that it removes, and the lower bound of the gain: the
+    quantile `BOOTSTRAP_LEVEL` of a bootstrap over blocks. errors_without, errors_with: (blocks,), sums of squares
+    without and with the law."""
     draws = draw_bootstrap_blocks(len(errors_without))
-    shares = 1 - errors_with[draws].sum(axis=1) / np.maximum(errors_without[draws].sum(axis=1), 1e-300)
+    drawn_gains = 1 - errors_with[draws].sum(axis=1) / np.maximum(errors_without[draws].sum(axis=1), 1e-300)
     return float(1 - errors_with.sum() / max(float(errors_without.sum()), 1e-300)), float(
-        np.quantile(shares, BOOTSTRAP_LEVEL)
+        np.quantile(drawn_gains, BOOTSTRAP_LEVEL)
     )
 
 
@@ -40,8 +41,8 @@ def is_confirmed_by_folds(held_out: Sequence[FloatArray], folds: Sequence[FloatA
 
 
 def compute_lagged_products(series: FloatArray, largest_lag: int) -> FloatArray:
-    """(largest_lag + 1, c): sums of x[t + k] x[t] for lags k = 0..largest_lag of each channel of a time series (n, c):
-    autocovariances, neither centred nor divided by n. A sample with a NaN in any channel counts as 0 in all."""
+    """Compute (largest_lag + 1, c): sums of x[t + k] x[t] for lags k = 0..largest_lag of each channel of a time series
+    (n, c): autocovariances, neither centred nor divided by n. A sample with a NaN in any channel counts as 0 in all."""
     finite_series: FloatArray = np.where(np.isfinite(series).all(axis=1, keepdims=True), series, 0.0)
     return np.array(
         [

@@ -32,30 +32,31 @@ parameter relative to the mean diagonal element of the normal matrix."""
 
 
 def compute_response_significance(recordings: Sequence[Recording]) -> float | None:
-    """Excess coherence of the response channel with the largest mean coherence over that of noise, in standard
-    deviations. None where the recordings are too short for a verdict, or where the coherence is not significant but a
-    filter predicts a response or a command. recordings: with the same channels and rate; commands without gaps."""
-    inputs, outputs = _compute_spectra(recordings)
-    if not len(inputs):
+    """Compute the excess coherence of the response channel with the largest mean coherence over that of noise, in
+    standard deviations. None where the recordings are too short for a verdict, or where the coherence is not
+    significant but a filter predicts a response or a command. recordings: with the same channels and rate; commands
+    without gaps."""
+    command_spectra, response_spectra = _compute_spectra(recordings)
+    if not len(command_spectra):
         return None
-    power = (np.abs(inputs) ** 2).sum(axis=(0, 2))
+    power = (np.abs(command_spectra) ** 2).sum(axis=(0, 2))
     lines = np.flatnonzero(power > LEAST_LINE_POWER * power.max(initial=0.0))
     lines = lines[lines > 0]
     line_results = [
         line_result
         for line in lines
-        if (line_result := _compute_coherence(inputs[:, line], outputs[:, line])) is not None
+        if (line_result := _compute_coherence(command_spectra[:, line], response_spectra[:, line])) is not None
     ]
     if not line_results:
         return None
     coherence, noise_mean, noise_variance = (np.array(column) for column in zip(*line_results, strict=True))
-    mean_sd = np.sqrt(CORRELATED_LINES * noise_variance.sum()) / len(line_results)
+    mean_deviation = np.sqrt(CORRELATED_LINES * noise_variance.sum()) / len(line_results)
     # Too short: even the coherence of a device that clearly responds would hardly be significant.
-    if (DRIVEN_COHERENCE - noise_mean.mean()) / mean_sd < 2 * DRIVEN_DEVIATIONS:
+    if (DRIVEN_COHERENCE - noise_mean.mean()) / mean_deviation < 2 * DRIVEN_DEVIATIONS:
         return None
-    deviations = float(((coherence.mean(axis=0) - noise_mean.mean()) / mean_sd).max())
-    significant = deviations >= DRIVEN_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
-    return deviations if significant else None
+    deviations = float(((coherence.mean(axis=0) - noise_mean.mean()) / mean_deviation).max())
+    is_significant = deviations >= DRIVEN_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
+    return deviations if is_significant else None
 
 
 def _is_predictable(recording: Recording) -> bool:
@@ -70,42 +71,44 @@ def _can_predict(targets: FloatArray, signals: FloatArray, uses_future: bool) ->
     taps are non-causal, as a derivative needs."""
     sample_count = len(targets)
     tap_step = max(int(FILTER_SPAN_SHARE * sample_count) // MAX_TAPS, 1)
-    taps = min(int(FILTER_SPAN_SHARE * sample_count), MAX_TAPS)
+    tap_count = min(int(FILTER_SPAN_SHARE * sample_count), MAX_TAPS)
     samples_before, samples_after = (
-        ((taps - taps // 2) * tap_step, taps // 2 * tap_step) if uses_future else (taps * tap_step, 0)
+        ((tap_count - tap_count // 2) * tap_step, tap_count // 2 * tap_step)
+        if uses_future
+        else (tap_count * tap_step, 0)
     )
     padded = np.pad(signals, ((samples_before, samples_after), (0, 0)), mode="edge" if uses_future else "constant")
-    shifted_signals = [padded[taps * tap_step - k * tap_step :][:sample_count] for k in range(taps)]
+    shifted_signals = [padded[tap_count * tap_step - k * tap_step :][:sample_count] for k in range(tap_count)]
     regressors = np.hstack([*shifted_signals, np.ones((sample_count, 1))])
-    finite = np.isfinite(targets).all(axis=1) & np.isfinite(regressors).all(axis=1)
-    first_half = finite & (np.arange(sample_count) < sample_count // 2)
+    is_finite = np.isfinite(targets).all(axis=1) & np.isfinite(regressors).all(axis=1)
+    first_half = is_finite & (np.arange(sample_count) < sample_count // 2)
     gram = regressors[first_half].T @ regressors[first_half]
     weights = np.linalg.solve(
         gram + RIDGE_SHARE * np.trace(gram) / len(gram) * np.eye(len(gram)),
         regressors[first_half].T @ targets[first_half],
     )
-    second_half = finite & ~first_half
+    second_half = is_finite & ~first_half
     residual_squares = np.sum((targets[second_half] - regressors[second_half] @ weights) ** 2, axis=0)
-    power = np.maximum(np.sum((targets[second_half] - targets[first_half].mean(axis=0)) ** 2, axis=0), 1e-300)
-    return bool(np.any(residual_squares < (1 - DRIVEN_COHERENCE) * power))
+    target_power = np.maximum(np.sum((targets[second_half] - targets[first_half].mean(axis=0)) ** 2, axis=0), 1e-300)
+    return bool(np.any(residual_squares < (1 - DRIVEN_COHERENCE) * target_power))
 
 
 def _compute_spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:
-    """Spectra (stretches, lines, inputs) of the commands and (stretches, lines, outputs) of the responses; no stretches
-    where each would have less than 16 samples."""
-    inputs, outputs = len(recordings[0].command.channels), len(recordings[0].response.channels)
-    length = sum(len(recording) for recording in recordings) // (STRETCHES_PER_COMMAND * inputs)
+    """Compute the spectra (stretches, lines, commands) of the commands and (stretches, lines, responses) of the
+    responses; no stretches where each would have fewer than 16 samples, too few lines for a mean."""
+    command_count, response_count = len(recordings[0].command.channels), len(recordings[0].response.channels)
+    length = sum(len(recording) for recording in recordings) // (STRETCHES_PER_COMMAND * command_count)
     pairs = (
         [pair for recording in recordings for pair in _transform_stretches(recording, length)] if length >= 16 else []
     )
     if not pairs:
-        return np.zeros((0, 0, inputs), complex), np.zeros((0, 0, outputs), complex)
+        return np.zeros((0, 0, command_count), complex), np.zeros((0, 0, response_count), complex)
     return np.array([u for u, _ in pairs]), np.array([y for _, y in pairs])
 
 
 def _transform_stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray, ComplexArray]]:
-    """Spectra (lines, channels) of commands and responses per stretch of `length` samples; stretches with constant
-    commands or missing responses are left out."""
+    """Compute the spectra (lines, channels) of commands and responses per stretch of `length` samples; stretches with
+    constant commands or missing responses are left out."""
     window = hann(length)[:, None]
     for start in range(0, len(recording) - length + 1, length):
         commands, responses = (part.samples[start : start + length] for part in (recording.command, recording.response))
@@ -114,14 +117,14 @@ def _transform_stretches(recording: Recording, length: int) -> Iterator[tuple[Co
 
 
 def _transform_windowed(samples: FloatArray, window: FloatArray) -> ComplexArray:
-    """(lines, k): windowed spectrum of samples (n, k) about their mean."""
+    """Compute (lines, k): windowed spectrum of samples (n, k) about their mean."""
     return np.asarray(np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0))
 
 
 def _compute_coherence(commands: ComplexArray, responses: ComplexArray) -> tuple[FloatArray, float, float] | None:
-    """Multiple coherence at a line, (p,): share of each response's power that the commands explain; with its mean and
-    variance for noise. commands: (stretches, inputs), responses: (stretches, outputs). None where the stretches are
-    fewer than twice the rank of the commands plus one, or where a response has no power."""
+    """Compute the multiple coherence at a line, (p,): share of each response's power that the commands explain; with
+    its mean and variance for noise. commands: (stretches, inputs), responses: (stretches, outputs). None where the
+    stretches are fewer than one more than twice the rank of the commands, or where a response has no power."""
     basis, singular_values, _ = np.linalg.svd(commands, full_matrices=False)
     basis = basis[:, singular_values > RANK_TOLERANCE * singular_values.max()]
     stretches, rank = basis.shape

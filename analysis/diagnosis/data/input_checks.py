@@ -1,5 +1,6 @@
 """Input checks of a diagnosis: recordings of one device, a model of that device, enough data. Recordings that fail are
-refused and get no verdict, not even `unexplained`."""
+refused and get no verdict, not even `unexplained`. Called by `study.workflows.diagnosis` before `diagnose`, and by
+`diagnose_values`, `prepare_recordings` and `fit_without_model`."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -36,7 +37,8 @@ class NothingToDiagnose(ListedProblemsError):  # noqa: N818 - an answer that a u
 def require_comparable(
     recordings: Sequence[Recording], names: Sequence[str], remedy: str = "diagnose them one at a time"
 ) -> None:
-    """Requires recordings with the same channels, units and rate. Raises NothingToDiagnose."""
+    """Require recordings with the same channels, units and rate. Raises NothingToDiagnose where they differ, or without
+    recordings. names: of the recordings. remedy: clause that ends each problem."""
     if not recordings:
         raise NothingToDiagnose(("there is no recording",))
     reference, problems = recordings[0], []
@@ -55,8 +57,9 @@ def require_comparable(
 def require_usable_data(
     recordings: Sequence[Recording], names: Sequence[str], allow_short: bool = False
 ) -> tuple[str, ...]:
-    """Requires a command without gaps, and responses that change and depend on it, for long enough. allow_short: a
-    slightly short recording gives a returned sentence instead of a refusal. Raises NothingToDiagnose."""
+    """Require a command without gaps, and responses that change and depend on it, for long enough. allow_short: whether
+    recordings with at least `LEAST_SAMPLES` samples that are too short to name physics are accepted, and a sentence
+    about that is returned. Raises NothingToDiagnose."""
     problems = [
         gap for recording, name in zip(recordings, names, strict=True) for gap in _find_gaps(recording.command, name)
     ]
@@ -76,9 +79,9 @@ def require_usable_data(
             )
         elif shortness and not allow_short:
             problems += shortness
-        elif (fitted := count_fit_samples(recordings)) < LEAST_SAMPLES_TO_FIT:
+        elif (count := count_fit_samples(recordings)) < LEAST_SAMPLES_TO_FIT:
             problems.append(
-                f"only {fitted} samples that may be fitted have a response (and a position, if one was recorded); the "
+                f"only {count} samples that may be fitted have a response (and a position, if one was recorded); the "
                 "others are missing or have the role of a test"
             )
         elif (
@@ -96,18 +99,18 @@ def require_usable_data(
 
 
 def is_too_short_to_name(recordings: Sequence[Recording]) -> bool:
-    """Whether recordings are so short that other laws would explain them about as well."""
+    """Whether recordings are so short, in samples and in s, that other laws would explain them about as well."""
     answered_samples = _count_answered_samples(recordings)
     return answered_samples < SHORTEST_SAMPLES and answered_samples / recordings[0].sample_rate_hz < SHORTEST_S
 
 
 def _count_answered_samples(recordings: Sequence[Recording]) -> int:
-    """Number of samples, over all recordings, in which no response is missing."""
+    """Count the samples, over all recordings, in which no response is missing."""
     return sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
 
 
 def _describe_shortness(recordings: Sequence[Recording]) -> Iterator[str]:
-    """A sentence for recordings with too few samples, or else with too few cycles of the command."""
+    """Yield a sentence for recordings with too few samples, or else with too few cycles of the command."""
     if is_too_short_to_name(recordings):
         count = _count_answered_samples(recordings)
         yield (
@@ -122,7 +125,7 @@ def _describe_shortness(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
-    """Requires recordings that differ: a duplicate would be tested by the data that it was fitted to. Raises
+    """Require recordings that differ: a duplicate would be tested by the data that it was fitted to. Raises
     NothingToDiagnose."""
     problems = [
         f"{names[second]} holds the same samples as {names[first]}, and a recording counts once"
@@ -135,29 +138,29 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
-    """Requires a model that fits the recordings' device. recordings: with the same channels,
-    units and rate. Raises NothingToDiagnose."""
-    first = recordings[0]
+    """Require a model that fits the recordings' device: channels, quantities, units, magnitudes, payloads, modes and
+    effects. recordings: with the same channels, units and rate. Raises NothingToDiagnose."""
+    first_recording = recordings[0]
     names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
     problems = (
-        *_compare_channel_counts(model, first),
-        *_compare_quantities(model, first),
+        *_compare_channel_counts(model, first_recording),
+        *_compare_quantities(model, first_recording),
         *_find_impossible_model_values(model),
     )
     problems = problems or find_payload_problems(model, recordings, names)
     if not problems:
         problems = (
-            *_find_unconnected_channels(model, first),
+            *_find_unconnected_channels(model, first_recording),
             *_find_instability(model, recordings),
-            *_find_too_fast_modes(model, first),
-            *_find_misplaced_effects(model, first),
+            *_find_too_fast_modes(model, first_recording),
+            *_find_misplaced_effects(model, first_recording),
         )
     if problems:
         raise NothingToDiagnose(problems)
 
 
 def _find_gaps(command: Signal, name: str) -> Iterator[str]:
-    """A sentence for a command with missing samples. name: of its recording."""
+    """Yield a sentence for a command with missing samples. name: of its recording."""
     missing_count = int((~np.isfinite(command.samples)).any(axis=1).sum())
     if missing_count:
         first_missing = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
@@ -168,7 +171,7 @@ def _find_gaps(command: Signal, name: str) -> Iterator[str]:
 
 
 def _find_impossible_values(recording: Recording, name: str) -> Iterator[str]:
-    """A sentence for each channel with a magnitude above `LARGEST_VALUE`."""
+    """Yield a sentence for each channel with a magnitude above `LARGEST_VALUE`."""
     for side in ("command", "response", "position"):
         signal: Signal | None = getattr(recording, side)
         for channel in range(0 if signal is None else len(signal.channels)):
@@ -182,7 +185,7 @@ def _find_impossible_values(recording: Recording, name: str) -> Iterator[str]:
 
 
 def _find_constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
-    """Sentences for commands that are constant, responses that are constant or missing, and missing positions."""
+    """Yield sentences for commands that are constant, responses that are constant or missing, and missing positions."""
     if all(np.ptp(recording.command.samples, axis=0).max(initial=0.0) == 0 for recording in recordings):
         yield (
             "the command never changes, so the device was not excited; a free motion, measured as positions or speeds "
@@ -198,7 +201,7 @@ def _find_constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def _count_command_cycles(recording: Recording) -> float:
-    """Number of cycles in the recording of the frequency below which most of the command's power lies, its mean
+    """Count the cycles in the recording of the frequency below which most of the command's power lies, its mean
     removed."""
     power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
     power[0] = 0.0
@@ -206,6 +209,7 @@ def _count_command_cycles(recording: Recording) -> float:
 
 
 def _compare_channel_counts(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """Yield a sentence for commands, and one for responses, whose number differs from that of the model."""
     for side, expected, channels in (
         ("command", model.inputs, recording.command.channels),
         ("response", model.outputs, recording.response.channels),
@@ -219,6 +223,7 @@ def _compare_channel_counts(model: MechanicalModel, recording: Recording) -> Ite
 
 
 def _compare_quantities(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """Yield a sentence for other quantities than the model's, and one for translation in place of rotation."""
     other_quantities = [quantity for quantity in recording.response.quantities if quantity != model.quantity]
     if other_quantities:
         quantity_names = ", ".join(sorted(set(other_quantities)))
@@ -239,6 +244,7 @@ def _is_rotational(recording: Recording) -> bool | None:
 
 
 def _find_impossible_model_values(model: MechanicalModel) -> Iterator[str]:
+    """Yield a sentence for each matrix with an entry above `LARGEST_VALUE`, and one for a mass below its inverse."""
     for name in ("mass", "damping", "stiffness", "input", "output"):
         largest = float(np.abs(getattr(model, name)).max())
         if largest > LARGEST_VALUE:
@@ -248,10 +254,10 @@ def _find_impossible_model_values(model: MechanicalModel) -> Iterator[str]:
 
 
 def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """Sentences for inputs of the model that drive nothing, or the same motion as another, and outputs that measure
-    nothing."""
+    """Yield sentences for inputs of the model that drive nothing, or the same motion as another, and outputs that
+    measure nothing."""
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
-    unconnected = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
+    unmeasured = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
         yield f"in the model's input matrix no coordinate is driven by {', '.join(idle)}"
     elif (rank := int(np.linalg.matrix_rank(model.input))) < model.inputs:
@@ -259,12 +265,12 @@ def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> 
             f"the model's {model.inputs} inputs drive only {rank} motion{'s' if rank != 1 else ''}, so they cannot "
             "be distinguished; combine the commands that push the same motion into one"
         )
-    if unconnected:
-        yield f"in the model's output matrix no coordinate is measured by {', '.join(unconnected)}"
+    if unmeasured:
+        yield f"in the model's output matrix no coordinate is measured by {', '.join(unmeasured)}"
 
 
 def _find_instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
-    """A sentence for a model whose motion would grow by more than exp(`MOST_GROWTH`) within the longest recording."""
+    """Yield a sentence for a model whose motion grows by over exp(`MOST_GROWTH`) within the longest recording."""
     growth_per_s = compute_growth_rate(model)
     longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
     if growth_per_s * longest_s > MOST_GROWTH:
@@ -275,8 +281,8 @@ def _find_instability(model: MechanicalModel, recordings: Sequence[Recording]) -
 
 
 def _find_too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """A sentence for a slowest mode above half the sample rate (Nyquist frequency): most likely the rate is stated a
-    thousand times too low."""
+    """Yield a sentence for a slowest mode above half the sample rate (Nyquist frequency): most likely the rate is
+    stated a thousand times too low."""
     natural_hz = np.abs(compute_poles(model).imag) / (2 * np.pi)
     slowest_hz = min((float(mode_hz) for mode_hz in natural_hz if mode_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
@@ -287,7 +293,7 @@ def _find_too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterat
 
 
 def _find_misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
-    """A sentence for an effect of the model at a place that the recorded device does not have."""
+    """Yield a sentence for an effect of the model at a place that the recorded device does not have."""
     try:
         place_recorded_effects(model, recording)
     except PlacingError as problem:

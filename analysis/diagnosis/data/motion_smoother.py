@@ -33,12 +33,13 @@ EXPECTED_CHANGE_SHARE = 0.1
 CHANGE_TIME_S = 0.005
 """Time (s) in which a missing force is expected to change by `EXPECTED_CHANGE_SHARE`. Chosen by hand."""
 _LEAK_SHARE = 1e-5
-"""Decay of the state per sample, relative: without it, unobservable states have no steady-state filter."""
+"""Decay of the state per sample, relative: without it, unobservable states have no steady-state filter. Chosen by
+hand."""
 _PROCESS_NOISE = 1e-12
 """Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
-solution."""
+solution. Chosen by hand."""
 _DOUBLINGS = 40
-"""Largest number of doublings; 40 of them are equivalent to 2^40 samples of the filter."""
+"""Largest number of doublings of the Riccati equation; 40 are equivalent to 2^40 samples of the filter."""
 _MATRIX = types.float64[:, ::1]
 _READONLY_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 
@@ -57,8 +58,8 @@ def run_smoother(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes
 ) -> None:
     """Run the smoother of the module's equations: fill `smoothed` (n, s), whose first row is the initial prediction.
 
-    transition (s, s): T; observation (c, s): H; gain (s, c): K; smoother_gain (s, s): S. step_input (n, s): (B u, 0)
-    of the step that begins at a sample. measured (n, c): y - D u; a sample with a NaN is skipped."""
+    transition (s, s): T; observation (c, s): H; gain (s, c): K; smoother_gain (s, s): S. step_input (n, s): (B u, 0) of
+    the step that begins at a sample. measured (n, c): y - D u; a sample with a NaN is skipped."""
     n, s, c = smoothed.shape[0], smoothed.shape[1], observation.shape[0]
     predicted = np.empty((n, s))
     state = smoothed[0].copy()
@@ -113,22 +114,25 @@ def smooth_motion(
     at a sample, effects included. channel_noise: (c,), standard deviations of the measured channels. Raises
     numpy.linalg.LinAlgError where no stable filter exists."""
     rate_hz, m = record.recording.sample_rate_hz, model.inputs
-    steps, state_count = discretise_model(model, 1 / rate_hz), 2 * model.coordinates
+    discrete_model, state_count = discretise_model(model, 1 / rate_hz), 2 * model.coordinates
     transition = np.eye(state_count + m)
     transition[:state_count, :state_count], transition[:state_count, state_count:] = (
-        steps.transition,
-        steps.by_axis_force,
+        discrete_model.transition,
+        discrete_model.state_by_port_force,
     )
     transition *= 1 - _LEAK_SHARE
-    observation, feedthrough = _build_observation_matrices(steps, record.measured.shape[1])
-    expected_force = EXPECTED_CHANGE_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
+    observation, feedthrough = _build_observation_matrices(discrete_model, record.measured.shape[1])
+    expected_force = EXPECTED_CHANGE_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12  # N; above 0
     walk_variance = np.concatenate([np.zeros(state_count), expected_force**2 / (CHANGE_TIME_S * rate_hz)])
     gain, smoother_gain = _compute_smoother_gains(
-        transition, observation / channel_noise[:, None], walk_variance, _estimate_state_sizes(steps, expected_force)
+        transition,
+        observation / channel_noise[:, None],
+        walk_variance,
+        _estimate_state_sizes(discrete_model, expected_force),
     )
     gain = gain / channel_noise[None, :]
     measured = _subtract_feedthrough(model, record, forces, feedthrough)
-    step_input = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
+    step_input = np.hstack([forces @ discrete_model.state_by_port_force.T, np.zeros((len(forces), m))])
     smoothed = np.zeros((len(forces), state_count + m))
     first_complete = measured[np.isfinite(measured).all(axis=1)][:1]
     if len(first_complete):
@@ -142,23 +146,24 @@ def smooth_motion(
         np.ascontiguousarray(measured),
         smoothed,
     )
-    axis_motion = smoothed[:, :state_count] @ steps.motion[: 2 * m].T
+    axis_motion = smoothed[:, :state_count] @ discrete_model.motion[: 2 * m].T
     return SmoothedMotion(smoothed[:, :state_count], axis_motion[:, :m], axis_motion[:, m:], smoothed[:, state_count:])
 
 
-def _build_observation_matrices(steps: DiscreteModel, channels: int) -> tuple[FloatArray, FloatArray]:
-    """Observation matrix H (c, s + m) of state and missing force, and feedthrough D (c, m) of the force during the step
-    before."""
-    p, m = len(steps.position), steps.by_axis_force.shape[1]
-    response_by_state = np.vstack([steps.response, steps.position])[:channels]
-    response_by_force = np.vstack([steps.response_by_axis_force, np.zeros((p, m))])[:channels]
+def _build_observation_matrices(discrete_model: DiscreteModel, channel_count: int) -> tuple[FloatArray, FloatArray]:
+    """Build the observation matrix H (c, s + m) of state and missing force, and feedthrough D (c, m) of the force
+    during the step before."""
+    p, m = len(discrete_model.position), discrete_model.state_by_port_force.shape[1]
+    response_by_state = np.vstack([discrete_model.response, discrete_model.position])[:channel_count]
+    response_by_force = np.vstack([discrete_model.response_by_port_force, np.zeros((p, m))])[:channel_count]
     return np.ascontiguousarray(np.hstack([response_by_state, response_by_force])), response_by_force
 
 
 def _subtract_feedthrough(
     model: MechanicalModel, record: Observed, forces: FloatArray, feedthrough: FloatArray
 ) -> FloatArray:
-    """(n, c): measured channels without the sensor's low pass, less the feedthrough of the force in the step before."""
+    """Compute (n, c): measured channels without the sensor's low pass, less the feedthrough of the force in the step
+    before."""
     measured, responses = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
         measured[:, :responses] = undo_low_pass(
@@ -168,11 +173,16 @@ def _subtract_feedthrough(
     return measured
 
 
-def _estimate_state_sizes(steps: DiscreteModel, expected_force: FloatArray) -> FloatArray:
-    """(s + m,): scales of position, velocity and missing force: what a force of `expected_force` causes within
-    `CHANGE_TIME_S`."""
-    n = len(steps.transition) // 2
-    velocity_size = np.abs(steps.by_axis_force[n:]) @ expected_force / steps.step_s * CHANGE_TIME_S
+def _estimate_state_sizes(discrete_model: DiscreteModel, expected_force: FloatArray) -> FloatArray:
+    """Estimate (s + m,): scales of position, velocity and missing force: what a force of `expected_force` causes within
+    `CHANGE_TIME_S`. A velocity scale is at least 1e-6 of the largest, so that no division is by zero."""
+    coordinate_count = len(discrete_model.transition) // 2
+    velocity_size = (
+        np.abs(discrete_model.state_by_port_force[coordinate_count:])
+        @ expected_force
+        / discrete_model.step_s
+        * CHANGE_TIME_S
+    )
     velocity_size = np.maximum(velocity_size, 1e-6 * velocity_size.max())
     return np.concatenate([velocity_size * CHANGE_TIME_S, velocity_size, expected_force])
 
@@ -180,9 +190,9 @@ def _estimate_state_sizes(steps: DiscreteModel, expected_force: FloatArray) -> F
 def _compute_smoother_gains(
     transition: FloatArray, observation: FloatArray, walk_variance: FloatArray, sizes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Gains K (s, c) of the Kalman filter and S (s, s) of the backward pass. observation: H for channels in units of
-    their noise. walk_variance: (s,), variance of w per sample. sizes: (s,), scales of the states, by which the
-    equations are made well-conditioned."""
+    """Compute the gains K (s, c) of the Kalman filter and S (s, s) of the backward pass. observation: H for channels in
+    units of their noise. walk_variance: (s,), variance of w per sample. sizes: (s,), scales of the states, by which the
+    equations are made well-conditioned. Raises numpy.linalg.LinAlgError where the filter is not stable."""
     noise_covariance = np.eye(len(observation))
     scaled_transition, scaled_observation = transition * sizes[None, :] / sizes[:, None], observation * sizes[None, :]
     process_noise = np.diag(walk_variance / sizes**2) + _PROCESS_NOISE * np.eye(len(transition))
@@ -204,8 +214,8 @@ def _compute_smoother_gains(
 def _solve_riccati_by_schur_form(
     transition: FloatArray, observation: FloatArray, process_noise: FloatArray
 ) -> FloatArray:
-    """Steady prediction covariance P (s, s) by an ordered Schur form (SciPy). Raises numpy.linalg.LinAlgError where it
-    does not exist."""
+    """Compute the steady prediction covariance P (s, s) by an ordered Schur form (SciPy). Raises
+    numpy.linalg.LinAlgError where it does not exist."""
     try:
         return np.asarray(solve_discrete_are(transition.T, observation.T, process_noise, np.eye(len(observation))))
     except ValueError as error:  # not finite
@@ -215,8 +225,8 @@ def _solve_riccati_by_schur_form(
 def _solve_riccati_by_doubling(
     state_transition: FloatArray, observation: FloatArray, process_noise: FloatArray
 ) -> FloatArray:
-    """Steady prediction covariance P (s, s) by the doubling algorithm (Anderson 1978), for channels with unit noise.
-    Raises numpy.linalg.LinAlgError where it does not converge."""
+    """Compute the steady prediction covariance P (s, s) by the doubling algorithm (Anderson 1978), for channels with
+    unit noise. Raises numpy.linalg.LinAlgError where it does not converge to 1e-10 (relative) within `_DOUBLINGS`."""
     transition, information, covariance = state_transition.T, observation.T @ observation, process_noise
     for _ in range(_DOUBLINGS):
         solutions = np.linalg.solve(

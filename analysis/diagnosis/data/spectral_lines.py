@@ -3,8 +3,8 @@ noise.
 
 A linear device responds on driven lines only. Where all driven lines are odd multiples of one line, odd distortion
 falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon, IEEE Control Systems 36 (2016), 38).
-The driven lines are found in the measured excitation, so that any multisine with silent lines is suitable.
-Used by `analysis.diagnosis.localisation`.
+The driven lines are found in the measured excitation, so that any multisine with silent lines is suitable. Called by
+the modules of `analysis.diagnosis.localisation`.
 
 Lines are tested in octaves that begin at powers of 2 Hz, the same for all recordings, so that results of different
 recordings can be compared band by band. The ratio of the power on silent lines to that of the noise is F-distributed.
@@ -28,7 +28,7 @@ _DRIVEN_SHARE = 0.01
 """Least power of a driven input, relative to the strongest. Chosen by hand."""
 _MAX_INCONCLUSIVE_CHANGES = 16
 """Number of changes of a command up to which the length of its zero-order hold is not estimated. Chosen by hand."""
-_SMALLEST_POSITIVE = np.finfo(np.float64).tiny
+_SMALLEST_POSITIVE = np.finfo(np.float64).tiny  # least noise power of a line, against division by zero
 _MAX_F_RATIO = 1e300
 """Upper limit of an F ratio: SciPy returns NaN for infinity."""
 
@@ -44,7 +44,7 @@ class DetectionLines:
     even: Mask
     """Silent lines that only even distortion reaches."""
     either: Mask
-    """Silent lines that odd and even distortion reach, because even lines were driven, too."""
+    """Silent lines that odd and even distortion reach, because even lines were driven, too, or a single line was."""
     step: int
     """Greatest common divisor of the driven lines' numbers: lines between its multiples detect noise only."""
 
@@ -55,8 +55,8 @@ class DetectionLines:
 
 
 def find_detection_lines(excitation: ComplexArray, hold_samples: int = 1) -> DetectionLines | None:
-    """Driven lines of a periodic excitation, and the silent lines on which distortion appears; None where no line is
-    driven.
+    """Find the driven lines of a periodic excitation, and the silent lines on which distortion appears; None where no
+    line is driven.
 
     excitation: (lines, inputs), spectrum of one period, line k in row k - 1. hold_samples: samples for which each value
     of the command is held (zero-order hold); above half of its update rate there are only images, which do not count as
@@ -70,11 +70,11 @@ def find_detection_lines(excitation: ComplexArray, hold_samples: int = 1) -> Det
     driven = np.asarray(
         (amplitude > _SILENT_SHARE * np.maximum(amplitude.max(axis=0), 0.1 * largest_amplitude)).any(axis=1)
     )
-    numbers = np.arange(1, len(driven) + 1)
-    step = int(np.gcd.reduce(numbers[driven]))
-    lowest, highest = numbers[driven][[0, -1]]
-    silent_lines = ~driven & (numbers >= lowest) & (numbers <= highest) & (numbers % step == 0)
-    multiples = numbers // step
+    line_numbers = np.arange(1, len(driven) + 1)
+    step = int(np.gcd.reduce(line_numbers[driven]))
+    lowest, highest = line_numbers[driven][[0, -1]]
+    silent_lines = ~driven & (line_numbers >= lowest) & (line_numbers <= highest) & (line_numbers % step == 0)
+    multiples = line_numbers // step
     odd_only = bool((multiples[driven] % 2 == 1).all()) and highest > lowest
     no_lines = np.zeros(len(driven), dtype=np.bool_)
     if not odd_only:
@@ -89,18 +89,18 @@ def find_detection_lines(excitation: ComplexArray, hold_samples: int = 1) -> Det
 
 
 def compute_hold_samples(command: npt.NDArray[np.float64]) -> int:
-    """Length of the command's zero-order hold in samples: the greatest common divisor of the distances between its
-    changes; 1 where it changes at most `_MAX_INCONCLUSIVE_CHANGES` times. command: (n, inputs)."""
+    """Compute the length of the command's zero-order hold in samples: the greatest common divisor of the distances
+    between its changes; 1 where it changes at most `_MAX_INCONCLUSIVE_CHANGES` times. command: (n, inputs)."""
     change_indices = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
     return int(np.gcd.reduce(np.diff(change_indices))) if len(change_indices) > _MAX_INCONCLUSIVE_CHANGES else 1
 
 
 def list_octaves(from_hz: float, to_hz: float) -> tuple[Band, ...]:
-    """All octaves [2^k, 2^(k+1)) Hz that overlap the closed interval from `from_hz` to `to_hz`, both positive; so an
-    upper end at 2^k adds the octave from 2^k."""
-    first = int(np.floor(np.log2(from_hz) + 1e-9))
-    last = int(np.floor(np.log2(to_hz) + 1e-9))
-    return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
+    """List all octaves [2^k, 2^(k+1)) Hz that overlap the closed interval from `from_hz` to `to_hz`, both positive; an
+    upper end at 2^k therefore adds the octave from 2^k. Ends within 1e-9 octaves of 2^k count as 2^k (rounding)."""
+    first_power = int(np.floor(np.log2(from_hz) + 1e-9))
+    last_power = int(np.floor(np.log2(to_hz) + 1e-9))
+    return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first_power, last_power + 1))
 
 
 def select_lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
@@ -109,8 +109,9 @@ def select_lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
 
 
 def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the inputs that were driven in a segment: those with more than a hundredth of the power of the
-    strongest. An input that is only moved by feedback has less, where the excitation was recorded. power: (inputs,)."""
+    """Find the names of the inputs that were driven in a segment: those with more than `_DRIVEN_SHARE` of the power of
+    the strongest; none without power. An input that is only moved by feedback has less, where the excitation was
+    recorded. power: (inputs,)."""
     if power.max(initial=0.0) == 0:
         return ()
     return tuple(
@@ -121,8 +122,9 @@ def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[st
 def compute_noncentral_f_sf(
     ratio: npt.ArrayLike, lines: npt.ArrayLike, freedom: npt.ArrayLike, noncentrality: npt.ArrayLike
 ) -> FloatArray:
-    """Survival function P(F >= ratio) of a noncentral F distribution with d = 2 `lines` and `freedom` degrees of
-    freedom, by the central F of equal first two moments (Patnaik, Biometrika 36 (1949) 202): with noncentrality c,
+    """Compute the survival function P(F >= ratio) of a noncentral F distribution with d = 2 `lines` and `freedom`
+    degrees of freedom, by the central F of equal first two moments (Patnaik, Biometrika 36 (1949) 202): with
+    noncentrality c,
 
         d' = (d + c)² / (d + 2 c),    P(F >= f) = P(F_central(d', freedom) >= f d / (d + c)).
 
@@ -136,12 +138,13 @@ def compute_noncentral_f_sf(
 
 
 def compute_excess_power(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
-    """Summed power beyond noise, its detection limit (two standard errors of the noise), and the p-value.
+    """Compute the summed power beyond noise, its detection limit (two standard errors of the noise), and the p-value.
 
     power: p (lines,), squared magnitudes. noise: s (lines,), their expectation without a signal, estimated with
     `freedom` degrees of freedom. Without a signal each p is exponential with mean s, so that the mean of p / s has an F
-    distribution with 2 lines and `freedom` degrees of freedom, and the variance of sum(p - s) is
-    sum(s²) + 2 sum(s)² / freedom, the second part from the error of s, which all lines share.
+    distribution with 2 lines and `freedom` degrees of freedom, and the variance of sum(p - s) is sum(s²) + 2 sum(s)² /
+    freedom, the second part from the error of s, which all lines share. Returns 0, 0 and 1 without lines, or where the
+    noise is not finite.
     """
     if len(power) == 0 or not np.isfinite(noise).all():
         return 0.0, 0.0, 1.0

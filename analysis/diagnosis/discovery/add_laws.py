@@ -1,9 +1,9 @@
-"""Adds discovered laws (formulas outside the catalogue of effects) to the result of a search for catalogue effects.
+"""Add discovered laws (formulas outside the catalogue of effects) to the result of a search for catalogue effects.
 
 Laws are searched where the catalogue leaves a mismatch, or where its named effects may only approximate a law. They
 replace the named effects if they pass the checks of `validation` on held-out data; otherwise they are reported as
 unconfirmed candidates, with the reasons. The search itself is `discover_laws`; its equations are in the package's
-docstring.
+docstring. Called by `search_by_simulation`.
 """
 
 import itertools
@@ -29,8 +29,14 @@ from analysis.diagnosis.search.parsimony import has_far_smaller_error
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
 from analysis.diagnosis.search.time_budget import limit_map
-from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
-from analysis.diagnosis.settings import HELD_OUT_ALONE_ERROR, LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN
+from analysis.diagnosis.search.verdict import SearchResult, UnconfirmedEffect, judge
+from analysis.diagnosis.settings import (
+    HELD_OUT_ALONE_ERROR,
+    LAW_MOST_ROUNDS,
+    LEAST_PITCH_PERIODS,
+    NAMED_ERROR,
+    NOISE_ALONE,
+)
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import AxisForce
 from equalizer.laws.law import Law
@@ -47,8 +53,8 @@ class LawSearch:
     """Per completed search: the re-tuned model, the largest number of laws, and the discovery, None where there was
     none."""
 
-    def add_short(self, result: SearchResult) -> SearchResult:
-        """Add laws as `add_any`, but only those that are a shorter description than two effects of the catalogue
+    def add_short_laws(self, result: SearchResult) -> SearchResult:
+        """Add laws as `add_laws`, but only those that are a shorter description than two effects of the catalogue
         (`is_short_description`)."""
         if not _needs_law(result) or not self.time_left():
             return result
@@ -63,13 +69,13 @@ class LawSearch:
             else result
         )
 
-    def add_before_third(self, result: SearchResult) -> SearchResult:
-        """Add laws as `add_any`, where the two effects of `result`, which were not judged yet, leave a mismatch."""
+    def add_laws_before_third_effect(self, result: SearchResult) -> SearchResult:
+        """Add laws as `add_laws`, where the two effects of `result`, which were not judged yet, leave a mismatch."""
         is_explained = result.judgement.named or judge(result.found).verdict == "explained"
-        return result if is_explained else self.add_any(result)
+        return result if is_explained else self.add_laws(result)
 
-    def add_any(self, result: SearchResult) -> SearchResult:
-        """The result with discovered laws in place of its named effects. Unchanged where it needs no law or no law is
+    def add_laws(self, result: SearchResult) -> SearchResult:
+        """Replace the named effects of a result by discovered laws. Unchanged where it needs no law or no law is
         better; with laws that fail a check of `validation` as unconfirmed candidates only."""
         if not _needs_law(result) or not self.time_left():
             return result
@@ -96,15 +102,15 @@ def is_short_description(discovery: Discovery) -> bool:
         for term_sum in (round_.sums[0], round_.sums[0].partner)
         if term_sum is not None
     ]
-    places = {(term_sum.acts_on, term_sum.axis) for term_sum in term_sums}
-    if any(len(term_sum.terms) > 1 for term_sum in term_sums) or len(places) < len(term_sums):
+    acting_places = {(term_sum.acts_on, term_sum.axis) for term_sum in term_sums}
+    if any(len(term_sum.terms) > 1 for term_sum in term_sums) or len(acting_places) < len(term_sums):
         return False
     return len(term_sums) == 1 or all(depends_on_another_axis(term_sum) for term_sum in term_sums)
 
 
 def check_laws(result: SearchResult, discovery: Discovery, time_left: TimeBudget) -> SearchResult:
-    """The result with the laws in place of its named effects where they pass all checks, else with the laws as
-    unconfirmed candidates; unchanged where the laws do not lower the held-out error."""
+    """Replace the named effects of a result by the laws where these pass all checks, else add the laws as unconfirmed
+    candidates; unchanged where the laws do not lower the held-out error."""
     context, catalogue_explanation = result.context, result.found
     if time_left():
         discovery = choose_on_held_out(replace(context, map_=limit_map(context.map_, time_left)), discovery)
@@ -112,12 +118,14 @@ def check_laws(result: SearchResult, discovery: Discovery, time_left: TimeBudget
         return result
     identifiable = keep_identifiable(context, discovery.explanation, time_left)
     has_unidentifiable = len(identifiable.steps) < len(discovery.explanation.steps)
-    reduced = (
-        _keep_rounds_of(discovery, identifiable) if has_unidentifiable and _improves_held_out(identifiable) else None
+    reduced_discovery = (
+        _restrict_discovery(discovery, identifiable)
+        if has_unidentifiable and _improves_held_out(identifiable)
+        else None
     )
-    if reduced is not None:
+    if reduced_discovery is not None:
         # Only identifiable laws remain. A law that is not identifiable must not prevent these from being named.
-        discovery, has_unidentifiable = reduced, False
+        discovery, has_unidentifiable = reduced_discovery, False
     rivals, judgement = _list_rivals(context, catalogue_explanation), judge(identifiable)
     reasons = (
         *_find_rival_objections(context, catalogue_explanation, discovery, rivals),
@@ -138,7 +146,7 @@ def check_laws(result: SearchResult, discovery: Discovery, time_left: TimeBudget
 def _find_rival_objections(
     context: SearchContext, catalogue_explanation: Explanation, discovery: Discovery, rivals: Sequence[FittedCandidate]
 ) -> Iterator[str]:
-    """Reasons, as sentences, why the laws do not replace the explanations of the catalogue: failed checks of
+    """Find the reasons, as clauses, why the laws do not replace the explanations of the catalogue: failed checks of
     `validation`, and rivals whose error is hardly larger."""
     if catalogue_explanation.steps and may_approximate_law(context, catalogue_explanation):
         rivals = [rival for rival in rivals if not is_shorter_and_as_good(context, discovery, rival)]
@@ -148,7 +156,7 @@ def _find_rival_objections(
 
 
 def _find_fit_objections(discovery: Discovery, explanation: Explanation) -> Iterator[str]:
-    """Reasons, as sentences, from the fit itself: it ended early, or its held-out error is too large."""
+    """Find the reasons, as clauses, in the fit itself: it ended early, or its held-out error is too large."""
     if not all(round_.complete for round_ in discovery.rounds):
         yield "the time limit was reached before other laws were fitted"
     held_out_error = float(np.nanmax(explanation.after.score.test, initial=0.0))
@@ -180,17 +188,18 @@ def _needs_law(result: SearchResult) -> bool:
 
 def may_approximate_law(context: SearchContext, explanation: Explanation) -> bool:
     """Whether named effects that fit may only approximate a law that the catalogue lacks: several forces on the same
-    axes, or an effect whose parameters exceed the recorded range (a periodic force needs `PITCHES_SEEN` periods)."""
+    axes, or an effect whose parameters exceed the recorded range (a periodic force needs `LEAST_PITCH_PERIODS`
+    periods)."""
     fitted, claims = explanation.after.fitted, explanation.after.fitted.hypothesis.claims
-    forces = all(isinstance(claim.effect.action, AxisForce) for claim in claims)
-    if len(claims) > 1 and forces and len({claim.sites for claim in claims}) == 1:
+    are_forces = all(isinstance(claim.effect.action, AxisForce) for claim in claims)
+    if len(claims) > 1 and are_forces and len({claim.sites for claim in claims}) == 1:
         return True
     records = gather_evidence(context.full_measure, context.tuning, fitted)
-    within_data = (
-        any(is_within_data(fitted.hypothesis, k, record, PITCHES_SEEN) for record in records)
-        for k in range(len(claims))
+    are_within_data = (
+        any(is_within_data(fitted.hypothesis, claim_index, record, LEAST_PITCH_PERIODS) for record in records)
+        for claim_index in range(len(claims))
     )
-    return not all(within_data)
+    return not all(are_within_data)
 
 
 def _improves_held_out(explanation: Explanation) -> bool:
@@ -203,13 +212,13 @@ def _improves_held_out(explanation: Explanation) -> bool:
 
 
 def _compute_held_out_log_error(candidate: FittedCandidate) -> float:
-    """Mean over the channels of the log held-out rms error, in units of the noise."""
+    """Compute the mean over the channels of the log held-out rms error, in units of the noise."""
     return float(np.mean(np.log(candidate.score.test)))
 
 
 def _list_rivals(context: SearchContext, catalogue_explanation: Explanation) -> list[FittedCandidate]:
-    """Rivals of the laws from the catalogue: the explanation with its named effects, and the best single effect that
-    does not contain an excluded one (`SearchContext.excluded`), for which it would stand."""
+    """List the rivals of the laws from the catalogue: the explanation with its named effects, and the best single
+    effect that does not contain an excluded one (`SearchContext.excluded`), for which it would stand."""
     rivals = [catalogue_explanation.after] if catalogue_explanation.steps else []
     single_effects = catalogue_explanation.rounds[0] if catalogue_explanation.rounds else ()
     nameable_effects = (
@@ -221,22 +230,26 @@ def _list_rivals(context: SearchContext, catalogue_explanation: Explanation) -> 
     return rivals
 
 
-def _yield_candidates(context: SearchContext, discovery: Discovery, reasons: tuple[str, ...]) -> Iterator[Unconfirmed]:
-    """Each law as an unconfirmed candidate, with the gain of all laws together."""
+def _yield_candidates(
+    context: SearchContext, discovery: Discovery, reasons: tuple[str, ...]
+) -> Iterator[UnconfirmedEffect]:
+    """Yield each law as an unconfirmed candidate, with the gain of all laws together."""
     gain = estimate_held_out_gain(context.full_measure, discovery.explanation.retuned, discovery.explanation.after)
     hypothesis = discovery.explanation.after.fitted.hypothesis
-    for number, law in enumerate(list_fitted_laws(hypothesis)):
+    for law_index, law in enumerate(list_fitted_laws(hypothesis)):
         if law is not None:
-            yield Unconfirmed(hypothesis, 0.0 if gain is None else max(gain.gain, 0.0), "; ".join(reasons), number)
+            yield UnconfirmedEffect(
+                hypothesis, 0.0 if gain is None else max(gain.gain, 0.0), "; ".join(reasons), law_index
+            )
 
 
-def _keep_rounds_of(discovery: Discovery, reduced: Explanation) -> Discovery | None:
-    """The discovery restricted to the explanation `reduced`, which has some of its laws in the same order, and to the
+def _restrict_discovery(discovery: Discovery, reduced: Explanation) -> Discovery | None:
+    """Restrict a discovery to the explanation `reduced`, which has some of its laws in the same order, and to the
     rounds that found these. None where `reduced` has no law, or a law that belongs to no round: the checks of a law
     need the data of its round."""
     if not reduced.steps:
         return None
-    remaining = [
+    remaining_structures = [
         _identify_structure(law) for law in list_fitted_laws(reduced.after.fitted.hypothesis)[-len(reduced.steps) :]
     ]
     structures = [
@@ -245,14 +258,14 @@ def _keep_rounds_of(discovery: Discovery, reduced: Explanation) -> Discovery | N
     ]
     rounds: list[Round] = []
     for round_ in discovery.rounds:
-        size = 1 if round_.sums[0].partner is None else 2
-        if remaining[:size] == structures[:size]:
+        law_count = 1 if round_.sums[0].partner is None else 2
+        if remaining_structures[:law_count] == structures[:law_count]:
             rounds.append(round_)
-            remaining = remaining[size:]
-        structures = structures[size:]
-    return None if remaining else replace(discovery, explanation=reduced, rounds=tuple(rounds))
+            remaining_structures = remaining_structures[law_count:]
+        structures = structures[law_count:]
+    return None if remaining_structures else replace(discovery, explanation=reduced, rounds=tuple(rounds))
 
 
 def _identify_structure(law: Law | None) -> tuple[str, str, str] | None:
-    """Identity of a law without its parameters: formula, what it acts on, and axis."""
+    """Identify a law without its parameters: formula, what it acts on, and axis; None for None."""
     return None if law is None else (law.expression, law.acts_on, law.axis)

@@ -29,12 +29,13 @@ _COUPLING_FORMULA = re.compile(rf"p0\*(v?)([{AXES}])")
 """Formula of a force that is linear in the motion of an axis; groups: "v" for velocity or nothing for position, and the
 axis that moves."""
 _START_SHARE = 1e-9
-"""Factor with which the opposite force of a pair enters a fit, relative to the factor of the force."""
+"""Factor with which the opposite force of a pair enters a fit, relative to the factor of the force: not 0, so that its
+sign is known, and too small to change the prediction. Chosen by hand."""
 
 
 def find_antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
-    """Antisymmetric sums for all pairs of axes, with velocities and with positions, whose two forces, fitted one at a
-    time, have factors of opposite signs. views: one per axis and place; only those of forces are used."""
+    """Find the antisymmetric sums for all pairs of axes, with velocities and with positions, whose two forces, fitted
+    one at a time, have factors of opposite signs. views: one per axis and place; only those of forces are used."""
     forces = [view for view in views if view.acts_on == "force"][: len(AXES)]
     for (first_view, second_view), prefix in product(combinations(forces, 2), ("v", "")):
         halves = [
@@ -49,7 +50,7 @@ def find_antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
 
 
 def _combine_halves(force: Sum, partner: Sum, factor: float) -> Sum:
-    """Both forces as one sum with opposite factors; its errors are the means of the two fits."""
+    """Combine both forces to one sum with opposite factors; its errors are the means of the two fits."""
     return replace(
         force, factors=(factor,),
         cross_validated_error=(force.cross_validated_error + partner.cross_validated_error) / 2,
@@ -60,9 +61,9 @@ def _combine_halves(force: Sum, partner: Sum, factor: float) -> Sum:
 
 
 def list_pair_starts(pair: Sum) -> tuple[Sum, ...]:
-    """Starting values for the fit of a pair: with its factors, and with half of them. Where the model has a coupled
-    parameter, each force was fitted together with it, and the parameter took the place of the other force: the factor
-    is then twice the right one."""
+    """List the starting values for the fit of a pair: with its factors, and with half of them. Where the model has a
+    coupled parameter, each force was fitted together with it, and the parameter took the place of the other force: the
+    factor is then twice the right one."""
     assert pair.partner is not None
     half_factor, partner_sum = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
     return pair, replace(pair, factors=(half_factor,), partner=partner_sum)
@@ -78,7 +79,8 @@ def is_coupling(term_sum: Sum) -> bool:
 
 
 def sum_squared_coupling_deviations(tuning: Tuning, fitted: Fitted) -> float:
-    """Sum of squares of the deviations of the model's coupled damping and stiffness from their calibration."""
+    """Sum the squared deviations of the model's coupled damping and stiffness from their calibration, in standard
+    deviations."""
     m = tuning.model.inputs
     parameter_indices = [
         _find_coupled_parameter(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)
@@ -87,7 +89,7 @@ def sum_squared_coupling_deviations(tuning: Tuning, fitted: Fitted) -> float:
 
 
 def convert_to_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], pair: Sum) -> Fitted | None:
-    """The fit of a single force, rewritten as a pair of half its factor with the same prediction: the model's coupled
+    """Rewrite the fit of a single force as a pair of half its factor with the same prediction: the model's coupled
     parameter takes the symmetric half. single: fit and sum of that force. None where force and pair depend on different
     motions, or the parameter would leave its bounds."""
     fitted, term_sum = single
@@ -106,8 +108,8 @@ def convert_to_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted,
 
 
 def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> Fitted:
-    """The fit with the factors of each pair made antisymmetric: their mean is added to the model's coupled parameter,
-    which is the symmetric part. Unchanged where there is no pair, or the parameter would leave its bounds."""
+    """Make the factors of each pair of a fit antisymmetric: their mean is added to the model's coupled parameter, which
+    is the symmetric part. Unchanged where there is no pair, or the parameter would leave its bounds."""
     couplings = _find_coupled_laws(fitted, measure.records[0].recording.command.channels)
     values, deviations = (
         [dict(placed_effect.values) for placed_effect in fitted.hypothesis.list_placed_effects()],
@@ -124,9 +126,9 @@ def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) ->
             values[claim_index]["p0"], values[partner_index]["p0"] = factor - mean_factor, partner_factor - mean_factor
     if (deviations == fitted.deviations).all() or np.abs(deviations).max() > tuning.bound:
         return fitted
-    parts = zip(fitted.hypothesis.claims, values, strict=True)
+    claims_with_values = zip(fitted.hypothesis.claims, values, strict=True)
     hypothesis = reduce(
-        combine_hypotheses, [make_claim_hypothesis(claim, [claim_values]) for claim, claim_values in parts]
+        combine_hypotheses, [make_claim_hypothesis(claim, [claim_values]) for claim, claim_values in claims_with_values]
     )
     return evaluate_fit(measure, tuning, deviations, hypothesis)
 
@@ -149,8 +151,8 @@ def can_coupling_imitate(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
 
 
 def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
-    """Index of the claim and factor of each force that is linear in the motion of an axis, by prefix of the motion ("v"
-    or empty), axis of the force and axis of the motion."""
+    """Find the index of the claim and the factor of each force that is linear in the motion of an axis, by prefix of
+    the motion ("v" or empty), axis of the force and axis of the motion."""
     names, couplings = derive_axis_letters(inputs), {}
     for claim_index, (claim, law) in enumerate(
         zip(fitted.hypothesis.claims, list_fitted_laws(fitted.hypothesis), strict=True)
@@ -162,7 +164,7 @@ def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[st
 
 
 def _find_coupled_parameter(tuning: Tuning, prefix: str, axis: int, coupled_axis: int) -> int:
-    """Index among the model's parameters of the coupled damping (prefix v) or stiffness of two axes."""
+    """Find the index among the model's parameters of the coupled damping (prefix v) or stiffness of two axes."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     return (1 if prefix else 2) * len(pairs) + pairs.index((min(axis, coupled_axis), max(axis, coupled_axis)))

@@ -25,7 +25,7 @@ from analysis.diagnosis.settings import (
     LAW_BEAM,
     LAW_MAIN_PART,
     LAW_MOST_TERMS,
-    LAW_REFINED,
+    LAW_STARTS_REFINED,
     LAW_WORTH_SHARE,
 )
 from analysis.diagnosis.types import TimeBudget
@@ -165,7 +165,7 @@ def _fit_best_shapes(
         term = terms[term_index]
         family = term.family or term.shape
         if term.shape not in {candidate.shape for candidate in selected_terms} and (
-            len(refined_families) < LAW_REFINED or family in refined_families
+            len(refined_families) < LAW_STARTS_REFINED or family in refined_families
         ):
             term_by_shape.setdefault(term.shape, term)
             refined_families.add(family)

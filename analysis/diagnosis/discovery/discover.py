@@ -30,13 +30,13 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.time_budget import limit_map
 from analysis.diagnosis.settings import (
     EXPLAINED_ERROR,
-    LAW_ALMOST_NOISE,
-    LAW_ALONE_LEAVES,
+    LAW_ALONE_REMAINDER,
     LAW_AXES_SHARE,
-    LAW_COMMAND_TAKEN,
+    LAW_COMMAND_SHARE,
     LAW_FITTED,
     LAW_FITTED_WITHIN,
     LAW_MOST_ROUNDS,
+    LAW_NOISE_POWER,
     NOISE_ALONE,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -193,14 +193,14 @@ def _find_constant_forces(views: Sequence[View]) -> list[Sum]:
         constant
         for constant in constants
         if constant is not None
-        and constant.base_error > LAW_ALMOST_NOISE
+        and constant.base_error > LAW_NOISE_POWER
         and is_worth_adding(constant.base_error, constant.cross_validated_error)
     ]
 
 
 def _may_explain_alone(best_sum: Sum) -> bool:
-    """Whether a sum is a single term that leaves at most `LAW_ALONE_LEAVES` of the excess error in the screen."""
-    leaves_little = best_sum.cross_validated_error - 1 <= LAW_ALONE_LEAVES * (best_sum.base_error - 1)
+    """Whether a sum is a single term that leaves at most `LAW_ALONE_REMAINDER` of the excess error in the screen."""
+    leaves_little = best_sum.cross_validated_error - 1 <= LAW_ALONE_REMAINDER * (best_sum.base_error - 1)
     return leaves_little and len(best_sum.terms) == 1
 
 
@@ -216,12 +216,12 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 
 def _select_views_to_search(views: Sequence[View]) -> list[View]:
     """Select the views in which laws are searched, at most two of axes and two of readings, by falling excess error:
-    above `LAW_ALMOST_NOISE`, and at least `LAW_AXES_SHARE` of the largest of its kind."""
+    above `LAW_NOISE_POWER`, and at least `LAW_AXES_SHARE` of the largest of its kind."""
     selected: list[View] = []
     for acts_on in ("force", "response"):
         excess_by_output = [(_compute_excess_error(view), view.output) for view in views if view.acts_on == acts_on]
         largest_excess = max((excess for excess, _ in excess_by_output), default=0.0)
-        significant = [(excess, output) for excess, output in excess_by_output if excess > LAW_ALMOST_NOISE]
+        significant = [(excess, output) for excess, output in excess_by_output if excess > LAW_NOISE_POWER]
         selected += [
             views[output]
             for excess, output in sorted(significant, reverse=True)[:2]
@@ -231,7 +231,7 @@ def _select_views_to_search(views: Sequence[View]) -> list[View]:
 
 
 def _cancels_command(view: View, term_sum: Sum) -> bool:
-    """Whether a force cancels more than `LAW_COMMAND_TAKEN` (half) of the command of its axis. If mass, damping and
+    """Whether a force cancels more than `LAW_COMMAND_SHARE` (half) of the command of its axis. If mass, damping and
     stiffness shrink in proportion, the force balance then approaches its trivial solution 0 = 0."""
     if term_sum.acts_on != "force":
         return False
@@ -242,7 +242,7 @@ def _cancels_command(view: View, term_sum: Sum) -> bool:
             force = factor * evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
             cancelled -= float(force @ command)
         command_power += float(command @ command)
-    return cancelled > LAW_COMMAND_TAKEN * command_power
+    return cancelled > LAW_COMMAND_SHARE * command_power
 
 
 def _compute_excess_error(view: View) -> float:
@@ -262,12 +262,12 @@ def _compute_explained_squares(views: Sequence[View], term_sum: Sum) -> float:
 
 def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
     """Keep the sums whose error above the noise is at most `LAW_FITTED_WITHIN` times that of the first, which counts as
-    at least `LAW_ALMOST_NOISE` - 1."""
+    at least `LAW_NOISE_POWER` - 1."""
     return [
         term_sum
         for term_sum in sums
         if term_sum.cross_validated_error - 1
-        <= LAW_FITTED_WITHIN * max(sums[0].cross_validated_error - 1, LAW_ALMOST_NOISE - 1)
+        <= LAW_FITTED_WITHIN * max(sums[0].cross_validated_error - 1, LAW_NOISE_POWER - 1)
     ]
 
 

@@ -34,7 +34,7 @@ from analysis.diagnosis.search.search_context import (
 )
 from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_recordings
 from analysis.diagnosis.search.time_budget import OutOfTimeError
-from analysis.diagnosis.settings import LAW_NEAR
+from analysis.diagnosis.settings import LAW_EXPONENT_TOLERANCE
 from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
 
@@ -169,14 +169,16 @@ def put_simplest_first(
 
 
 def _count_parameters(fit_and_sum: tuple[FittedCandidate, Sum]) -> int:
-    """Count the free parameters of a sum. Exponents within `LAW_NEAR` of whole or half numbers are not counted, nor is
-    the factor of a soft limit that is 1."""
+    """Count the free parameters of a sum. Exponents within `LAW_EXPONENT_TOLERANCE` of whole or half numbers are not
+    counted, nor is the factor of a soft limit that is 1."""
     candidate, term_sum = fit_and_sum
     law = list_fitted_laws(candidate.fitted.hypothesis)[-1]
-    count = 0 if law is None else -int(is_full_soft_limit(law, LAW_NEAR))
+    count = 0 if law is None else -int(is_full_soft_limit(law, LAW_EXPONENT_TOLERANCE))
     for term in term_sum.terms:
         simple_exponents = [
-            k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR
+            k
+            for k in term.exponents
+            if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_EXPONENT_TOLERANCE
         ]
         count += 1 + len(term.numbers) - len(simple_exponents)
     return count

@@ -33,7 +33,7 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.band_limited import compute_low_pass_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_SETTLING_S = 2.0
+_SETTLING_S = 2.0  # chosen
 """Length (s) of the zeros appended to a record, so that the response at its end does not wrap around to the start."""
 
 
@@ -52,44 +52,44 @@ class FilteredRecord:
     force_response: ComplexArray
     """(lines, c, m), 1/N: response h from a force to the residuals, up to the last line with command power."""
     strength: FloatArray
-    """(lines, m), 1/N: norm of that response over the channels, |h|; limited from below to avoid a division by zero."""
+    """(lines, m), 1/N: norm of that response over the channels, |h|; at least 1e-9 of the axis's largest, so not 0."""
     reading_units: FloatArray
     """(p,): units of the residuals of the response channels; none where forces are compared."""
     block_slices: tuple[slice, ...]
     """Blocks of the cross-validation, as ranges of decimated samples."""
 
     def filter_residuals(self, residuals: FloatArray) -> FloatArray:
-        """(kept samples, m + p): output of each filter for residuals (n, c), decimated."""
+        """Compute (kept samples, m + p): output of each filter for residuals (n, c), decimated."""
         return self._filter_spectrum(rfft(residuals, self.length, axis=0)[: len(self.force_response)])
 
     def _filter_spectrum(self, spectrum: ComplexArray) -> FloatArray:
-        """(kept samples, m + p): output of each filter. spectrum: (lines, c), of residuals."""
+        """Compute (kept samples, m + p): output of each filter. spectrum: (lines, c), of residuals."""
         force_outputs = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
         return self._select_blocks(np.hstack([force_outputs, spectrum[:, : len(self.reading_units)]]))
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
-        """(kept samples, m + p): outputs for the residuals that forces (n, m), N, cause together. A force acts as in
-        `compute_column`."""
+        """Compute (kept samples, m + p): outputs for the residuals that forces (n, m), N, cause together. A force acts
+        as in `compute_column`."""
         step_mean = forces.copy()
         step_mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
         spectrum = rfft(step_mean, self.length, axis=0)[: len(self.force_response)]
         return self._filter_spectrum(np.einsum("lcm,lm->lc", self.force_response, spectrum))
 
-    def compute_column(self, added: FloatArray, output: int) -> FloatArray:
-        """(kept samples,): output of one filter. added: (n,), a force along its axis, N, or a change of its reading.
-        The force between two samples is the mean of both, because the model's commands are held over a step."""
+    def compute_column(self, signal: FloatArray, output: int) -> FloatArray:
+        """Compute (kept samples,): output of one filter. signal: (n,), a force along its axis, N, or change of its
+        reading. Forces are means of two samples, because the model's commands are held over a step."""
         lines, axes = self.strength.shape
         if output >= axes:
-            spectrum = rfft(added, self.length)[:lines] / self.reading_units[output - axes]
+            spectrum = rfft(signal, self.length)[:lines] / self.reading_units[output - axes]
         else:
-            step_mean = added.copy()
-            step_mean[:-1] = 0.5 * (added[1:] + added[:-1])
+            step_mean = signal.copy()
+            step_mean[:-1] = 0.5 * (signal[1:] + signal[:-1])
             spectrum = rfft(step_mean, self.length)[:lines] * self.strength[:, output]
         return self._select_blocks(spectrum[:, None])[:, 0]
 
     def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
-        """(kept samples, outputs): time series of a spectrum (lines, outputs), decimated to its band, in the blocks
-        only. Sums of squares are those at the full rate."""
+        """Compute (kept samples, outputs): time series of a spectrum (lines, outputs), decimated to its band, in the
+        blocks only. Sums of squares are those at the full rate."""
         sample_count = 2 * (len(spectrum) - 1)
         filtered = irfft(spectrum, sample_count, axis=0) * np.sqrt(sample_count / self.length)
         return np.concatenate([filtered[block] for block in self.block_slices])
@@ -120,7 +120,7 @@ class View:
 
 
 def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
-    """One view per driven axis, then one per response channel (up to the three that the grammar has names for)."""
+    """Build one view per driven axis, then one per response channel (at most three: the names of the grammar)."""
     model, placed_effects = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed_effects, fitted.residuals)
     filtered_records = tuple(
@@ -161,16 +161,16 @@ def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[
 
 
 def _set_missing_to_zero(residuals: FloatArray) -> FloatArray:
-    """Residuals with 0 where a reading is missing."""
+    """Replace missing residuals (NaN or infinite) by 0."""
     return np.where(np.isfinite(residuals), residuals, 0.0)
 
 
 def _compute_parameter_columns(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, filtered_records: Sequence[FilteredRecord], index: int
 ) -> FloatArray:
-    """(s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its index. For
-    mass, damping and stiffness it is that of their force along the measured motion, exact even for a wrong model; for
-    modes, a finite difference of simulations without the hypothesis; 0 where no such model is valid."""
+    """Compute (s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its
+    index. For mass, damping and stiffness it is that of their force along the measured motion, exact even for a wrong
+    model; for modes, a finite difference of simulations without the hypothesis; 0 where no such model is valid."""
     m = tuning.model.inputs
     axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if index < 3 * len(axis_pairs):
@@ -202,7 +202,7 @@ def _compute_parameter_columns(
 def _compute_parameter_force(
     record: FilteredRecord, tuning: Tuning, axis_pairs: Sequence[tuple[int, int]], parameter_index: int
 ) -> FloatArray:
-    """(n, m), N: external force equivalent to one standard deviation more of a mass, damping or stiffness entry."""
+    """Compute (n, m), N: external force equivalent to one standard deviation of a mass, damping or stiffness entry."""
     order, (i, j) = parameter_index // len(axis_pairs), axis_pairs[parameter_index % len(axis_pairs)]
     forces = np.zeros_like(record.missing_force)
     for axis, motion_axis in {(i, j), (j, i)}:
@@ -217,8 +217,8 @@ def _compute_parameter_force(
 
 
 def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) -> FilteredRecord:
-    """The filters of one record, up to a line just above that below which `LAW_POWER_KEPT` of the command power
-    lies."""
+    """Build the filters of one record, up to a line about 10 % and 8 lines (chosen) above that below which
+    `LAW_POWER_KEPT` of the command power lies."""
     rate_hz, n = evidence.sample_rate_hz, len(evidence.command)
     length = next_fast_len(n + int(_SETTLING_S * rate_hz), real=True)
     lines_hz = rfftfreq(length, 1 / rate_hz)
@@ -229,7 +229,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     strength = np.sqrt(np.sum(np.abs(force_response) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     ratio = 2 * (line_count - 1) / length
-    # The response to a force near the record's end is not recorded to its end, so that the last samples are left out.
+    # The response to a force near the record's end is cut off: the last samples, a quarter at most, are left out.
     end = n - min(_count_settling_samples(measure, evidence), n // 4)
     block_slices = tuple(
         slice(int(start * ratio), int(min(stop, end) * ratio)) for start, stop in _list_blocks(record) if start < end
@@ -242,7 +242,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
 
 
 def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, f_hz: FloatArray) -> ComplexArray:
-    """(lines, c, m), 1/N: see `FilteredRecord`. f_hz: frequencies (lines,)."""
+    """Compute (lines, c, m), 1/N: `FilteredRecord.force_response` at the frequencies f_hz (lines,)."""
     if isinstance(measure, PredictedForce):
         m = evidence.command.shape[1]
         band_gain = compute_low_pass_gain(f_hz, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
@@ -253,7 +253,7 @@ def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, f_hz: Flo
 
 
 def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
-    """Samples until the response to a force has decayed (`SETTLED_CONSTANTS` of the slowest time constant)."""
+    """Count the samples until the response to a force has decayed: `SETTLED_CONSTANTS` slowest time constants."""
     if isinstance(measure, PredictedForce):
         return 0
     largest_eigenvalue = float(
@@ -263,7 +263,7 @@ def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
 
 
 def _list_blocks(record: Observed) -> list[tuple[int, int]]:
-    """Start and stop of the segments that are not held out; with fewer than `LAW_BLOCKS` of them, of as many equal
+    """List start and stop of the segments that are not held out; with fewer than `LAW_BLOCKS` of them, of as many equal
     parts of the samples."""
     is_used = record.fit | record.choose
     blocks = [
@@ -283,17 +283,17 @@ def _list_blocks(record: Observed) -> list[tuple[int, int]]:
 
 
 def _compute_block_edges(filtered_records: Sequence[FilteredRecord]) -> tuple[int, ...]:
-    """Edges of all blocks where the kept samples of the records follow one another."""
+    """Compute the edges of all blocks where the kept samples of the records follow one another."""
     block_lengths = [block.stop - block.start for filtered in filtered_records for block in filtered.block_slices]
     return tuple(np.cumsum([0, *block_lengths]).tolist())
 
 
 def _compute_noise(measure: ErrorMeasure, filtered_records: Sequence[FilteredRecord], axis: int) -> float:
-    """Mean square of the noise in the output of an axis's matched filter."""
+    """Compute the mean square of the noise in the output of an axis's matched filter."""
     noise_power = (measure.noise / measure.unit) ** 2
-    shares = [
+    noise_shares = [
         np.sum(np.abs(filtered.force_response[:, :, axis]) ** 2 * noise_power[None, :], axis=1)
         / filtered.strength[:, axis] ** 2
         for filtered in filtered_records
     ]
-    return float(np.mean(np.concatenate(shares)))
+    return float(np.mean(np.concatenate(noise_shares)))

@@ -23,7 +23,8 @@ from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.signals.signal import FloatArray
 
 _LEAST_INDEPENDENT_SHARE = 1e-6
-"""Least share of a term's power that must be linearly independent of the base columns; below it rounding dominates."""
+"""Least share of a term's power that must be linearly independent of the base columns; below it rounding dominates.
+Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,23 +61,26 @@ class NormalEquations:
     @property
     def prior_right_side(self) -> FloatArray:
         """(k,): D w0, the prior's contribution to the right side of the normal equations."""
-        offset = np.zeros(len(self.prior_precision))
-        offset[: len(self.view.to_calibration)] = self.view.to_calibration
-        return self.prior_precision * offset
+        prior_mean = np.zeros(len(self.prior_precision))
+        prior_mean[: len(self.view.to_calibration)] = self.view.to_calibration
+        return self.prior_precision * prior_mean
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """(k,) each: lower and upper bounds of the weights: those of re-tuning for the model's parameters, else
         infinite. If mass, damping and stiffness could vanish, a force that cancels the command would explain the whole
         residual."""
-        offsets, k = self.view.to_calibration, len(self.prior_precision)
-        tuned = len(offsets) - 1
+        calibration, k = self.view.to_calibration, len(self.prior_precision)
+        tuned_count = len(calibration) - 1
         low, high = np.full(k, -np.inf), np.full(k, np.inf)
-        low[:tuned], high[:tuned] = offsets[:tuned] - RETUNING_BOUND, offsets[:tuned] + RETUNING_BOUND
+        low[:tuned_count], high[:tuned_count] = (
+            calibration[:tuned_count] - RETUNING_BOUND,
+            calibration[:tuned_count] + RETUNING_BOUND,
+        )
         return low, high
 
     def multiply_columns(self, columns: FloatArray) -> FloatArray:
-        """(blocks, k, terms): inner products of the base columns with those of terms. columns: (terms, s)"""
+        """Compute (blocks, k, terms): inner products of the base columns with those of terms. columns: (terms, s)"""
         products_by_block = []
         for block in self.blocks:
             term_columns = columns[:, block].T
@@ -89,7 +93,8 @@ class NormalEquations:
 
 
 def build_normal_equations(view: View) -> NormalEquations:
-    """Normal equations of a view without further terms: the columns are the model's parameters and a constant."""
+    """Build the normal equations of a view without further terms: the columns are the model's parameters and a
+    constant."""
     base, edges = view.parameter_columns, list(pairwise(view.edges))
     return NormalEquations(
         view,
@@ -101,7 +106,7 @@ def build_normal_equations(view: View) -> NormalEquations:
 
 
 def add_columns(base: NormalEquations, columns: Sequence[FloatArray]) -> NormalEquations:
-    """Normal equations of the base with the columns of further terms appended. columns: (s,) each"""
+    """Append the columns of further terms to the base's normal equations. columns: (s,) each"""
     if not len(columns):
         return base
     added_columns, view = np.array(columns), base.view
@@ -170,9 +175,9 @@ def cross_validate_terms(base: NormalEquations, columns: FloatArray) -> TermErro
 
 
 def _border_gram(gram: FloatArray, base_products: FloatArray, term_powers: FloatArray) -> FloatArray:
-    """(terms, k + 1, k + 1): Gram matrix of the base (k, k), bordered by each term. A term that is linearly dependent
-    on the base gets an infinite diagonal entry, and so the weight 0. base_products: (k, terms), inner products with the
-    base; term_powers: (terms,), sums of squares."""
+    """Build (terms, k + 1, k + 1): Gram matrix of the base (k, k), bordered by each term. A term that is linearly
+    dependent on the base gets an infinite diagonal entry, and so the weight 0. base_products: (k, terms), inner
+    products with the base; term_powers: (terms,), sums of squares."""
     independent_powers = term_powers - np.einsum("kt,kt->t", base_products, np.linalg.solve(gram, base_products))
     k = len(gram)
     bordered = np.zeros((len(term_powers), k + 1, k + 1))
@@ -185,9 +190,9 @@ def _border_gram(gram: FloatArray, base_products: FloatArray, term_powers: Float
 def solve_bounded_least_squares(
     gram: FloatArray, right_sides: FloatArray, low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """(systems, k): least squares within bounds by an active set, from Gram matrices (systems, k, k) and right sides
-    (systems, k): weights that exceed their bounds are fixed at them, and the others solved for again. A weight with an
-    infinite diagonal entry is 0."""
+    """Solve (systems, k): least squares within bounds by an active set, from Gram matrices (systems, k, k) and right
+    sides (systems, k): weights that exceed their bounds are fixed at them, and the others solved for again. A weight
+    with an infinite diagonal entry is 0."""
     is_excluded = np.isinf(np.einsum("tkk->tk", gram))
     is_fixed, fixed_values = is_excluded.copy(), np.zeros_like(right_sides)
     for _ in range(right_sides.shape[1]):
@@ -202,7 +207,7 @@ def solve_bounded_least_squares(
 
 
 def _compute_held_out_squares(base: NormalEquations, index: int, weights: FloatArray) -> FloatArray:
-    """(terms,): |r|² - 2 w'X'r + w'X'X w of the block `index`, for each column w of the weights (k, terms)."""
+    """Compute (terms,): |r|² - 2 w'X'r + w'X'X w of the block `index`, for each column w of the weights (k, terms)."""
     return np.asarray(
         base.residual_power[index]
         - 2 * base.residual_products[index] @ weights
@@ -215,13 +220,13 @@ class Solution:
     """Weights of the base columns, fitted to all blocks together, and their cost."""
 
     weights: FloatArray
-    """(k,)"""
+    """(k,): those of the model's parameters in standard deviations of the calibration."""
     cost: float
     """Residual sum of squares plus the prior's penalty."""
 
 
 def solve_all_blocks(base: NormalEquations) -> Solution:
-    """Weights and cost of the base columns, fitted to all blocks together."""
+    """Fit the weights of the base columns to all blocks together."""
     prior_precision, gram, residual_products = (
         base.prior_precision,
         base.gram.sum(axis=0),

@@ -1,5 +1,6 @@
-"""Rounds exponents of a discovered law to whole or half numbers where their standard errors allow it, drops a memory
-that is shorter than a sample, and simplifies the formula. Called by `discover` and `validation`."""
+"""Round the exponents of a discovered law to whole or half numbers where their standard errors allow it, drop a lag
+that is shorter than a sample, and simplify the formula. Called by `discover` and `validation`; `fit_laws` uses
+`is_full_soft_limit`."""
 
 import re
 from dataclasses import replace
@@ -13,18 +14,19 @@ from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.search_context import FIRST_FIT_ROUNDS, SearchContext
-from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
+from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_ROUNDING_TOLERANCE
 from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
 from equalizer.laws.law import Law, find_parameter_roles
 
 _LAGGED_CUBE_PATTERN = re.compile(r"\b(\w+)\*lag\(\1\*\*2, (?:p(\d+)|0)\)")
+"""signal * lag(signal**2, time constant), which without the lag is the signal's cube."""
 _SOFT_LIMIT_PATTERN = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
 """signal + p0 * (soft limit of the signal - signal); see `grammar.generate_soft_limit_terms`."""
 
 
 def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
-    """The fit repeated with exponents fixed at whole or half numbers and without short memories; unchanged where no law
-    becomes simpler, or where the cost rises by a share of more than `LAW_SNAP`."""
+    """Repeat the fit with exponents fixed at whole or half numbers and without short lags; unchanged where no law
+    becomes simpler, or where the cost rises by a share of more than `LAW_ROUNDING_TOLERANCE`."""
     if not any(law is not None and _can_simplify(law) for law in list_fitted_laws(fitted.hypothesis)):
         return fitted
     tuned_count = len(fitted.deviations)
@@ -40,16 +42,16 @@ def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
         sensitivity, columns=sensitivity.columns[:tuned_count], gram=sensitivity.gram[:tuned_count, :tuned_count]
     )
     refitted = fit(context.measure, context.tuning, start_fit, model_sensitivity, FIRST_FIT_ROUNDS)
-    return refitted if refitted.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
+    return refitted if refitted.cost <= fitted.cost * (1 + LAW_ROUNDING_TOLERANCE) else fitted
 
 
 def converge_and_snap(context: SearchContext, fitted: Fitted) -> Fitted:
-    """The fit continued until it converges, then `snap_exponents`."""
+    """Continue the fit until it converges, then call `snap_exponents`."""
     return snap_exponents(context, refine(context, fitted))
 
 
 def _can_simplify(law: Law) -> bool:
-    """Whether a law has an exponent, a short memory or a soft limit that might be simplified: only then are standard
+    """Whether a law has an exponent, a short lag or a soft limit that might be simplified: only then are standard
     errors needed, which take a simulation per parameter."""
     has_exponent = "exponent" in find_parameter_roles(law.tree).values()
     return (
@@ -60,18 +62,18 @@ def _can_simplify(law: Law) -> bool:
 
 
 def _simplify_laws(context: SearchContext, hypothesis: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
-    """The hypothesis with simpler laws; None where none changes. errors: (parameters,), standard errors of
+    """Simplify the laws of a hypothesis; None where none changes. errors: (parameters,), standard errors of the
     coordinates."""
     recording = context.measure.records[0].recording
     claim_hypotheses, any_simplified, first_parameter = [], False, 0
     for claim_index, (claim, law) in enumerate(zip(hypothesis.claims, list_fitted_laws(hypothesis), strict=True)):
-        parameter_count = len(claim.effect.parameters) * claim.groups
+        parameter_count = len(claim.effect.parameters) * claim.group_count
         claim_errors = errors[first_parameter : first_parameter + parameter_count]
         first_parameter += parameter_count
         if law is None:
             claim_hypotheses.append(_extract_claim(hypothesis, claim_index))
             continue
-        simplified_law = _drop_short_memory(law, 1 / recording.sample_rate_hz)
+        simplified_law = _drop_short_lag(law, 1 / recording.sample_rate_hz)
         simplified_law = _simplify_exponents(law, claim_errors) if simplified_law is law else simplified_law
         any_simplified |= simplified_law != law
         effect = make_law_effect(simplified_law, collect_channels(recording))
@@ -84,26 +86,27 @@ def _simplify_laws(context: SearchContext, hypothesis: Hypothesis, errors: np.nd
 
 
 def _extract_claim(hypothesis: Hypothesis, claim_index: int) -> Hypothesis:
-    """The hypothesis that consists of one claim alone, with its present values."""
+    """Extract the hypothesis of one claim alone, with its present values."""
     claim = hypothesis.claims[claim_index]
     return make_claim_hypothesis(
         claim, [dict(placed_effect.values) for placed_effect in hypothesis.list_effects_of(claim_index)]
     )
 
 
-def _drop_short_memory(law: Law, sample_s: float) -> Law:
-    """The law with signal * lagged square replaced by the cube of the signal where the lag is less than a sample."""
-    match = _LAGGED_CUBE_PATTERN.search(law.expression)
-    if match is None or match[2] is None or law.numbers[int(match[2])] >= sample_s:
+def _drop_short_lag(law: Law, sample_s: float) -> Law:
+    """Replace signal * lagged square in a law by the cube of the signal where the lag is less than a sample."""
+    lagged_cube = _LAGGED_CUBE_PATTERN.search(law.expression)
+    if lagged_cube is None or lagged_cube[2] is None or law.numbers[int(lagged_cube[2])] >= sample_s:
         return law
     # The parameter is replaced by its value and removed, so that later parameters are renumbered.
-    shortened = substitute_parameter(law, int(match[2]), 0.0)
+    shortened = substitute_parameter(law, int(lagged_cube[2]), 0.0)
     return replace(shortened, expression=_LAGGED_CUBE_PATTERN.sub(r"\1**3", shortened.expression, count=1))
 
 
 def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
-    """The law with exponents near half or whole numbers rounded to these in the formula. errors: standard errors of
-    their logarithms."""
+    """Round exponents near half or whole numbers (0.5 at least) to these in the formula: within their 95 % interval, or
+    relatively within the tolerance of `settings`; where no exponent changes, simplify the soft limit. errors: standard
+    errors of their logarithms."""
     simplified = law
     for index, role in sorted(find_parameter_roles(law.tree).items(), reverse=True):
         value = law.numbers[index]
@@ -111,7 +114,7 @@ def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
             continue
         rounded = max(round(2 * value) / 2, 0.5)
         half_width = 1.96 * INTERVAL_FACTOR * float(errors[index]) * value
-        if abs(value - rounded) <= max(half_width, LAW_SNAP * value):
+        if abs(value - rounded) <= max(half_width, LAW_ROUNDING_TOLERANCE * value):
             simplified = substitute_parameter(simplified, index, rounded)
     if simplified.numbers == law.numbers:
         simplified = _simplify_soft_limit(law, float(errors[0]) * abs(law.numbers[0]))
@@ -124,16 +127,17 @@ def is_full_soft_limit(law: Law, tolerance: float) -> bool:
 
 
 def _simplify_soft_limit(law: Law, error: float) -> Law:
-    """The soft limit alone where the interval of its factor p0 contains 1 and not 0. error: standard error of p0."""
+    """Reduce a law to the soft limit alone where the interval of its factor p0 contains 1 and not 0. error: standard
+    error of p0."""
     half_width = 1.96 * INTERVAL_FACTOR * error
-    match = _SOFT_LIMIT_PATTERN.fullmatch(law.expression)
-    if match is None or not half_width < 1 or not is_full_soft_limit(law, max(half_width, LAW_SNAP)):
+    soft_limit = _SOFT_LIMIT_PATTERN.fullmatch(law.expression)
+    if soft_limit is None or not half_width < 1 or not is_full_soft_limit(law, max(half_width, LAW_ROUNDING_TOLERANCE)):
         return law
-    return substitute_parameter(replace(law, expression=f"p0*{match[2]}"), 0, 1.0)
+    return substitute_parameter(replace(law, expression=f"p0*{soft_limit[2]}"), 0, 1.0)
 
 
 def substitute_parameter(law: Law, index: int, value: float) -> Law:
-    """The law with the free parameter p<index> replaced by a value in the formula, later parameters renumbered."""
+    """Replace the free parameter p<index> by a value in the formula, and renumber later parameters."""
     expression = re.sub(rf"\bp{index}\b", f"{value:g}", law.expression)
     renumbered = re.sub(r"\bp(\d+)\b", lambda match: f"p{int(match[1]) - (int(match[1]) > index)}", expression)
     numbers = (*law.numbers[:index], *law.numbers[index + 1 :])
@@ -141,7 +145,7 @@ def substitute_parameter(law: Law, index: int, value: float) -> Law:
 
 
 def simplify_powers(expression: str) -> str:
-    """The formula with powers of whole exponents written without absolute values where these are not needed."""
+    """Write powers of whole exponents in a formula without absolute values where these are not needed."""
 
     def write_signed_power(match: re.Match[str]) -> str:
         """abs(x)**n*sign(x) as x**n for odd n, else as x*abs(x)**(n - 1)."""

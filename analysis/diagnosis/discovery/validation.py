@@ -25,7 +25,7 @@ from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import are_inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER_RATIO, NOISE_KNOWN_TO
+from analysis.diagnosis.settings import LAW_FACTOR_ERROR, LOUDER_RATIO, NOISE_ACCURACY, SAME_LAW_SHARE, SHUFFLED_RATIO
 from analysis.wording import conjoin
 from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.signals.recording import Segment
@@ -107,10 +107,10 @@ def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[F
         yield NO_OTHER_EXCITATION
     for round_index, round_ in enumerate(discovery.rounds):
         best_sum = round_.sums[0]
-        if best_sum.factor_error > LAW_STABLE and not is_confirmed_on_held_out(discovery.explanation):
+        if best_sum.factor_error > LAW_FACTOR_ERROR and not is_confirmed_on_held_out(discovery.explanation):
             yield f"its parameters differ by {100 * best_sum.factor_error:.0f} % from stretch to stretch"
         removed_share, chance_share = round_.shares_above_noise
-        if 1 - removed_share > LAW_PLACEBO * (1 - chance_share):
+        if 1 - removed_share > SHUFFLED_RATIO * (1 - chance_share):
             yield (
                 f"it explains {100 * removed_share:.0f} % of the missing force above the noise, and the same search "
                 f"explains {100 * chance_share:.0f} % of the force when it is shuffled in time"
@@ -132,12 +132,12 @@ def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[F
 
 def is_confirmed_on_held_out(explanation: Explanation) -> bool:
     """Whether the held-out error is so small that the law's factor, fitted to other stretches, must be correct within
-    `LAW_STABLE`: a relative error s of the factor leaves the share s^2 of the error power above the noise."""
+    `LAW_FACTOR_ERROR`: a relative error s of the factor leaves the share s^2 of the error power above the noise."""
     retuned_excess, remaining_excess = (
         float(np.sum(np.maximum(candidate.score.test**2 - 1, 0.0)))
         for candidate in (explanation.retuned, explanation.after)
     )
-    return retuned_excess > 0 and remaining_excess <= LAW_STABLE**2 * retuned_excess
+    return retuned_excess > 0 and remaining_excess <= LAW_FACTOR_ERROR**2 * retuned_excess
 
 
 def _check_held_out_gain(
@@ -177,20 +177,20 @@ def _check_rival_laws(context: SearchContext, discovery: Discovery, round_index:
 
 
 def _are_predictions_equal(retuned: FittedCandidate, law: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether two laws predict the same residuals in all samples, including the held-out ones, within `LAW_SAME` of the
-    law's contribution: then they are one law in two notations, such as a relaxation of position or of speed."""
+    """Whether two laws predict the same residuals in all samples, including the held-out ones, within `SAME_LAW_SHARE`
+    of the law's contribution: then they are one law in two notations, such as a relaxation of position or of speed."""
     difference_squares = law_squares = 0.0
     residual_sets = retuned.fitted.residuals, law.fitted.residuals, rival.fitted.residuals
     for base_residual, law_residual, rival_residual in zip(*residual_sets, strict=True):
         difference_squares += float(np.nansum((law_residual - rival_residual) ** 2))
         law_squares += float(np.nansum((law_residual - base_residual) ** 2))
-    return difference_squares <= LAW_SAME**2 * law_squares
+    return difference_squares <= SAME_LAW_SHARE**2 * law_squares
 
 
 def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: FittedCandidate) -> bool:
     """Whether the laws have fewer parameters than a rival (rounded exponents count) and are inseparable from it on the
-    fitted data, and their held-out error is at most that of the rival, within `NOISE_KNOWN_TO`: the shorter of two
-    equally good descriptions. Both have held-out errors. A tenth of `NOISE_KNOWN_TO` allows for unconverged fits."""
+    fitted data, and their held-out error is at most that of the rival, within `NOISE_ACCURACY`: the shorter of two
+    equally good descriptions. Both have held-out errors. A tenth of `NOISE_ACCURACY` allows for unconverged fits."""
     law = discovery.explanation.after
     sums = [
         term_sum
@@ -204,7 +204,7 @@ def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: 
     rival_gain = estimate_held_out_gain(context.full_measure, law, rival)
     log_error_change = np.mean(np.log(law.score.test)) - np.mean(np.log(rival.score.test))
     return (
-        rival_gain is not None and rival_gain.low <= 0.1 * NOISE_KNOWN_TO and bool(log_error_change <= NOISE_KNOWN_TO)
+        rival_gain is not None and rival_gain.low <= 0.1 * NOISE_ACCURACY and bool(log_error_change <= NOISE_ACCURACY)
     )
 
 

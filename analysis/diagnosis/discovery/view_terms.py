@@ -3,7 +3,7 @@
 A view is the filtered residual either of the force along an axis, with the terms of `grammar`, or of the reading of one
 response channel, with terms of sensor errors: sign, powers, soft limits, dead zones, hysteresis (play), drift, and
 products with other channels. Terms that are linear in the readings (gain, lag, cross-axis sensitivity) are left out,
-because the effects of the catalogue describe them. Start values are chosen by hand. Called by `discover`.
+because the effects of the catalogue describe them. Start values and bounds are chosen by hand. Called by `discover`.
 """
 
 from collections.abc import Iterator
@@ -46,11 +46,11 @@ def list_reading_terms(columns: Columns, channel: int, channel_count: int) -> tu
     names = [f"a{axis}" for axis in AXES[:channel_count]]
     reading, other_readings = names[channel], [name for name in names if name != names[channel]]
     largest_reading = max(float(np.abs(columns[reading]).max()), 1e-12)
-    return (*_generate_own_terms(reading, largest_reading), *_generate_cross_terms(reading, other_readings))
+    return (*_generate_single_terms(reading, largest_reading), *_generate_cross_terms(reading, other_readings))
 
 
-def _generate_own_terms(reading: str, largest_reading: float) -> Iterator[Term]:
-    """Generate the terms that contain only the channel's own reading (and time t). reading: name of the signal;
+def _generate_single_terms(reading: str, largest_reading: float) -> Iterator[Term]:
+    """Generate the terms that contain the reading of the channel alone, and time t. reading: name of the signal;
     largest_reading: its largest magnitude, in its unit."""
     yield Term(f"sign({reading})")
     for start in (0.5, 1.5, 2.0, 3.0, 5.0):
@@ -59,9 +59,9 @@ def _generate_own_terms(reading: str, largest_reading: float) -> Iterator[Term]:
         yield Term(format_even_power(reading, 0), (start,), (POWER_BOUNDS,), (0,))
     yield from generate_soft_limit_terms(reading, largest_reading)
     for share in (0.2, 0.5, 0.8):
-        threshold = (share * largest_reading,), ((0.0, largest_reading),)
-        yield Term(f"maximum(abs({reading}) - p0, 0)*sign({reading})", *threshold)
-        yield from (Term(f"maximum({side} - p0, 0)", *threshold) for side in (reading, f"(-{reading})"))
+        threshold_range = (share * largest_reading,), ((0.0, largest_reading),)
+        yield Term(f"maximum(abs({reading}) - p0, 0)*sign({reading})", *threshold_range)
+        yield from (Term(f"maximum({side} - p0, 0)", *threshold_range) for side in (reading, f"(-{reading})"))
         yield Term(
             f"play({reading}, p0)", (0.1 * share * largest_reading,), ((1e-4 * largest_reading, largest_reading),)
         )
@@ -70,11 +70,11 @@ def _generate_own_terms(reading: str, largest_reading: float) -> Iterator[Term]:
 
 def _generate_cross_terms(reading: str, other_readings: list[str]) -> Iterator[Term]:
     """Generate the products and powers up to the third order that contain readings of other response channels. reading:
-    name of the channel's own reading."""
-    for other in other_readings:
+    name of the channel's reading."""
+    for cross in other_readings:
         shapes = (
-            f"{reading}*{other}", f"{other}**2", f"{other}*abs({other})", f"abs({other})", f"{reading}*abs({other})",
-            f"abs({reading})*{other}", f"{reading}*{other}**2", f"{reading}**2*{other}", f"{other}**3",
+            f"{reading}*{cross}", f"{cross}**2", f"{cross}*abs({cross})", f"abs({cross})", f"{reading}*abs({cross})",
+            f"abs({reading})*{cross}", f"{reading}*{cross}**2", f"{reading}**2*{cross}", f"{cross}**3",
         )  # fmt: skip
         yield from (Term(shape) for shape in shapes)
     yield from (

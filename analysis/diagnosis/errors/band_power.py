@@ -69,7 +69,7 @@ class BandPower:
         that of the noise."""
         power = self._compute_band_power([record.measured for record in self.measure.records])
         with np.errstate(divide="ignore"):
-            return np.where(power > LEAST_POWER_RATIO * self._noise, 0.5 * np.log(power), np.nan)
+            return np.where(power > LEAST_POWER_RATIO * self._noise_density, 0.5 * np.log(power), np.nan)
 
     def predict(self, residuals: Residuals) -> FloatArray:
         """Compute ln a of the predicted signals, (stretches, bands, c), with the noise's power added."""
@@ -77,7 +77,7 @@ class BandPower:
         predicted = [
             record.measured - residual * unit for record, residual in zip(self.measure.records, residuals, strict=True)
         ]
-        return np.asarray(0.5 * np.log(self._compute_band_power(predicted) + self._noise))
+        return np.asarray(0.5 * np.log(self._compute_band_power(predicted) + self._noise_density))
 
     def compute_misfits(self, log_errors: FloatArray) -> FitScore:
         """Compute the rms (c,) of differences of ln a, (stretches, bands, c), by role; NaN without a compared band."""
@@ -87,29 +87,29 @@ class BandPower:
         )
 
     @cached_property
-    def _edges(self) -> FloatArray:
+    def _band_edges_hz(self) -> FloatArray:
         """(bands + 1,), Hz: edges of the bands, at constant ratios."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         band_count = int(np.log2(HIGHEST_SHARE * rate_hz * WINDOW_S / LOWEST_LINE) / OCTAVES)
         return np.asarray(LOWEST_LINE / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(band_count, 1) + 1)))
 
     @property
-    def _noise(self) -> FloatArray:
+    def _noise_density(self) -> FloatArray:
         """(c,): one-sided power density of white noise with the rms of the measure's noise."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         return np.asarray(self.measure.noise**2 / (rate_hz / 2))
 
-    def _compute_band_power(self, predicted: Sequence[FloatArray]) -> FloatArray:
+    def _compute_band_power(self, signals: Sequence[FloatArray]) -> FloatArray:
         """Compute a², (stretches, bands, c): mean power density over the lines of each band, in units squared per
-        hertz. A band between two lines has the density of the line above it. predicted: signals (n, c), per record."""
+        hertz. A band between two lines has the density of the line above it. signals: (n, c) per record."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
-        band_powers = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
+        band_powers = np.empty((len(self.stretches), len(self._band_edges_hz) - 1, len(self.measure.noise)))
         for stretch_powers, stretch in zip(band_powers, self.stretches, strict=True):
             window_samples = min(int(WINDOW_S * rate_hz), stretch.stop - stretch.start)
             frequency_hz, density = estimate_spectral_density(
-                predicted[stretch.record][stretch.start : stretch.stop], rate_hz, window_samples
+                signals[stretch.record][stretch.start : stretch.stop], rate_hz, window_samples
             )
-            first_lines = np.searchsorted(frequency_hz, self._edges)
+            first_lines = np.searchsorted(frequency_hz, self._band_edges_hz)
             for band, (first_line, stop_line) in enumerate(pairwise(first_lines)):
                 stretch_powers[band] = density[first_line : max(stop_line, first_line + 1)].mean(axis=0)
         return band_powers

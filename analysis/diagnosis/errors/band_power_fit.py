@@ -7,7 +7,8 @@ With the differences e of ln a, measured less predicted (`band_power`), and devi
 
 with Huber's loss rho (Huber, Ann. Math. Stat. 35:73, 1964) over the N fitted bands. Simulations of impacts are chaotic:
 the spread of ln a between simulations whose parameters differ by rounding sets the weights, and derivatives are central
-differences over large steps. Called by `refine_band_power` and, for rattling play, by `search.impacts`.
+differences over large steps. Called by `refine_band_power` and, for rattling play, by `search.impacts`. All constants
+are chosen by hand.
 """
 
 from dataclasses import dataclass, replace
@@ -23,8 +24,8 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
 STEP_LIMITS, STEP_RATIO = (0.02, 0.2), 12.0
-"""Least and largest finite-difference step of a logarithmic parameter; and its ratio to
-`FreeParameter.difference_step` between these limits."""
+"""Least and largest finite-difference step of a logarithmic parameter; and its ratio to `FreeParameter.difference_step`
+between these limits."""
 LONGEST_STEP = 0.5
 """Largest Gauss-Newton step of a logarithmic parameter; for others it is two finite-difference steps."""
 MOST_CHANCE_SHARE = 0.8
@@ -47,8 +48,8 @@ PERTURBATION = 1e-9
 
 
 def perturb(hypothesis: Hypothesis, member_index: int) -> Hypothesis:
-    """The hypothesis with its coordinates moved by `member_index` times `PERTURBATION`: a further member of an ensemble
-    of simulations, which diverge because impacts are chaotic."""
+    """Move the coordinates of a hypothesis by `member_index` times `PERTURBATION`: a further member of an ensemble of
+    simulations, which diverge because impacts are chaotic."""
     return replace(hypothesis, point=hypothesis.point + member_index * PERTURBATION)
 
 
@@ -67,7 +68,8 @@ class BandPowerProblem:
     """Ensemble size: simulations over which a prediction is averaged, from parameters that differ by PERTURBATION."""
 
     def predict(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
-        """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
+        """Compute (stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is
+        invalid."""
         members = range(self.ensemble if len(hypothesis.point) else 1)
 
         def simulate_member(member_index: int) -> FloatArray:
@@ -76,7 +78,7 @@ class BandPowerProblem:
         return np.asarray(np.mean(list(self.map_(simulate_member, members)), axis=0))  # type: ignore[arg-type]
 
     def _predict_member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
-        """(stretches, bands, c): ln a of a single simulation; NaN for an invalid model."""
+        """Compute (stretches, bands, c): ln a of a single simulation; NaN for an invalid model."""
         try:
             model = self.tuning.tune(deviations)
             return self.power.predict(self.power.measure.residuals(model, hypothesis.list_placed_effects()))
@@ -107,8 +109,8 @@ class BandPowerFit:
 
 
 def evaluate_hypothesis(problem: BandPowerProblem, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
-    """Predicted band powers and their cost at given parameters, without fitting. The cost is infinite where a
-    prediction is not finite."""
+    """Compute the predicted band powers and their cost at given parameters, without fitting. The cost is infinite where
+    a prediction is not finite."""
     predicted = problem.predict(deviations, hypothesis)
     weights = problem.weights
     if not np.isfinite(predicted[weights > 0]).all():
@@ -121,7 +123,7 @@ def evaluate_hypothesis(problem: BandPowerProblem, deviations: FloatArray, hypot
 
 
 def fit_band_power(problem: BandPowerProblem, start: BandPowerFit, rounds: int) -> BandPowerFit:
-    """The best fit within a number of Gauss-Newton steps; never worse than the start, and unchanged for an invalid
+    """Find the best fit within a number of Gauss-Newton steps; never worse than the start, and unchanged for an invalid
     one."""
     best = start
     for _ in range(rounds):
@@ -136,11 +138,13 @@ def fit_band_power(problem: BandPowerProblem, start: BandPowerFit, rounds: int) 
 
 
 def differentiate_hypothesis(problem: BandPowerProblem, iterate: BandPowerFit) -> FloatArray:
-    """(parameters, stretches, bands, c): derivatives of ln a by the hypothesis's coordinates (central differences)."""
+    """Compute (parameters, stretches, bands, c): derivatives of ln a by the hypothesis's coordinates (central
+    differences)."""
     parameters = iterate.hypothesis.parameters
     jobs = [(parameter_index, sign) for parameter_index in range(len(parameters)) for sign in (1.0, -1.0)]
 
     def predict_displaced(job: tuple[int, float]) -> FloatArray:
+        """Predict with one coordinate moved by a step of the given sign."""
         parameter_index, sign = job
         point = iterate.hypothesis.point.copy()
         point[parameter_index] += sign * _get_step(parameters[parameter_index])
@@ -156,7 +160,7 @@ def differentiate_hypothesis(problem: BandPowerProblem, iterate: BandPowerFit) -
 
 
 def _take_gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) -> BandPowerFit:
-    """The fit after a bounded step with line search, with its standard errors; its cost is higher than before where no
+    """Take a bounded step with line search, and estimate the standard errors; the cost is higher than before where no
     factor of `STEP_FACTORS` reduces it."""
     hypothesis_columns = np.array(
         [_select_weighted(problem, column) for column in differentiate_hypothesis(problem, iterate)]
@@ -172,12 +176,13 @@ def _take_gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) ->
     huber_weights = np.minimum(1.0, HUBER_THRESHOLD / np.maximum(np.abs(errors), HUBER_THRESHOLD))
     # Re-tuning within the calibration makes small changes, so a residual that stays large shows a missing effect: with
     # the model's own parameters in the fit, large residuals get less weight.
-    weighted = columns * (huber_weights**3 if tuned_count else huber_weights)
-    rhs = weighted @ errors
-    information = weighted @ columns.T
+    weighted_columns = columns * (huber_weights**3 if tuned_count else huber_weights)
+    rhs = weighted_columns @ errors
+    information = weighted_columns @ columns.T
     if tuned_count:
         rhs[:tuned_count] -= iterate.deviations
         information[:tuned_count, :tuned_count] += np.eye(tuned_count)
+    # A small ridge keeps the matrix regular.
     information += 1e-9 * np.diag(np.maximum(np.diagonal(information), 1e-9))
     low, high = _compute_step_bounds(iterate, tuned_count)
     step = solve_bounded_step(information, rhs, low, high)
@@ -195,27 +200,29 @@ def _take_gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) ->
 
 
 def _estimate_errors(problem: BandPowerProblem, iterate: BandPowerFit, information: FloatArray) -> FloatArray:
-    """(parameters,): standard errors from the information matrix, reduced by the information due to chaotic scatter.
-    Scatter adds to the diagonal only; subtracted there, it would make the matrix of correlated parameters indefinite,
-    so rows and columns are scaled instead. This underestimates errors of strongly correlated parameters: twenty
-    parameters of five simulated devices (seeds 7000 to 7004) were wrong by 1.09 standard errors (rms)."""
+    """Estimate (parameters,): standard errors from the information matrix, reduced by the information due to chaotic
+    scatter. Scatter adds to the diagonal only; subtracted there, it would make the matrix of correlated parameters
+    indefinite, so rows and columns are scaled instead. This underestimates errors of strongly correlated parameters:
+    twenty parameters of five simulated devices (seeds 7000 to 7004) were wrong by 1.09 standard errors (rms)."""
     parameters = iterate.hypothesis.parameters
     first_parameter = len(information) - len(parameters)
     scatter = _select_weighted(
         problem, np.broadcast_to(np.asarray(problem.spread, dtype=np.float64), iterate.predicted.shape)
     )
-    kept_share = np.ones(len(information))
-    for k, parameter in enumerate(parameters, start=first_parameter):
+    information_shares = np.ones(len(information))
+    for index, parameter in enumerate(parameters, start=first_parameter):
         scatter_information = float(scatter @ scatter) / (2 * problem.ensemble * _get_step(parameter) ** 2)
-        kept_share[k] -= min(scatter_information / max(float(information[k, k]), 1e-300), MOST_CHANCE_SHARE)
-    values, vectors = np.linalg.eigh(information * np.sqrt(np.outer(kept_share, kept_share)))
-    values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_INFORMATION))
-    variances = (vectors**2 / values).sum(axis=1) * max(iterate.cost, 1.0)
+        information_shares[index] -= min(
+            scatter_information / max(float(information[index, index]), 1e-300), MOST_CHANCE_SHARE
+        )
+    eigenvalues, eigenvectors = np.linalg.eigh(information * np.sqrt(np.outer(information_shares, information_shares)))
+    eigenvalues = np.maximum(eigenvalues, max(1e-9 * float(eigenvalues[-1]), LEAST_INFORMATION))
+    variances = (eigenvectors**2 / eigenvalues).sum(axis=1) * max(iterate.cost, 1.0)
     return np.asarray(np.sqrt(variances[first_parameter:]))
 
 
 def _compute_step_bounds(iterate: BandPowerFit, tuned_count: int) -> tuple[FloatArray, FloatArray]:
-    """Bounds of a step, (tuned_count + parameters,) each: the model's own parameters stay within 3 standard
+    """Compute the bounds of a step, (tuned_count + parameters,) each: the model's own parameters stay within 3 standard
     deviations of their calibration, those of the hypothesis within their limits and a largest step."""
     parameters = iterate.hypothesis.parameters
     largest_steps = np.array(
@@ -234,14 +241,14 @@ def _compute_step_bounds(iterate: BandPowerFit, tuned_count: int) -> tuple[Float
 
 
 def _get_step(parameter: FreeParameter) -> float:
-    """Step of the finite differences, in the parameter's coordinate."""
+    """Get the step of the finite differences, in the parameter's coordinate."""
     if parameter.parameter.scale != "log":
         return parameter.difference_step
     return float(np.clip(STEP_RATIO * parameter.difference_step, *STEP_LIMITS))
 
 
 def _compute_huber_loss(errors: FloatArray) -> FloatArray:
-    """Huber's loss rho of the module's equation, element by element."""
+    """Compute Huber's loss rho of the module's equation, element by element."""
     magnitude = np.abs(errors)
     return np.asarray(
         np.where(magnitude <= HUBER_THRESHOLD, magnitude**2, HUBER_THRESHOLD * (2 * magnitude - HUBER_THRESHOLD))
@@ -249,6 +256,6 @@ def _compute_huber_loss(errors: FloatArray) -> FloatArray:
 
 
 def _select_weighted(problem: BandPowerProblem, values: FloatArray) -> FloatArray:
-    """(N,): values (stretches, bands, c) in the fitted bands, times their weights 1 / s."""
+    """Select (N,): values (stretches, bands, c) in the fitted bands, times their weights 1 / s."""
     weights = problem.weights
     return np.asarray((values * weights)[weights > 0])

@@ -17,7 +17,12 @@ from analysis.diagnosis.data.observed import Observed, compute_error_units
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, count_samples_to_settle
+from analysis.diagnosis.errors.error_measure_rule import (
+    UNTIMED,
+    RuleChoice,
+    count_samples_to_settle,
+    select_error_measure,
+)
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, estimate_noise_floor
 from analysis.diagnosis.noise.rounding import find_rounding_step
@@ -80,9 +85,9 @@ def make_measure(
     floors = tuple(estimate_noise_floor(record.recording) for record in records)
     noise = _estimate_noise(floors, records)
     unit = compute_error_units(np.vstack([record.measured for record in records]), noise)
-    choice = choose_measure((*records, *companion_records), model)
+    choice = select_error_measure((*records, *companion_records), model)
     if compared == "motion" and choice.measure == "predicted force":
-        choice = Choice("windows", REQUESTED_MOTION_REMARK)
+        choice = RuleChoice("windows", REQUESTED_MOTION_REMARK)
     model_effects = place_recorded_effects(model, recordings[0])
     remarks = (*((choice.reason,) if choice.reason else ()), *_describe_model_effects(model_effects))
     if choice.measure == "free simulation":

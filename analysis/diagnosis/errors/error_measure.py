@@ -2,7 +2,8 @@
 noise.
 
 `choose_measure` selects one of three: `free_simulation`, `windows` and `forces.predicted_force`. `whitened_measure`
-wraps any of them with a whitening filter that was learned from reference recordings.
+wraps any of them with a whitening filter that was learned from reference recordings. The fits (`output_error`), the
+search (`search`) and `localisation` use the measures only through this protocol.
 """
 
 from collections.abc import Sequence
@@ -36,29 +37,29 @@ class ErrorMeasure(Protocol):
         """(c,): divisor that scales the residuals, in each channel's physical unit; usually the rms noise."""
 
     @property
-    def least(self) -> float:
+    def least_error(self) -> float:
         """Lower limit of rms errors relative to the noise: smaller errors are set to it."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, which usually differ in sample roles alone; some implementations require equal
-        number and lengths."""
+        """Return the measure on other records, which usually differ in sample roles alone; some implementations require
+        equal number and lengths."""
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with an error floor: further noise, added to its own as a root sum of squares, and 1 as its least
-        error. rms: (c,), of the further noise, in each channel's physical unit."""
+        """Return the measure with an error floor: further noise, added to its own as a root sum of squares, and 1 as
+        its least error. rms: (c,), of the further noise, in each channel's physical unit."""
 
     def shorten(self) -> Self:
-        """The measure on records without the samples after the last fit or validation sample, to save time."""
+        """Return the measure on records without the samples after the last fit or validation sample, to save time."""
 
     def can_observe(self, effect: Effect) -> bool:
         """Whether the effect changes the compared signals; an effect that does not is not a candidate."""
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): measured minus predicted, divided by `unit`. With predicted forces, raises
+        """Compute, per record, (n, c): measured minus predicted, divided by `unit`. With predicted forces, raises
         numpy.linalg.LinAlgError where the model's outputs do not determine its motion."""
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Per record, the motion and the missing force from which starting values of further effects are estimated.
-        residuals: those of the same model and effects."""
+        """Gather, per record, the motion and the missing force from which starting values of further effects are
+        estimated. residuals: those of the same model and effects."""

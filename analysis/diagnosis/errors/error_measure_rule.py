@@ -1,4 +1,4 @@
-"""The rule by which `choose_measure` selects the error measure for recordings and a model.
+"""The rule by which the error measure for recordings and a model is selected. Called by `choose_measure`.
 
 Free simulation, from rest by the commands alone, is the strictest test, because no measurement corrects it. It is not
 suitable for
@@ -30,13 +30,20 @@ from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import is_unstable_within
-from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
+from analysis.diagnosis.settings import (
+    MOST_OMITTED_SHARE,
+    REST_S,
+    REST_SHARE,
+    SELF_STABLE_DECAY_SHARE,
+    SETTLED_CONSTANTS,
+)
 from equalizer.plant.linear_simulation import compute_poles
 from equalizer.plant.mechanical_model import MechanicalModel
 
 Measure = Literal["free simulation", "windows", "predicted force"]
 WINDOW_S = 1.0
-"""Shortest window (s)."""
+"""Shortest window (s). Chosen by hand."""
+# Reasons and remarks for the user.
 UNTIMED = (
     "No time is known: forces are compared as a function of the position, sample by sample; nothing that depends on "
     "speed, acceleration or frequency can be determined."
@@ -73,68 +80,73 @@ NOT_AT_REST = (
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
-    """The error measure that the rule chooses, and why."""
+class RuleChoice:
+    """The error measure that the rule selects, and why."""
 
     measure: Measure
     reason: str
     """A sentence for the user; empty for a free simulation."""
 
 
-def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
+def select_error_measure(records: Sequence[Observed], model: MechanicalModel) -> RuleChoice:
     """Select the measure by the rule in the module's docstring."""
     longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
-    self_stable, motion_measured = (
+    is_stable, is_motion_measured = (
         is_self_stable(model, longest_s),
         all(has_motion(record.recording, model) for record in records),
     )
-    if motion_measured and any(is_quasi_static(record.recording) for record in records):
-        return Choice("predicted force", UNTIMED)
+    if is_motion_measured and any(is_quasi_static(record.recording) for record in records):
+        return RuleChoice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
-        return Choice("predicted force", IMPOSED)
-    if not self_stable and any(is_in_closed_loop(record.recording) for record in records):
-        return Choice("predicted force", CLOSED_LOOP) if motion_measured else Choice("windows", CLOSED_LOOP_WINDOWS)
-    if motion_measured and is_unstable_within(model, WINDOW_S):
-        return Choice("predicted force", UNSTABLE)
-    if not self_stable:
-        return Choice("windows", DRIFTS)
+        return RuleChoice("predicted force", IMPOSED)
+    if not is_stable and any(is_in_closed_loop(record.recording) for record in records):
+        return (
+            RuleChoice("predicted force", CLOSED_LOOP)
+            if is_motion_measured
+            else RuleChoice("windows", CLOSED_LOOP_WINDOWS)
+        )
+    if is_motion_measured and is_unstable_within(model, WINDOW_S):
+        return RuleChoice("predicted force", UNSTABLE)
+    if not is_stable:
+        return RuleChoice("windows", DRIFTS)
     if any(
-        _begins_in_motion(record) and _count_settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
+        _begins_in_motion(record) and _count_settling_samples(record, model) > MOST_OMITTED_SHARE * len(record.command)
         for record in records
     ):
-        return Choice("windows", NOT_AT_REST)
-    return Choice("free simulation", "")
+        return RuleChoice("windows", NOT_AT_REST)
+    return RuleChoice("free simulation", "")
 
 
 def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
     """Whether all free motion of the model decays well within a recording of `longest_s` seconds: the slowest time
-    constant is less than `DIES_OUT_SHARE` of it."""
-    return _compute_slowest_decay_rate(model) * DIES_OUT_SHARE * longest_s > 1
+    constant is less than `SELF_STABLE_DECAY_SHARE` of it."""
+    return _compute_slowest_decay_rate(model) * SELF_STABLE_DECAY_SHARE * longest_s > 1
 
 
 def count_samples_to_settle(record: Observed, model: MechanicalModel) -> int:
-    """Samples to leave out at the beginning of a record that begins in motion, until the motion has decayed; 0 where it
-    begins at rest, or where they would be more than `MOST_LEFT_OUT` of the record."""
+    """Count the samples to leave out at the beginning of a record that begins in motion, until the motion has decayed;
+    0 where it begins at rest, or where they would be more than `MOST_OMITTED_SHARE` of the record."""
     settling_samples = _count_settling_samples(record, model)
-    if settling_samples > MOST_LEFT_OUT * len(record.command) or not _begins_in_motion(record):
+    if settling_samples > MOST_OMITTED_SHARE * len(record.command) or not _begins_in_motion(record):
         return 0
     return int(np.ceil(settling_samples))
 
 
 def _count_settling_samples(record: Observed, model: MechanicalModel) -> float:
-    """Samples until the initial motion has decayed (`SETTLED_CONSTANTS` time constants); infinite if it never does."""
+    """Count the samples until the initial motion has decayed (`SETTLED_CONSTANTS` time constants); infinite if it never
+    does."""
     decay_rate = _compute_slowest_decay_rate(model)
     return SETTLED_CONSTANTS / decay_rate * record.recording.sample_rate_hz if decay_rate > 0 else np.inf
 
 
 def _compute_slowest_decay_rate(model: MechanicalModel) -> float:
-    """Decay rate of the slowest free motion, 1/s; negative where a motion grows."""
+    """Compute the decay rate of the slowest free motion, 1/s; negative where a motion grows."""
     return -float(compute_poles(model).real.max())
 
 
 def _begins_in_motion(record: Observed) -> bool:
     """Whether a channel is away from zero and changes in the first `REST_S`, both relative to the whole record. An
-    offset alone is no motion."""
+    offset alone is no motion. False for records shorter than four times `REST_S`, or than 16 samples."""
     block_length = max(int(REST_S * record.recording.sample_rate_hz), 4)
     complete_samples = record.measured[np.isfinite(record.measured).all(axis=1)]
     if len(complete_samples) < 4 * block_length:
@@ -146,5 +158,5 @@ def _begins_in_motion(record: Observed) -> bool:
     )
     changes = np.diff(means, axis=0)
     is_offset = np.abs(means[0]) > REST_SHARE * complete_samples.std(axis=0)
-    changes_fast = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
-    return bool(np.any(is_offset & changes_fast))
+    is_changing = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
+    return bool(np.any(is_offset & is_changing))

@@ -1,4 +1,4 @@
-"""Selects the segments of a recording in which a given axis is driven.
+"""Select the segments of a recording in which a given axis is driven.
 
 The first fit of play (backlash) with impacts (`search.impacts`) uses only these segments: they contain the information
 about that axis, and simulating them takes less time than simulating the whole recording.

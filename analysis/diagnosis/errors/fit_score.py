@@ -48,14 +48,14 @@ class FitScore:
 
 def compute_fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
     """Compute the score of residuals, per record (n, c), in units of `measure.unit`; errors are at least
-    `measure.least`."""
+    `measure.least_error`."""
     noise_units = measure.unit / measure.noise
     return FitScore(
         *(
             np.maximum(
                 compute_residual_rms(measure.records, residuals, [getattr(record, role) for record in measure.records])
                 * noise_units,
-                measure.least,
+                measure.least_error,
             )
             for role in ("fit", "choose", "test")
         )

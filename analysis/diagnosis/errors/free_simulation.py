@@ -46,7 +46,7 @@ class FreeSimulation:
     name: str = "free simulation"
     model_effects: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
-    least: float = 0.0
+    least_error: float = 0.0
     """Least error in units of the noise, to which smaller errors are set; 1 with a floor."""
     step_factor: int = 1
     """Factor by which the time steps of motion-dependent forces are lengthened, to save time (`short_recordings`)."""
@@ -55,15 +55,16 @@ class FreeSimulation:
     record consists of parts."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, of any length. Each counts as a single part: `restarts` is emptied."""
+        """Return the measure on other records, of any length. Each counts as a single part: `restarts` is emptied."""
         return replace(self, records=records, restarts=())
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
-        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+        """Return the measure with noise of this rms (c,) added in power, and 1 as its least error."""
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least_error=1.0)
 
     def shorten(self) -> "FreeSimulation":
-        """The measure without the samples after the last to fit or to choose by, and without records that have none."""
+        """Return the measure without the samples after the last to fit or to choose by, and without records that have
+        none."""
         used = [bool((record.fit | record.choose).any()) for record in self.records]
         records = tuple(record.shorten() for record in compress(self.records, used))
         return replace(self, records=records, restarts=tuple(compress(self.restarts, used)))
@@ -73,7 +74,7 @@ class FreeSimulation:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): measured less simulated, in units of `unit`; NaN where a sample is missing."""
+        """Compute, per record, (n, c): measured less simulated, in units of `unit`; NaN where a sample is missing."""
         with np.errstate(over="ignore", invalid="ignore"):  # A simulation of trial parameters may diverge.
             return tuple(
                 _subtract_prediction(
@@ -90,7 +91,8 @@ class FreeSimulation:
         record: Observed,
         sample_indices: npt.NDArray[np.int64],
     ) -> FloatArray:
-        """(k, 2n): positions, then velocities of the n coordinates just before the samples `sample_indices` (k,)."""
+        """Simulate (k, 2n): positions, then velocities of the n coordinates just before the samples `sample_indices`
+        (k,)."""
         recording = record.recording
         all_effects = apply_conditions((*self.model_effects, *effects), recording)
         model = add_payload(model, recording)
@@ -106,7 +108,7 @@ class FreeSimulation:
         simulate: Callable[..., SimulationResult],
         restarts: Restarts | None = None,
     ) -> SimulationResult:
-        """One record simulated by the function `simulate`, or restarted at each part where parts were joined."""
+        """Simulate one record by the function `simulate`, or restarted at each part where parts were joined."""
         recording, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
@@ -123,8 +125,8 @@ class FreeSimulation:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Per record, the motion and missing force from which starting values are estimated. residuals: of the same
-        model and effects."""
+        """Gather, per record, the motion and missing force from which starting values are estimated. residuals: of the
+        same model and effects."""
         evidence_by_record = []
         for record, residual in zip(self.records, residuals, strict=True):
             simulated = self._simulate(model, effects, record, simulate_mechanism)
@@ -134,7 +136,7 @@ class FreeSimulation:
 
 
 def _lengthen_steps(placed_effect: PlacedEffect, factor: int) -> PlacedEffect:
-    """The effect with time steps about `factor` times longer, at least one step per sample; other effects than
+    """Return the effect with time steps about `factor` times longer, at least one step per sample; other effects than
     motion-dependent forces unchanged."""
     action = placed_effect.effect.action
     if factor == 1 or not isinstance(action, (AxisForce, JointForce)):
@@ -144,7 +146,8 @@ def _lengthen_steps(placed_effect: PlacedEffect, factor: int) -> PlacedEffect:
 
 
 def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> FloatArray:
-    """(n, c): measured less simulated signals, in the channels' units: the response, then the position if measured."""
+    """Compute (n, c): measured less simulated signals, in the channels' units: the response, then the position if
+    measured."""
     p, difference = simulated.response.shape[1], measured.copy()
     difference[:, :p] -= simulated.response
     difference[:, p:] -= simulated.position[:, : difference.shape[1] - p]
@@ -152,5 +155,5 @@ def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> F
 
 
 def stack_simulated_channels(simulated: SimulationResult, channel_count: int) -> FloatArray:
-    """(n, channel_count): the first of the simulated channels, the response before the position."""
+    """Stack (n, channel_count): the first of the simulated channels, the response before the position."""
     return np.hstack([simulated.response, simulated.position])[:, :channel_count]

@@ -30,7 +30,7 @@ class Claim:
     """Numbers of the axes or channels, from 0."""
 
     @property
-    def groups(self) -> int:
+    def group_count(self) -> int:
         """Number of sets of the effect's parameters."""
         return len(self.sites) if self.spread == "each" else 1
 
@@ -44,13 +44,14 @@ class FreeParameter:
     """Change of the value per unit of the coordinate where it is not logarithmic (SI)."""
 
     def to_value(self, coordinate: float) -> float:
-        """The parameter's value (SI) at a coordinate, within its limits."""
+        """Convert a coordinate to the parameter's value (SI), within its limits."""
         p = self.parameter
+        # exp overflows a double above 709; values as large as exp(700) are clipped to the upper limit.
         value = float(np.exp(min(coordinate, 700.0))) if p.scale == "log" else coordinate * self.unit
         return min(max(value, p.lower), p.upper)
 
     def to_coordinate(self, value: float) -> float:
-        """The coordinate of a value (SI): its logarithm on a log scale, else the value over `unit`."""
+        """Convert a value (SI) to a coordinate: its logarithm on a log scale, else the value over `unit`."""
         p = self.parameter
         clipped = min(max(value, p.lower), p.upper)
         return float(np.log(clipped)) if p.scale == "log" else clipped / self.unit
@@ -85,7 +86,7 @@ class Hypothesis:
     @property
     def parameters(self) -> tuple[FreeParameter, ...]:
         """The free parameters, one per coordinate of the point."""
-        parameters_by_group = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
+        parameters_by_group = [claim.effect.parameters for claim in self.claims for _ in range(claim.group_count)]
         return tuple(
             FreeParameter(p, _compute_coordinate_unit(p, start))
             for group_parameters, start in zip(parameters_by_group, self.starts, strict=True)
@@ -94,14 +95,14 @@ class Hypothesis:
         )
 
     def list_placed_effects(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
-        """The effects with their values, one per claim and group, as a simulation takes them. point: (k,) coordinates;
-        None = the hypothesis's own."""
+        """List the effects with their values, one per claim and group, as a simulation takes them. point: (k,)
+        coordinates; None = the hypothesis's own."""
         free_parameters = list(self.parameters)
         coordinates = list(self.point if point is None else point)
         effects: list[PlacedEffect] = []
         starts = iter(self.starts)
         for claim in self.claims:
-            for group in range(claim.groups):
+            for group in range(claim.group_count):
                 values = dict(next(starts))
                 for p in claim.effect.parameters:
                     if not p.fixed:
@@ -111,9 +112,9 @@ class Hypothesis:
         return tuple(effects)
 
     def list_effects_of(self, claim_index: int) -> tuple[PlacedEffect, ...]:
-        """The placed effects of one claim, one per group, with the values at the hypothesis's own point."""
-        first_group = sum(claim.groups for claim in self.claims[:claim_index])
-        return self.list_placed_effects()[first_group : first_group + self.claims[claim_index].groups]
+        """List the placed effects of one claim, one per group, with the values at the hypothesis's own point."""
+        first_group = sum(claim.group_count for claim in self.claims[:claim_index])
+        return self.list_placed_effects()[first_group : first_group + self.claims[claim_index].group_count]
 
 
 def has_motion_forces(hypothesis: Hypothesis) -> bool:
@@ -122,11 +123,11 @@ def has_motion_forces(hypothesis: Hypothesis) -> bool:
 
 
 def remove_claim(hypothesis: Hypothesis, claim_index: int) -> Hypothesis:
-    """The hypothesis without the claim of this index, and without the claim's starts and parameters."""
-    group_start = sum(claim.groups for claim in hypothesis.claims[:claim_index])
-    group_stop = group_start + hypothesis.claims[claim_index].groups
+    """Remove the claim of this index, with its starts and parameters."""
+    group_start = sum(claim.group_count for claim in hypothesis.claims[:claim_index])
+    group_stop = group_start + hypothesis.claims[claim_index].group_count
     coordinate_counts = [
-        sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in hypothesis.claims
+        sum(not p.fixed for p in claim.effect.parameters) * claim.group_count for claim in hypothesis.claims
     ]
     coordinate_start = sum(coordinate_counts[:claim_index])
     return Hypothesis(
@@ -137,15 +138,16 @@ def remove_claim(hypothesis: Hypothesis, claim_index: int) -> Hypothesis:
 
 
 def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> Hypothesis:
-    """The hypothesis with its coordinates moved by a step (k,). along_values: logarithmic coordinates move by ln(1 +
-    step), so that values change in proportion to the step, and drop to a tenth at least. Where a parameter of the model
-    compensates for that of the effect (two masses), the cost has a valley that is straight in the values only."""
+    """Move the coordinates of a hypothesis by a step (k,). along_values: logarithmic coordinates move by ln(1 + step),
+    so that values change in proportion to the step, and drop to a tenth at least; the result is clipped to the bounds.
+    Where a parameter of the model compensates for that of the effect (two masses), the cost has a valley that is
+    straight in the values only."""
     if not along_values:
         return replace(hypothesis, point=hypothesis.point + step)
-    logarithmic = np.array(
+    is_logarithmic = np.array(
         [free_parameter.parameter.scale == "log" for free_parameter in hypothesis.parameters], dtype=np.bool_
     )
-    increments = np.where(logarithmic, np.log1p(np.maximum(step, -0.9)), step)
+    increments = np.where(is_logarithmic, np.log1p(np.maximum(step, -0.9)), step)
     lower_bounds, upper_bounds = (
         np.array([free_parameter.bounds for free_parameter in hypothesis.parameters]).reshape(-1, 2).T
     )
@@ -153,7 +155,8 @@ def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> 
 
 
 def make_claim_hypothesis(claim: Claim, values: Sequence[Values]) -> Hypothesis:
-    """The hypothesis of one claim, its point at the given values. values: parameter values (SI) by name, per group."""
+    """Make the hypothesis of one claim, its point at the given values. values: parameter values (SI) by name, per
+    group."""
     free_parameters = [(p, group_values) for group_values in values for p in claim.effect.parameters if not p.fixed]
     point = np.array(
         [
@@ -165,7 +168,7 @@ def make_claim_hypothesis(claim: Claim, values: Sequence[Values]) -> Hypothesis:
 
 
 def combine_hypotheses(leading: Hypothesis, added: Hypothesis) -> Hypothesis:
-    """The hypothesis with the claims, starts and coordinates of both; those of `leading` come first."""
+    """Combine the claims, starts and coordinates of two hypotheses; those of `leading` come first."""
     return Hypothesis(
         leading.claims + added.claims, leading.starts + added.starts, np.concatenate([leading.point, added.point])
     )
@@ -176,7 +179,7 @@ NO_EFFECTS = Hypothesis((), (), np.zeros(0))
 
 
 def generate_near_equivalents(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """Variants of the hypothesis in which one effect at a time has other values with almost the same response
+    """Generate variants of the hypothesis in which one effect at a time has other values with almost the same response
     (`Effect.near_equivalents`)."""
     parameters, first_coordinate = hypothesis.parameters, 0
     for placed_effect in hypothesis.list_placed_effects():
@@ -192,8 +195,8 @@ def generate_near_equivalents(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 
 
 def _compute_coordinate_unit(p: Parameter, start: Values) -> float:
-    """Unit of a coordinate that is not logarithmic: the magnitude of the start where either sign is possible (1 where
-    it is 0), else the parameter's own step."""
+    """Compute the unit of a coordinate that is not logarithmic: the magnitude of the start where either sign is
+    possible (1 where it is 0), else the parameter's own step."""
     if p.scale == "signed":
         return abs(start[p.name]) or 1.0
     return p.step

@@ -11,9 +11,9 @@ the maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
 
     (S'S + diag(1, 0)) step = -(S'e + (d, 0))        parameters that would leave their range are fixed at its end
 
-with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd costs one simulation
-per parameter of the model, so it is computed once and kept; de/dp is recomputed at each step, by finite differences.
-Standard errors: `standard_errors`. Source: Ljung, System Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
+with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd, one simulation per
+parameter of the model, is computed once, de/dp at each step, by finite differences. Called by `search`, `confirm` and
+`discovery`. Source: Ljung, System Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
 """
 
 from collections.abc import Sequence
@@ -34,9 +34,9 @@ DIFFERENCE_STEP = 0.1
 """Step of the finite differences for the model's parameters, in standard deviations of the calibration."""
 Dampings = Sequence[tuple[float, bool]]
 """Per trial, the share of the normal matrix's diagonal that is added, and `along_values` of `move_point`."""
-DAMPINGS: Dampings = ((1e-9, False), (1e-3, False), (0.1, False), (3.0, False))
+DAMPINGS: Dampings = ((1e-9, False), (1e-3, False), (0.1, False), (3.0, False))  # chosen
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
-"""Largest step of an effect's parameter, by its scale: a factor of e; ten times its starting value; unlimited."""
+"""Largest step of an effect's parameter, by its scale (chosen): factor e; ten times its starting value; unlimited."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,42 +47,42 @@ class Sensitivity:
     """(t,): deviations (standard deviations of the calibration) at which it was computed."""
     columns: FloatArray
     """(t, samples): change of the prediction per standard deviation, in units of the noise: -de/dd."""
-    gram: FloatArray
-    """(t, t): Gram matrix of the columns."""
-    repeated: npt.NDArray[np.int64] | None = None
+    gram: FloatArray  # (t, t): Gram matrix of the columns
+    period_indices: npt.NDArray[np.int64] | None = None
     """Where columns contain one period of each segment: per sample to fit, index of its sample in the columns."""
 
     def multiply(self, errors: FloatArray) -> FloatArray:
-        """(t,) or (t, k): products of the columns with errors on the samples to fit, (samples,) or (k, samples)."""
+        """Multiply the columns with errors on the samples to fit, (samples,) or (k, samples): (t,) or (t, k)."""
         rows = np.atleast_2d(errors)
-        if self.repeated is not None:
+        if self.period_indices is not None:
             rows = np.array([self._sum_periods(row) for row in rows]).reshape(len(rows), self.columns.shape[1])
         products = self.columns @ rows.T
         return products if errors.ndim > 1 else products[:, 0]
 
     def select_samples(self, first: int, last: int) -> FloatArray:
-        """(t, last - first): columns on the residuals `first` to `last`, ordered by instant, then by channel; both
-        limits are multiples of the number of channels."""
-        if self.repeated is None:
+        """Select (t, last - first): columns on the residuals `first` to `last`, ordered by instant, then by channel;
+        both limits are multiples of the number of channels."""
+        if self.period_indices is None:
             return self.columns[:, first:last]
         t, c = len(self.columns), self._channels
-        sample_indices = self.repeated[first // c : last // c]
+        sample_indices = self.period_indices[first // c : last // c]
         if len(sample_indices) and (np.diff(sample_indices) == 1).all():
             return self.columns[:, c * sample_indices[0] : c * (sample_indices[-1] + 1)]
         return self.columns.reshape(t, -1, c)[:, sample_indices].reshape(t, -1)
 
     @property
     def _channels(self) -> int:
-        assert self.repeated is not None
-        return int(self.columns.shape[1] // (int(self.repeated.max(initial=-1)) + 1))
+        """Number of channels c; needs `period_indices`."""
+        assert self.period_indices is not None
+        return int(self.columns.shape[1] // (int(self.period_indices.max(initial=-1)) + 1))
 
     def _sum_periods(self, errors: FloatArray) -> FloatArray:
-        """Errors summed over the periods of each segment. errors: (samples,), channel after channel at each instant."""
-        assert self.repeated is not None
-        by_channel = errors.reshape(len(self.repeated), -1)
+        """Sum errors over the periods of each segment. errors: (samples,), channel after channel at each instant."""
+        assert self.period_indices is not None
+        by_channel = errors.reshape(len(self.period_indices), -1)
         period_samples = self.columns.shape[1] // by_channel.shape[1]
-        summed = np.stack([np.bincount(self.repeated, channel, period_samples) for channel in by_channel.T], axis=1)
-        return np.asarray(summed.ravel())
+        sums = np.stack([np.bincount(self.period_indices, channel, period_samples) for channel in by_channel.T], axis=1)
+        return np.asarray(sums.ravel())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,14 +92,12 @@ class Fitted:
     hypothesis: Hypothesis
     deviations: FloatArray
     """(t,): deviations of the model's own parameters, in standard deviations of the calibration."""
-    residuals: tuple[FloatArray, ...]
-    """Residuals per record (n, c), in units of the noise."""
-    cost: float
-    """The cost J of the module's equation."""
+    residuals: tuple[FloatArray, ...]  # (n, c) per record, in units of the noise
+    cost: float  # J of the module's equation
 
 
 def stack_fit_residuals(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
-    """(samples,): the residuals of the samples to fit, of all records and channels in one row."""
+    """Stack (samples,): the residuals of the samples to fit, of all records and channels in one row."""
     fit_residuals = [residual[record.fit].ravel() for residual, record in zip(residuals, measure.records, strict=True)]
     return np.concatenate(fit_residuals)
 
@@ -112,8 +110,8 @@ def build_jacobian(
     map_: object = map,
     known_columns: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
-    """Jacobian of the prediction by the model's own parameters, by finite differences. map_: `map` or a parallel one.
-    known_columns: columns (t, samples), and the indices of those that must be computed; None = all."""
+    """Build the Jacobian of the prediction by the model's own parameters, by finite differences. map_: `map` or a
+    parallel one. known_columns: columns (t, samples), and the indices of those that must be computed; None = all."""
     base = stack_fit_residuals(measure, measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects()))
 
     def compute_column(parameter_index: int) -> FloatArray:
@@ -144,7 +142,7 @@ def build_jacobian(
 def fit(
     measure: ErrorMeasure, tuning: Tuning, start: Fitted, jacobian: Sensitivity, rounds: int, map_: object = map
 ) -> Fitted:
-    """The best fit within a number of Gauss-Newton steps; never worse than the start. jacobian: sensitivity to the
+    """Find the best fit within a number of Gauss-Newton steps; never worse than the start. jacobian: sensitivity to the
     model's parameters, computed at a point nearby. map_: as for `build_jacobian`."""
     best = start
     for _ in range(rounds):
@@ -153,24 +151,24 @@ def fit(
             return best
         cost_decrease = best.cost - next_fit.cost
         best = next_fit
-        if cost_decrease < 1e-4 * best.cost:
+        if cost_decrease < 1e-4 * best.cost:  # converged
             break
     return best
 
 
 def predict_decrease(last_decrease: float, previous_decrease: float) -> float:
-    """Expected decrease of the cost by the next fit, from those by the last two: they shrink about geometrically."""
+    """Predict the decrease of the cost by the next fit, from those by the last two: they shrink about geometrically."""
     return last_decrease * min(last_decrease / previous_decrease, 1.0) if previous_decrease > 0 else last_decrease
 
 
 def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
-    """Residuals and cost of a hypothesis at given deviations, by simulation without fitting."""
+    """Compute residuals and cost of a hypothesis at given deviations, by simulation without fitting."""
     residuals = measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects())
     return Fitted(hypothesis, deviations, residuals, _compute_cost(stack_fit_residuals(measure, residuals), deviations))
 
 
 def _compute_cost(residuals: FloatArray, deviations: FloatArray) -> float:
-    """The cost J of the module's equation, infinite where the simulation diverged. residuals: (samples,) to fit."""
+    """Compute the cost J of the module's equation; infinite for a diverged simulation. residuals: (samples,) to fit."""
     with np.errstate(over="ignore", invalid="ignore"):  # A simulation may have diverged.
         cost = float(residuals @ residuals + deviations @ deviations) / max(len(residuals), 1)
     return cost if np.isfinite(cost) else np.inf
@@ -179,7 +177,7 @@ def _compute_cost(residuals: FloatArray, deviations: FloatArray) -> float:
 def _take_gauss_newton_step(
     measure: ErrorMeasure, tuning: Tuning, iterate: Fitted, jacobian: Sensitivity, map_: object
 ) -> Fitted | None:
-    """The fit after one step; None where no step lowers the cost, or a derivative is not finite."""
+    """Take one step; None where no step lowers the cost, or a derivative is not finite."""
     errors = stack_fit_residuals(measure, iterate.residuals)
     effect_columns = compute_effect_columns(measure, tuning, iterate, errors, map_)
     t = len(iterate.deviations)
@@ -199,15 +197,15 @@ def take_step(
     system: tuple[FloatArray, FloatArray],
     dampings: Dampings = DAMPINGS,
 ) -> Fitted | None:
-    """The fit after a damped Gauss-Newton step within the bounds; None where no damping lowers the cost. system: normal
-    matrix and right side, of the model's parameters, then the hypothesis's."""
+    """Take a damped Gauss-Newton step within the bounds; None where no damping lowers the cost. system: normal matrix
+    and right side, of the model's parameters, then the hypothesis's."""
     t = len(iterate.deviations)
     unknowns = np.concatenate([iterate.deviations, iterate.hypothesis.point])
     low, high = (bound - unknowns for bound in _list_bounds(iterate.hypothesis, tuning))
     largest_steps = _list_largest_steps(iterate.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -largest_steps), np.minimum(high[t:], largest_steps)
-    next_fit, impossible = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
-    if next_fit is None and impossible:
+    next_fit, is_invalid = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
+    if next_fit is None and is_invalid:
         # A mass whose best value is negative must not stop the other parameters: it stays fixed.
         mass_indices = [index for index, parameter_name in enumerate(tuning.names) if parameter_name.startswith("mass")]
         low[mass_indices] = high[mass_indices] = 0.0
@@ -223,38 +221,38 @@ def _search_damping(
     bounds: tuple[FloatArray, FloatArray],
     dampings: Dampings,
 ) -> tuple[Fitted | None, bool]:
-    """The fit after the first of ever shorter steps that lowers the cost, None where none does; and whether any step
-    led to an invalid mechanical model. system: normal matrix and right side."""
-    (products, rhs), t, impossible = system, len(iterate.deviations), False
+    """Find the first of ever shorter steps that lowers the cost (by 1e-9 of it), None where none does; and whether any
+    step led to an invalid mechanical model. system: normal matrix and right side."""
+    (products, rhs), t, is_invalid = system, len(iterate.deviations), False
     # Steps that make the model less stable are refused, unless it is unstable already.
-    already_unstable = is_unstable_within(tuning.tune(iterate.deviations), _find_longest_s(measure))
+    is_unstable = is_unstable_within(tuning.tune(iterate.deviations), _find_longest_s(measure))
     for damping, along_values in dampings:
         step = solve_bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
         trial_hypothesis = move_point(iterate.hypothesis, step[t:], along_values)
         try:
             model = tuning.tune(iterate.deviations + step[:t])
-            if not already_unstable and is_unstable_within(model, _find_longest_s(measure)):
+            if not is_unstable and is_unstable_within(model, _find_longest_s(measure)):
                 continue
             trial = evaluate_fit(measure, tuning, iterate.deviations + step[:t], trial_hypothesis)
         except (MechanicalModelError, np.linalg.LinAlgError):
-            impossible = True
+            is_invalid = True
             continue
         if trial.cost < iterate.cost * (1 - 1e-9):
-            return trial, impossible
-    return None, impossible
+            return trial, is_invalid
+    return None, is_invalid
 
 
 def _find_longest_s(measure: ErrorMeasure) -> float:
-    """Length (s) of the longest record."""
+    """Find the length (s) of the longest record."""
     return max(len(record.command) / record.recording.sample_rate_hz for record in measure.records)
 
 
 def compute_effect_columns(
     measure: ErrorMeasure, tuning: Tuning, iterate: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
-    """(parameters, samples): -de/dp, change of the prediction per coordinate. errors: residuals to fit at `iterate`."""
+    """Compute (parameters, samples): -de/dp, per coordinate. errors: residuals to fit at `iterate`."""
     model: MechanicalModel = tuning.tune(iterate.deviations)
-    steps = [free.difference_step for free in iterate.hypothesis.parameters]
+    steps = [parameter.difference_step for parameter in iterate.hypothesis.parameters]
 
     def compute_column(parameter_index: int) -> FloatArray:
         point, step = iterate.hypothesis.point.copy(), steps[parameter_index]
@@ -269,18 +267,20 @@ def compute_effect_columns(
 
 
 def _list_bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, FloatArray]:
-    limits = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
-    largest = np.full(len(tuning.names), tuning.bound)
-    return np.concatenate([-largest, limits[:, 0]]), np.concatenate([largest, limits[:, 1]])
+    """List the bounds of all unknowns: of the model's parameters, then of the hypothesis's coordinates."""
+    limits = np.array([parameter.bounds for parameter in hypothesis.parameters]).reshape(-1, 2)
+    largest_deviations = np.full(len(tuning.names), tuning.bound)
+    return np.concatenate([-largest_deviations, limits[:, 0]]), np.concatenate([largest_deviations, limits[:, 1]])
 
 
 def _list_largest_steps(hypothesis: Hypothesis) -> FloatArray:
-    return np.array([LARGEST_STEPS[free.parameter.scale] for free in hypothesis.parameters])
+    """List the largest step of each coordinate, by the scale of its parameter."""
+    return np.array([LARGEST_STEPS[parameter.parameter.scale] for parameter in hypothesis.parameters])
 
 
 def solve_bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Least-squares step (t,) within bounds: parameters that would leave their range are fixed at its end (active set).
-    products, rhs: matrix (t, t) and right-hand side (t,) of the normal equations."""
+    """Solve for the least-squares step (t,) within bounds: parameters that would leave their range are fixed at its end
+    (active set). products, rhs: matrix (t, t) and right-hand side (t,) of the normal equations."""
     step, is_fixed = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
     for _ in range(2 * len(rhs) + 2):
         is_free = ~is_fixed
@@ -296,5 +296,5 @@ def solve_bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, h
 
 
 def gather_evidence(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Evidence, ...]:
-    """Motion and missing force of a fit, one per record, from which starting values are estimated."""
+    """Gather motion and missing force of a fit, one per record, from which starting values are estimated."""
     return measure.evidence(tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects(), fitted.residuals)

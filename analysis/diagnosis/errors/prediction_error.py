@@ -38,7 +38,7 @@ class PredictionError:
     """Normalised rms errors, dimensionless: sqrt(mean over channels of (rms error / standard deviation of signal)²).
     None where they are not finite or no sample is compared."""
 
-    error: str
+    measure_name: str
     """Name of the error measure, as in `diagnosis.json`."""
     without_gain: float | None
     """The error of the model without any gain factor."""
@@ -56,22 +56,24 @@ def compute_prediction_error(
     """Compute the error of a model, with the effects that it contains, on a recording. selection: samples on which the
     error is computed; with "test", the gain factor is fitted to the other samples."""
     measure = make_measure((recording,), model).measure
-    measured, predicted, tested, fitted = [], [], [], []
+    measured, predicted, test_masks, fit_masks = [], [], [], []
     for record, residual in zip(measure.records, measure.residuals(model, ()), strict=True):
         is_complete = np.isfinite(record.measured).all(axis=1)
         measured.append(record.measured)
         predicted.append(record.measured - residual * measure.unit)
-        tested.append((record.test if selection == "test" else record.test | record.fit | record.choose) & is_complete)
-        fitted.append((record.fit | record.choose) & is_complete)
+        test_masks.append(
+            (record.test if selection == "test" else record.test | record.fit | record.choose) & is_complete
+        )
+        fit_masks.append((record.fit | record.choose) & is_complete)
     # y: measured, f: predicted, (n, c) each.
     y, f = np.vstack(measured), np.vstack(predicted)
-    test, fit = np.concatenate(tested), np.concatenate(fitted)
-    gain = _fit_gain(y, f, fit if selection == "test" and fit.any() else test)
+    test_mask, fit_mask = np.concatenate(test_masks), np.concatenate(fit_masks)
+    gain = _fit_gain(y, f, fit_mask if selection == "test" and fit_mask.any() else test_mask)
     return PredictionError(
         measure.name,
-        _compute_normalised_rms(y, f, test),
-        None if gain is None else _compute_normalised_rms(y, gain * f, test),
-        tuple(_compute_channel_errors(recording, y[test], f[test])),
+        _compute_normalised_rms(y, f, test_mask),
+        None if gain is None else _compute_normalised_rms(y, gain * f, test_mask),
+        tuple(_compute_channel_errors(recording, y[test_mask], f[test_mask])),
     )
 
 

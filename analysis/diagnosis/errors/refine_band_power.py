@@ -2,7 +2,7 @@
 
 For responses with impacts, which are chaotic: simulations of one hypothesis from almost equal parameters diverge. Their
 standard deviation, the chance variation, therefore weights the band powers, and predictions are averaged over an
-ensemble of simulations. Called by `impacts` and `second_effect_with_play`.
+ensemble of simulations. Called by `search.impacts` and `search.second_effect_with_play`.
 """
 
 from dataclasses import replace
@@ -16,46 +16,48 @@ from equalizer.signals.signal import FloatArray
 
 ENSEMBLE_SIZE = 4
 """Number of simulations of one hypothesis: their standard deviation is the chance variation, their mean is compared
-with the recording."""
+with the recording. Chosen."""
 MOST_LINEARISATIONS, STEPS_PER_LINEARISATION = 4, 2
-"""Largest number of linearisations by the model's parameters, and of Gauss-Newton steps with each of them."""
+"""Largest number of linearisations by the model's parameters, and of Gauss-Newton steps with each of them. Chosen."""
 LEAST_EXPECTED_GAIN = 0.02
-"""Expected relative reduction of the cost above which another linearisation follows."""
+"""Expected relative reduction of the cost above which another linearisation follows. Chosen."""
 
 
-def refine_band_power(weighted: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
-    """The joint fit of the hypothesis's and the model's parameters, from `start`. The sensitivity to the model's
-    parameters depends on the effects and is computed anew up to `MOST_LINEARISATIONS` times, while time is left.
-    weighted: the problem with the chance variation of `start` (`weight_by_chance_variation`)."""
+def refine_band_power(weighted_problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
+    """Fit the hypothesis's and the model's parameters jointly, from `start`. The sensitivity to the model's parameters
+    depends on the effects and is computed anew up to `MOST_LINEARISATIONS` times, while time is left. weighted_problem:
+    the problem with the chance variation of `start` (`weight_by_chance_variation`)."""
     best = start
-    last_gain = 0.0
+    last_decrease = 0.0
     for _ in range(MOST_LINEARISATIONS):
-        problem = replace(weighted, jacobian_by_deviations=_differentiate_by_deviations(weighted, best))
+        problem = replace(weighted_problem, jacobian_by_deviations=_differentiate_by_deviations(weighted_problem, best))
         refined = fit_band_power(problem, best, STEPS_PER_LINEARISATION)
-        gain = 1 - refined.cost / best.cost if best.cost > 0 else 0.0
-        best, expected, last_gain = refined, predict_decrease(gain, last_gain), gain
-        if expected <= LEAST_EXPECTED_GAIN or not time_left():
+        cost_decrease = 1 - refined.cost / best.cost if best.cost > 0 else 0.0
+        best, expected_decrease, last_decrease = refined, predict_decrease(cost_decrease, last_decrease), cost_decrease
+        if expected_decrease <= LEAST_EXPECTED_GAIN or not time_left():
             break
     return best
 
 
 def weight_by_chance_variation(problem: BandPowerProblem, fit: BandPowerFit) -> BandPowerProblem:
-    """The problem with the chance variation of `fit`: each band's standard deviation over `ENSEMBLE_SIZE` simulations.
-    Its predictions are averaged over as many."""
+    """Weight a problem by the chance variation of `fit`: each band's standard deviation over `ENSEMBLE_SIZE`
+    simulations. Its predictions are averaged over as many."""
 
     def predict(member: int) -> FloatArray:
+        """Predict the band powers of one simulation of the ensemble."""
         return problem.predict(fit.deviations, perturb(fit.hypothesis, member))
 
-    spread = np.std(np.array(list(problem.map_(predict, range(ENSEMBLE_SIZE)))), axis=0, ddof=1)
-    return replace(problem, spread=spread, ensemble=ENSEMBLE_SIZE)
+    chance_deviations = np.std(np.array(list(problem.map_(predict, range(ENSEMBLE_SIZE)))), axis=0, ddof=1)
+    return replace(problem, spread=chance_deviations, ensemble=ENSEMBLE_SIZE)
 
 
 def _differentiate_by_deviations(problem: BandPowerProblem, fit: BandPowerFit) -> FloatArray:
-    """(t, stretches, bands, c): sensitivity to the model's t parameters, by forward differences with steps of one
-    standard deviation, which are large compared with the chance variation; 0 where a step gives no finite value."""
+    """Compute (t, stretches, bands, c): sensitivity to the model's t parameters, by forward differences with steps of
+    one standard deviation, which are large compared with the chance variation; 0 where a step gives no finite value."""
     steps = np.eye(len(fit.deviations))
 
     def compute_difference(parameter_index: int) -> FloatArray:
+        """Compute the sensitivity to one parameter."""
         change = problem.predict(fit.deviations + steps[parameter_index], fit.hypothesis) - fit.predicted
         return np.where(np.isfinite(change), change, 0.0)
 

@@ -1,4 +1,4 @@
-"""Error measure with prewhitened residuals, and its whitening filter. Used by `learn_model_error`.
+"""Error measure with prewhitened residuals, and its whitening filter. Called by `learn_model_error`.
 
 The whitened residual is the one-step prediction error of an AR(p) model of the residual r that a re-tuned model leaves
 on reference recordings,
@@ -31,11 +31,11 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
-"""Largest order p of the autoregression, and least samples per lag: with fewer, the coefficients are mostly noise.
-Both were set by hand."""
+"""Largest order p of the autoregression, and least samples per lag: with fewer, the coefficients are mostly noise. Both
+were set by hand."""
 WHITE_SHARE = 1e-4
-"""White noise added to the residual before the fit, as a share of its power: no frequency weighs more than
-1 / WHITE_SHARE times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
+"""White noise added to the residual before the fit, as a share of its power: no frequency weighs more than 1 /
+WHITE_SHARE times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,16 +46,16 @@ class WhiteningFilter:
     """(p + 1, c): impulse response, 1 and then a1 ... ap."""
 
     @property
-    def lags(self) -> int:
+    def order(self) -> int:
         """Order p of the autoregression."""
         return len(self.coefficients) - 1
 
     def apply(self, residual: FloatArray) -> FloatArray:
-        """(n, c): the residual (n, c) through the causal filter; unknown samples count as 0 and stay NaN."""
+        """Filter a residual (n, c): (n, c); unknown samples count as 0 in the filter, and are NaN in the result."""
         is_known = np.isfinite(residual)
         padded_residual = np.where(is_known, residual, 0.0)
         # Padded by the filter's length, so that the circular convolution of the FFT is a linear one.
-        padded_length = next_fast_len(len(residual) + self.lags, True)
+        padded_length = next_fast_len(len(residual) + self.order, True)
         filtered = irfft(
             rfft(padded_residual, padded_length, axis=0) * rfft(self.coefficients, padded_length, axis=0),
             padded_length,
@@ -64,22 +64,23 @@ class WhiteningFilter:
         return np.where(is_known, filtered[: len(residual)], np.nan)
 
     def mask_full_history(self, residual: FloatArray) -> Mask:
-        """(n,): mask of the samples of a residual (n, c) for which all samples that the filter uses are known."""
-        is_unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(residual).all(axis=1)])
+        """Mask (n,) the samples of a residual (n, c) for which all samples that the filter uses are known."""
+        is_unknown = np.concatenate([np.ones(self.order), ~np.isfinite(residual).all(axis=1)])
         cumulative_unknown = np.concatenate([[0.0], np.cumsum(is_unknown)])
-        return np.asarray(cumulative_unknown[self.lags + 1 :] == cumulative_unknown[: len(residual)], dtype=np.bool_)
+        return np.asarray(cumulative_unknown[self.order + 1 :] == cumulative_unknown[: len(residual)], dtype=np.bool_)
 
 
 def fit_whitening_filter(residuals: Sequence[FloatArray], white_noise_rms: FloatArray) -> WhiteningFilter:
-    """Autoregression fitted to residuals by Yule-Walker, channel by channel. residuals: (n, c) each, NaN where not
-    known. white_noise_rms: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from below."""
+    """Fit an autoregression to residuals by the Yule-Walker equations, channel by channel. residuals: (n, c) each, NaN
+    where not known. white_noise_rms: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from
+    below."""
     sample_count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
-    lags = int(np.clip(sample_count // SAMPLES_PER_LAG, 1, MOST_LAGS))
+    order = int(np.clip(sample_count // SAMPLES_PER_LAG, 1, MOST_LAGS))
     autocovariance: FloatArray = np.sum(
-        [compute_lagged_products(residual, lags) for residual in residuals], axis=0
+        [compute_lagged_products(residual, order) for residual in residuals], axis=0
     ) / max(sample_count, 1)
     autocovariance[0] = autocovariance[0] * (1 + WHITE_SHARE) + white_noise_rms**2
-    coefficients = np.zeros((lags + 1, len(white_noise_rms)))
+    coefficients = np.zeros((order + 1, len(white_noise_rms)))
     coefficients[0] = 1.0
     for c, channel_autocovariance in enumerate(autocovariance.T):
         coefficients[1:, c] = -solve_toeplitz(channel_autocovariance[:-1], channel_autocovariance[1:])
@@ -98,7 +99,7 @@ class WhitenedMeasure:
     quadrature."""
     noise: FloatArray
     """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
-    least: float = 0.0
+    least_error: float = 0.0
     """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
 
     @property
@@ -112,16 +113,16 @@ class WhitenedMeasure:
         return self.base_measure.records
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, with the same filter. Their sample roles are kept, also where the filter has no
-        full history."""
+        """Return the measure on other records, with the same filter. Their sample roles are kept, also where the filter
+        has no full history."""
         return replace(self, base_measure=self.base_measure.with_records(records))
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
-        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+        """Return the measure with noise of this rms (c,) added in power, and 1 as its least error."""
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least_error=1.0)
 
     def shorten(self) -> Self:
-        """The measure without the samples after the last to fit or to choose by, as in the base measure."""
+        """Return the measure without the samples after the last to fit or to choose by, as in the base measure."""
         return replace(self, base_measure=self.base_measure.shorten())
 
     def can_observe(self, effect: Effect) -> bool:
@@ -129,7 +130,8 @@ class WhitenedMeasure:
         return self.base_measure.can_observe(effect)
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): residuals of the base measure through the filter, in `unit`; NaN where missing."""
+        """Compute, per record, (n, c): residuals of the base measure through the filter, in `unit`; NaN where
+        missing."""
         base_residuals = self.base_measure.residuals(model, effects)
         # The filter was fitted to residuals in the channels' units, those of the base measure are in units of noise.
         return tuple(self.whitening.apply(residual * self.base_measure.unit) / self.unit for residual in base_residuals)
@@ -137,20 +139,20 @@ class WhitenedMeasure:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Evidence from the residuals before whitening, because estimators of starting values need time series of
-        motions. residuals: not used."""
+        """Gather the evidence from the residuals before whitening, because estimators of starting values need time
+        series of motions. residuals: not used."""
         return self.base_measure.evidence(model, effects, self.base_measure.residuals(model, effects))
 
 
 def whiten_measure(base_measure: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> WhitenedMeasure:
-    """The measure with whitened residuals; samples without full history of the filter lose their roles. noise: (c,),
-    see `WhitenedMeasure`."""
+    """Whiten the residuals of a measure; samples without full history of the filter lose their roles. noise: (c,), see
+    `WhitenedMeasure`."""
     records = tuple(_leave_out_warm_up(record, whitening) for record in base_measure.records)
     return WhitenedMeasure(base_measure.with_records(records), whitening, noise, noise)
 
 
 def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:
-    """The record without roles for samples whose filter output depends on unknown samples."""
+    """Remove the roles of the samples whose filter output depends on unknown samples."""
     has_history = whitening.mask_full_history(record.measured)
     return replace(
         record, fit=record.fit & has_history, choose=record.choose & has_history, test=record.test & has_history

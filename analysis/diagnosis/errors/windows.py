@@ -33,7 +33,7 @@ _LEAST_SINGULAR_SHARE = 1e-9
 rounding errors. Chosen."""
 READINGS_PER_STATE = 10.0
 """Least readings of a channel in a window, per fitted state and channel: the fit then absorbs at most a tenth of the
-power of random errors."""
+power of random errors. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ class Windows:
     """Length of a window (s)."""
     model_effects: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
-    least: float = 0.0
+    least_error: float = 0.0
     """Lower limit of an error in units of the noise; 0, or 1 after `with_floor`."""
 
     @property
@@ -61,16 +61,16 @@ class Windows:
         return f"windows of {self.window_s:g} s"
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, which must match `states` in number and length."""
+        """Return the measure on other records, which must match `states` in number and length."""
         return replace(self, records=records)
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
-        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+        """Return the measure with noise of this rms (c,) added in power, and 1 as its least error."""
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least_error=1.0)
 
     def shorten(self) -> "Windows":
-        """The measure without the samples after the last one to fit or to choose by; records without such samples are
-        left out."""
+        """Return the measure without the samples after the last one to fit or to choose by; records without such
+        samples are left out."""
         used_records = [
             (record.shorten(), states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -87,8 +87,9 @@ class Windows:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): measured minus simulated, in units of `unit`, after the fit of each window's initial
-        state; NaN where a sample is missing, and then without that fit in the whole record (`_remove_state_errors`)."""
+        """Compute, per record, (n, c): measured minus simulated, in units of `unit`, after the fit of each window's
+        initial state; NaN where a sample is missing, and then without that fit in the whole record
+        (`_remove_state_errors`)."""
         all_effects = (*self.model_effects, *effects)
         return tuple(
             self._simulate_from_states(model, all_effects, *record_and_states)[1]
@@ -98,8 +99,8 @@ class Windows:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Per record, the motion and missing force from which starting values are estimated. residuals: not used; they
-        are computed again with the simulation."""
+        """Gather, per record, the motion and missing force from which starting values are estimated. residuals: not
+        used; they are computed again with the simulation."""
         return tuple(
             self._gather_evidence(model, (*self.model_effects, *effects), record, states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -132,7 +133,7 @@ class Windows:
     def _remove_state_errors(
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, window_samples: int
     ) -> FloatArray:
-        """(n, c): residuals without their projection on the free motions from other initial states, window by
+        """Compute (n, c): residuals without their projection on the free motions from other initial states, window by
         window. Unchanged in all windows where any value is missing, or where a simulation or free motion diverges."""
         n, c = residual.shape
         # A fit may try an unstable model, whose free motion overflows: its residuals are returned unchanged.
@@ -140,8 +141,8 @@ class Windows:
             free_motion = (
                 _compute_free_motion(structure, sample_rate_hz, min(window_samples, n), c) / self.unit[:, None]
             )
-            finite = np.isfinite(residual).all() and np.isfinite(np.sum(free_motion**2))
-        if not finite:
+            is_finite = np.isfinite(residual).all() and np.isfinite(np.sum(free_motion**2))
+        if not is_finite:
             return residual
         full_windows_end = n // window_samples * window_samples
         projected = residual.copy()
@@ -228,8 +229,8 @@ def _compute_free_motion(
 
 
 def _project_out(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
-    """Subtract from residuals (windows, samples) their least-squares projection on the columns of free_motion
-    (samples, k), which are normalised first; a column of zeros has no effect."""
+    """Subtract from residuals (windows, samples) their least-squares projection on the columns of free_motion (samples,
+    k), which are normalised first; a column of zeros has no effect."""
     column_norms = np.linalg.norm(free_motion, axis=0)
     basis, singular_values, _ = np.linalg.svd(
         free_motion / np.where(column_norms > 0, column_norms, 1.0), full_matrices=False

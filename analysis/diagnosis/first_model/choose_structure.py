@@ -23,7 +23,7 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_modal_structure,
     fit_structure,
 )
-from analysis.diagnosis.settings import MODES_GAIN, REMAINDER_REPORTED, RICHER_STRUCTURE_GAIN
+from analysis.diagnosis.settings import MODES_GAIN, REPORTED_REMAINDER_SHARE, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording
@@ -109,13 +109,13 @@ def choose_structure(
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
     """Describe the model's error in a sentence, and which regressor explains most of it. balanced: None = without
     one."""
-    error_text = f"{100 * fit.error:.3g} % of the {fit.compared}"
+    error_text = f"{100 * fit.error:.3g} % of the {fit.error_signal}"
     if balanced is None or fit.joint is None or balanced.untimed:
         return f"An error of {error_text} remains."
     motions = balanced.regressions[0].motions
     remainders = [
         remainder[motion.mask_valid_samples(motion.fit)]
-        for remainder, motion in zip(fit.joint.remainders, motions, strict=True)
+        for remainder, motion in zip(fit.joint.residual_forces, motions, strict=True)
     ]
     shares_by_cause = {
         cause: _compute_explained_share(
@@ -125,7 +125,7 @@ def describe_remaining_error(balanced: BalancedRecordings | None, fit: Structure
         for cause, compute_regressor in REMAINDER_REGRESSORS.items()
     }
     cause, explained_share = max(shares_by_cause.items(), key=lambda item: item[1])
-    if explained_share < REMAINDER_REPORTED:
+    if explained_share < REPORTED_REMAINDER_SHARE:
         return f"An error of {error_text} remains; it depends on neither speed nor position."
     return f"An error of {error_text} remains; {100 * explained_share:.0f} % of its power is explained by {cause}."
 

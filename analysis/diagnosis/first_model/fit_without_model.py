@@ -28,13 +28,13 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_structure,
 )
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, fit_rigid_model, should_use_rigid_model
-from analysis.diagnosis.settings import LEAST_MODEL_ANSWER
+from analysis.diagnosis.settings import LEAST_MODEL_RESPONSE
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from analysis.wording import format_sentence
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
-from equalizer.identification.mechanical.open_tolerance import widen_tolerance
+from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
@@ -67,8 +67,9 @@ def fit_first_model(
 ) -> FirstModel:
     """Fit the first model: by force balance where that is possible, else by `fit_first_linear_model`, which takes
     longer. recordings: at least one, as converted by `one_motion_per_force`. excluded_effects: names of effects that
-    the balance must not name. on_progress: called with a text and the completed fraction, 0 to 1. map_: a possibly
-    parallel `map`. Raises NothingToDiagnose where no model can be fitted."""
+    the balance must not name. time_left: time limit of the balance. on_progress: called with a text and the
+    completed fraction, 0 to 1, of which the balance counts as the first half. map_: a possibly parallel `map`. Raises
+    NothingToDiagnose where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
     on_progress("testing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(excluded_effects), time_left, map_)
@@ -86,7 +87,7 @@ def fit_first_model(
         return FirstModel(model, (BALANCE_REMARK,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
     model, remarks = fit_first_linear_model(
-        recordings, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
+        recordings, lambda fraction: on_progress("fitting a linear model, as none was given", 0.5 + fraction / 2)
     )
     return FirstModel(model, remarks, balances)
 
@@ -99,14 +100,14 @@ def _fix_mass(model: MechanicalModel) -> MechanicalModel:
 
 
 def _fit_free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
-    """Fit a mass with damper and spring to a free motion, or without the spring where that fit fails; None where both
+    """Fit damper and spring per unit mass to a free motion, or a damper alone where that fit fails; None where both
     fail."""
     return _fit_structure_by_balance(recordings, "mass-spring") or _fit_structure_by_balance(recordings, "motor")
 
 
 def _fit_structure_by_balance(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
-    """Fit the model of a structure by force balance; None where no motion was measured along the commands, or where the
-    fit fails."""
+    """Fit the model of a structure by force balance; None where not every command has one measured position or
+    velocity, or where the fit fails."""
     try:
         return fit_structure(balance_recordings(recordings), kind).model
     except (StructureRefused, NoMotionError):
@@ -117,8 +118,8 @@ def fit_first_linear_model(
     recordings: Sequence[Recording], on_progress: Callable[[float], None], source: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """Fit a linear model to forces (`fit_rigid_model`) or to frequency responses. Returns the model and remarks, as
-    sentences. source: description of the recordings, for the remarks. Raises NothingToDiagnose where no model can be
-    fitted."""
+    sentences. on_progress: called with the completed fraction, 0 to 1. source: description of the recordings, for the
+    remarks. Raises NothingToDiagnose where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
     if should_use_rigid_model(recordings) and (rigid_model := _try_rigid_model(recordings, source)) is not None:
         return rigid_model, (RIGID_REMARK,)
@@ -145,13 +146,13 @@ def fit_first_linear_model(
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
     """Whether the commands move the model: whether on some channel the simulated standard deviation is at least
-    `LEAST_MODEL_ANSWER` of the measured one. For an axis that friction holds at rest, the fitted masses and springs
-    grow without bound, and the model hardly moves."""
-    simulated = simulate_response(
+    `LEAST_MODEL_RESPONSE` of the measured one. For an axis that friction keeps at rest, the fitted masses and springs
+    grow without bound, and the simulated response is almost zero."""
+    simulation = simulate_response(
         model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
     )
-    measured = np.nanstd(recording.response.samples, axis=0)
-    return bool((np.std(simulated.response, axis=0) >= LEAST_MODEL_ANSWER * measured).any())
+    measured_deviations = np.nanstd(recording.response.samples, axis=0)
+    return bool((np.std(simulation.response, axis=0) >= LEAST_MODEL_RESPONSE * measured_deviations).any())
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:
@@ -166,7 +167,7 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
 
 
 def _try_rigid_model(recordings: Sequence[Recording], source: str) -> MechanicalModel | None:
-    """Fit a rigid body per command; None where the recordings do not determine it."""
+    """Fit a rigid body per command; None where the recordings do not permit that (`can_be_rigid`), or the fit fails."""
     if not can_be_rigid(recordings):
         return None
     try:

@@ -3,7 +3,7 @@
 From the channel's name where that is clear; force where the commands are motions; else from a force balance on the
 response y and its derivatives, f = m y'' + c y' + k y. With a position, mass makes y'' significant; with a velocity,
 mass multiplies y' and damping y, so that y'' is not needed. A response is a velocity where y'' explains less than
-`DERIVATIVE_NEEDED` of the force's power in cross-validation and y at least that much, otherwise a position. A sensor's
+`DERIVATIVE_GAIN` of the force's power in cross-validation and y at least that much, otherwise a position. A sensor's
 voltage is treated likewise. Called by `one_motion_per_force`.
 """
 
@@ -16,11 +16,11 @@ from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import build_regression
 from analysis.diagnosis.data.measured_motion import is_driven
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import DERIVATIVE_NEEDED
+from analysis.diagnosis.settings import DERIVATIVE_GAIN
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
-from equalizer.signals.units import UNSTATED
+from equalizer.signals.units import NO_UNIT
 
 BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
 """Quantities that a force balance can use. A voltage is a sensor's reading of an unknown quantity."""
@@ -38,7 +38,7 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
             first_recording, quantities_in_names
         )
     if not is_driven(recordings):
-        if set(first_recording.response.units) != {UNSTATED}:
+        if set(first_recording.response.units) != {NO_UNIT}:
             return recordings, ""
         return tuple(_set_quantity(recording, "position") for recording in recordings), (
             f"The recording does not state what {conjoin(list(first_recording.response.channels))} measures; it was "
@@ -62,7 +62,7 @@ def _infer_from_names(recording: Recording) -> tuple[str, ...]:
     response = recording.response
     quantities = [
         inferred_quantity
-        if unit == UNSTATED and (inferred_quantity := detect_quantity(name)) in BALANCE_QUANTITIES
+        if unit == NO_UNIT and (inferred_quantity := detect_quantity(name)) in BALANCE_QUANTITIES
         else quantity
         for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
     ]
@@ -105,7 +105,7 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
         compute_error_increase(range(motion_count)),
         compute_error_increase(range(2 * motion_count, 3 * motion_count)),
     )
-    return "velocity" if acceleration_increase < DERIVATIVE_NEEDED <= position_increase else "position"
+    return "velocity" if acceleration_increase < DERIVATIVE_GAIN <= position_increase else "position"
 
 
 def _set_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:

@@ -1,11 +1,10 @@
-"""Builds a linear mechanical model M a + D v + K q = f from force balances, with one body per command.
+"""Build a linear mechanical model M a + D v + K q = f from force balances, with one body per command.
 
 The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. The
 tolerance of a matrix is half the largest difference between its entries and those of the balances with the named laws
-(not made symmetric), plus a share (`FOUND_NUMBERS_OPEN`) of the largest entry. A mass is at least `MASSLESS_SHARE` of
-the force's rms over that of the acceleration, because every coordinate of a mechanical model needs a mass. Called by
-`fit_without_model` and `force_balance_measures`.
-"""
+(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry. A mass is at least
+`MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical model needs
+a mass. Called by `fit_without_model` and `force_balance_measures`."""
 
 from collections.abc import Sequence
 
@@ -14,7 +13,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed
-from analysis.diagnosis.settings import FOUND_NUMBERS_OPEN, MASSLESS_SHARE
+from analysis.diagnosis.settings import FOUND_PARAMETER_DEVIATION, MASSLESS_SHARE
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -22,17 +21,17 @@ from equalizer.signals.signal import FloatArray
 
 def build_first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
     """Build a linear model with the masses, dampers and springs of force balances, one per command, at least one.
-    recording: reduced by `reduce_recordings` where the balances hold more than one body per command. None where the
-    commands do not drive one measured motion each. Raises MechanicalModelError for matrices that are no valid model,
-    numpy.linalg.LinAlgError where a fit fails."""
+    recording: reduced by `reduce_recordings` where the balances contain more than one body per command. name: of the
+    model. None where the commands do not drive one measured motion each. Raises MechanicalModelError for matrices that
+    are no valid model, numpy.linalg.LinAlgError where a fit fails."""
     regressions = [balance.search.regression for balance in balances]
     command_count = len(balances)
     if command_count > len(regressions[0].motions[0].channels) or command_count != len(recording.response.channels):
         return None
     driven_channels = [regression.base_terms.driven_channel for regression in regressions]
     rows_without_laws, rows_with_laws = (
-        [_fit_matrix_rows(balance, laws, driven_channels) for balance, laws in zip(balances, law_choices, strict=True)]
-        for law_choices in (
+        [_fit_matrix_rows(balance, indices, driven_channels) for balance, indices in zip(balances, choice, strict=True)]
+        for choice in (
             [()] * command_count,
             [tuple(law.law_index for law in balance.named if law.law_index >= 0) for balance in balances],
         )
@@ -45,11 +44,11 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
         np.gradient(motion.velocity[:, driven_channels], 1 / motion.rate_hz, axis=0)
         for motion in regressions[0].motions
     ]
-    least_mass = least_inertial_force / np.maximum(_compute_rms(np.vstack(accelerations)), 1e-300)  # no 0 / 0
-    mass = mass + np.diag(np.maximum(least_mass - np.diagonal(mass), 0.0))
+    least_masses = least_inertial_force / np.maximum(_compute_rms(np.vstack(accelerations)), 1e-300)  # no 0 / 0
+    mass = mass + np.diag(np.maximum(least_masses - np.diagonal(mass), 0.0))
     tolerances = [
-        float(np.max(np.abs(base_matrix - matrix_with_laws)) / 2 + FOUND_NUMBERS_OPEN * np.abs(base_matrix).max())
-        for base_matrix, matrix_with_laws in zip((mass, damping, stiffness), matrices_with_laws, strict=True)
+        float(np.max(np.abs(base_matrix - with_laws)) / 2 + FOUND_PARAMETER_DEVIATION * np.abs(base_matrix).max())
+        for base_matrix, with_laws in zip((mass, damping, stiffness), matrices_with_laws, strict=True)
     ]
     return MechanicalModel(
         name,
@@ -86,18 +85,21 @@ def build_plain_model(balances: Sequence[Balance], recording: Recording, name: s
 
 def compute_law_power_share(balances: Sequence[Balance], band_hz: float) -> float:
     """Compute the share of the power of a named law's force at frequencies up to `band_hz` (Hz): the smallest share of
-    all named laws, 1 without any."""
+    all named laws, 1 without any. Laws of the command (negative index) are not counted."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
-        laws = [law.law_index for law in balance.named if law.law_index >= 0]
-        weights, weight_index = regression.fit_weights(regression.select_columns(laws)), regression.base
-        for law_columns in (regression.places[law] for law in laws):
-            law_weights = weights[weight_index : weight_index + law_columns.stop - law_columns.start]
+        law_indices = [law_index.law_index for law_index in balance.named if law_index.law_index >= 0]
+        weights, weight_index = (
+            regression.fit_weights(regression.select_columns(law_indices)),
+            regression.base_column_count,
+        )
+        for column_range in (regression.column_ranges[law_index] for law_index in law_indices):
+            law_weights = weights[weight_index : weight_index + column_range.stop - column_range.start]
             weight_index += len(law_weights)
             shares.append(
                 _compute_power_share(
-                    [columns[:, law_columns] @ law_weights for columns in regression.columns],
+                    [columns[:, column_range] @ law_weights for columns in regression.columns],
                     regression.motions,
                     band_hz,
                 )
@@ -109,9 +111,9 @@ def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion]
     """Compute the share of the forces' power at frequencies up to `band_hz` (Hz), 0 where all forces are equal. forces:
     (kept samples,) per motion. The mean over all recordings is subtracted, not that of each recording: where each moves
     in one direction only, friction differs between recordings by a constant, which must count as power in the band."""
-    power_in_band, total_power, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
+    power_in_band, total_power, mean_force = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
     for force, motion in zip(forces, motions, strict=True):
-        power = np.abs(np.fft.rfft(force - mean)) ** 2
+        power = np.abs(np.fft.rfft(force - mean_force)) ** 2
         frequency_hz = np.fft.rfftfreq(len(force), motion.step / motion.rate_hz)
         power_in_band, total_power = (
             power_in_band + float(power[frequency_hz <= band_hz].sum()),
@@ -121,13 +123,13 @@ def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion]
 
 
 def _fit_matrix_rows(
-    balance: Balance, laws: Sequence[int], driven_channels: Sequence[int]
+    balance: Balance, law_indices: Sequence[int], driven_channels: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit one row of the mass, damping and stiffness matrix each, (commands,), to one balance with these laws. laws:
     indices of the laws; driven_channels: channels of the driven motions. A stiffness row that the balance does not
-    contain is zero."""
+    contain is zero. A law of the command (negative index) adds no columns."""
     regression = balance.search.regression
-    weights = regression.fit_weights(regression.select_columns(laws))[: regression.matrices]
+    weights = regression.fit_weights(regression.select_columns(law_indices))[: regression.matrix_column_count]
     channel_count = len(regression.motions[0].channels)
     rows = [*weights.reshape(-1, channel_count)[:, list(driven_channels)], np.zeros(len(driven_channels))]
     return rows[0], rows[1], rows[2]

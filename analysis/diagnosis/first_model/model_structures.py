@@ -1,8 +1,8 @@
-"""Candidate structures of a first linear model, M a + D v + K x = u, and the choice among them by held-out error.
+"""Fit candidate structures of a first linear model, M a + D v + K x = u, and choose one by cross-validated error.
 
-A diagnosis to which no model was given starts from such a model. Each structure leaves some of the matrices out
-(`PARTS_OF`). All are fitted to the same recordings: by the force balance along the measured motion where every command
-has a measured position or velocity (`fit_structure`), else to spectra (`fit_modal_structure`).
+A diagnosis without a given model starts from such a model. Each structure omits some of the matrices (`PARTS_OF`). All
+are fitted to the same recordings: by the force balance where every command has a measured position or velocity
+(`fit_structure`), else to spectra (`fit_modal_structure`). Called by `choose_structure` and `fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRU
 from analysis.wording import format_sentence
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical.open_tolerance import widen_tolerance
+from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.effect_vocabulary import find_matrix_unit
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, adopt_recording_units
@@ -40,11 +40,12 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
 }
 """Matrices that the force balance fits, by structure; "two-mode" is fitted to spectra only."""
 FIXED_SHARE = 1e-6
-"""Without a time axis: factor on the least mass, and standard deviation that is stated for mass and damping."""
+"""Chosen so that re-tuning cannot change a mass: without a time axis, factor on the least mass, and standard deviation
+stated for mass and damping (SI units); for a free motion, that of the mass over the largest mass."""
 NAME_TEMPLATE = "first model, {}"
 """Name of the fitted model, to be filled in with its structure."""
 MEASURED_FORCE, SIMULATED_MOTION = "force along the measured motion", "free simulation"
-"""Signals that held-out errors refer to, for `StructureFit.compared`."""
+"""Signals that held-out errors refer to, for `StructureFit.error_signal`."""
 
 
 class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
@@ -72,7 +73,7 @@ class StructureFit:
     held_out: tuple[float, ...]
     """Per axis or response channel: rms of the held-out error over that of the signal."""
     channels: tuple[str, ...]
-    compared: str
+    error_signal: str
     """Signal that the held-out errors refer to, in words."""
     joint: JointFit | None
     """Result of the force balance; None for a fit to spectra (accelerations alone, or a structure with modes)."""
@@ -89,7 +90,7 @@ class BalancedRecordings:
     """Recordings whose motion was measured along every command, prepared for a force balance."""
 
     recording: Recording
-    """The first one: source of channels and units."""
+    """The first one: source of the channels and units."""
     regressions: tuple[Regression, ...]
     """Force balance of each axis, without laws."""
     untimed: bool
@@ -103,18 +104,18 @@ class BalancedRecordings:
 
 
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
-    """Prepare the force balance of all axes. Raises NoMotionError where only accelerations were measured, a command has
-    no measured motion of its own, or no sample is usable."""
+    """Prepare the force balance of all axes. Raises NoMotionError where only accelerations (order 2) were measured, the
+    numbers of commands, responses and motions differ, or no sample is usable. recordings: at least one."""
     first = recordings[0]
     motions = compute_motions(observe_parts(recordings, len(first.response.channels)))
-    count = len(first.command.channels)
+    axis_count = len(first.command.channels)
     if motions[0].order == 2:
         raise NoMotionError("only accelerations were measured")
-    if len(motions[0].channels) != count or len(first.response.channels) != count:
+    if len(motions[0].channels) != axis_count or len(first.response.channels) != axis_count:
         raise NoMotionError("not every command has exactly one measured motion")
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
-    turns = any(measure_scales(motions, axis, first.is_rotational).turns for axis in range(count))
+    turns = any(measure_scales(motions, axis, first.is_rotational).turns for axis in range(axis_count))
     untimed = not np.isfinite(motions[0].band_hz)
     return BalancedRecordings(
         first, build_regressions(motions, turns), untimed, turns, first.is_rotational, is_free_motion(first)
@@ -122,8 +123,8 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
 
 
 def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
-    """Fit a structure by the force balance. Raises StructureRefused where it does not suit the recordings, the motion
-    does not determine its parameters, or a mass or damping comes out negative."""
+    """Fit a structure by the force balance. Raises StructureRefused where the recordings cannot determine it, or the
+    fitted mass or damping is negative."""
     _require_suitable(balanced, kind)
     parts: tuple[Part, ...] = ("stiffness",) if balanced.untimed else PARTS_OF[kind]
     if balanced.free:
@@ -155,15 +156,15 @@ def fit_modal_structure(
     other structures, where the fit fails, and where a mode does not lower the held-out error."""
     if kind not in ("mass-spring", "two-mode"):
         raise StructureRefused("it needs a measured position or velocity along every command")
-    axes = len(recordings[0].command.channels)
-    settings = MechanicalFitSettings(most_modes=axes if kind == "two-mode" else 0)
+    axis_count = len(recordings[0].command.channels)
+    settings = MechanicalFitSettings(most_modes=axis_count if kind == "two-mode" else 0)
     try:
         fit = fit_mechanical_model(recordings, settings, on_progress, NAME_TEMPLATE.format(kind))
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as problem:
         raise StructureRefused(str(problem)) from problem
-    if kind == "two-mode" and fit.model.coordinates == axes:
+    if kind == "two-mode" and fit.model.coordinates == axis_count:
         raise StructureRefused("a mode on an axis does not lower the error on held-out lines")
-    errors = tuple(error.fit if error.held_out is None else error.held_out for error in fit.errors)
+    held_out_errors = tuple(error.fit if error.held_out is None else error.held_out for error in fit.errors)
     remarks = tuple(format_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
     first = recordings[0]
@@ -172,7 +173,7 @@ def fit_modal_structure(
         kind,
         model,
         _list_modal_parameters(replace(fit.model, units=model.units), first),
-        errors,
+        held_out_errors,
         channels,
         SIMULATED_MOTION,
         None,
@@ -181,16 +182,16 @@ def fit_modal_structure(
 
 
 def choose_simplest(fits: Sequence[StructureFit]) -> StructureFit:
-    """Return the fit by force balance with the fewest parameters that no richer fit beats. A richer fit wins where its
-    cross-validated error power is lower by more than `RICHER_STRUCTURE_GAIN` of the plainer fit's, more than
+    """Choose among fits by force balance, at least one: from the fewest parameters on, a richer fit replaces the best
+    where its cross-validated error power is lower by more than `RICHER_STRUCTURE_GAIN` of the best one's, more than
     `RICHER_STRUCTURE_ERRORS` standard errors over the folds, and more than `MODEL_FLOOR`²."""
     ordered = sorted(fits, key=lambda fit: (len(fit.parameters), fit.error))
     best = ordered[0]
     for richer in ordered[1:]:
         assert best.joint is not None and richer.joint is not None
         gains = best.joint.fold_errors - richer.joint.fold_errors
-        spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-        least_gain = max(RICHER_STRUCTURE_GAIN * float(best.joint.fold_errors.sum()), RICHER_STRUCTURE_ERRORS * spread)
+        gain_sd = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+        least_gain = max(RICHER_STRUCTURE_GAIN * float(best.joint.fold_errors.sum()), RICHER_STRUCTURE_ERRORS * gain_sd)
         if gains.sum() > max(least_gain, MODEL_FLOOR**2):
             best = richer
     return best
@@ -211,8 +212,8 @@ def _require_suitable(balanced: BalancedRecordings, kind: Kind) -> None:
 
 
 def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
-    """The fitted matrices as a mechanical model, their standard errors as its tolerance. Raises MechanicalModelError
-    where a mass or damping is negative."""
+    """Build the mechanical model of the fitted matrices, with a tolerance widened from their standard errors. Raises
+    MechanicalModelError where a mass or damping is negative."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
     if kind == "massless" or balanced.free:
         mass = np.diag(_find_least_mass(balanced.regressions[0].motions)) * (FIXED_SHARE if balanced.untimed else 1.0)
@@ -227,24 +228,24 @@ def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> Mec
     if np.linalg.eigvalsh(damping)[0] < 0:
         damping = np.diag(np.diagonal(damping))
     eye = np.eye(len(mass))
-    deviations = [fit.deviations[part] or None for part in PARTS]
+    std_errors = [fit.largest_standard_errors[part] or None for part in PARTS]
     recording = balanced.recording
     model = MechanicalModel(
         NAME_TEMPLATE.format(kind), balanced.recording.response.quantities[0], mass, damping, stiffness, eye, eye,
-        tolerance=Tolerance(deviations[0], deviations[1], deviations[2], None), rotational=balanced.rotational,
+        tolerance=Tolerance(std_errors[0], std_errors[1], std_errors[2], None), rotational=balanced.rotational,
     )  # fmt: skip
-    widened = widen_tolerance(model)
-    assert widened.tolerance is not None
-    sizes = widened.tolerance
-    tolerance = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
+    widened_model = widen_tolerance(model)
+    assert widened_model.tolerance is not None
+    widened = widened_model.tolerance
+    tolerance = Tolerance(widened.mass_kg, widened.damping_n_s_per_m or None, widened.stiffness_n_per_m or None, None)
     if balanced.untimed:
-        tolerance = Tolerance(FIXED_SHARE, FIXED_SHARE, sizes.stiffness_n_per_m, None)
+        tolerance = Tolerance(FIXED_SHARE, FIXED_SHARE, widened.stiffness_n_per_m, None)
     units = recording.command.units, recording.response.units
-    return adopt_recording_units(replace(widened, tolerance=tolerance), *units, select_time_unit(recording))
+    return adopt_recording_units(replace(widened_model, tolerance=tolerance), *units, select_time_unit(recording))
 
 
 def _find_least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """(d,), force over acceleration: masses whose inertial force is `MASSLESS_SHARE` of the measured force (standard
+    """Compute (d,), kg (kg m²): masses whose inertial force is `MASSLESS_SHARE` of the measured force (standard
     deviations). A simulation needs a mass, even where the recordings show none."""
     force = np.vstack([motion.force for motion in motions]).std(axis=0)
     accel = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
@@ -254,7 +255,7 @@ def _find_least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dty
 def _list_parameters(
     balanced: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
 ) -> tuple[ParameterEstimate, ...]:
-    """Diagonal elements of the fitted matrices, with their 95 % intervals."""
+    """List the diagonal elements of the fitted matrices, with their 95 % intervals."""
     names, (system, parts) = balanced.recording.command.channels, units_and_parts
     return tuple(
         ParameterEstimate(f"{part} {name}", find_matrix_unit(part, system), float(fit.matrices[part][k, k]),
@@ -265,21 +266,21 @@ def _list_parameters(
 
 
 def _list_modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[ParameterEstimate, ...]:
-    """Mass, damping and stiffness along each driven axis, with 95 % intervals from the model's tolerance (1.96 standard
-    deviations); then, for a model with modes, all natural frequencies (Hz)."""
-    axes, estimates = compute_driven_axes(model), []
+    """List mass, damping and stiffness along each driven axis, with 95 % intervals from the model's tolerance (1.96
+    standard deviations); then, for a model with modes, all natural frequencies (Hz)."""
+    driven_axes, estimates = compute_driven_axes(model), []
     tolerance = model.tolerance or Tolerance()
-    spread = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
-    for part, matrix, std in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
-        values = np.einsum("ni,nk,ki->i", axes, matrix, axes)
+    deviations = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
+    for part, matrix, std in zip(PARTS, (model.mass, model.damping, model.stiffness), deviations, strict=True):
+        values = np.einsum("ni,nk,ki->i", driven_axes, matrix, driven_axes)
         for name, value in zip(recording.command.channels, values.tolist(), strict=True):
             estimates.append(
                 ParameterEstimate(f"{part} {name}", find_matrix_unit(part, model.system), value, std and 1.96 * std)
             )
     mode_count = model.coordinates - model.inputs
     if mode_count > 0:
-        squares = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real
-        modes_hz = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        squared_frequencies = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real
+        modes_hz = np.sqrt(np.maximum(squared_frequencies, 0.0)) / (2 * np.pi)
         estimates += [
             ParameterEstimate(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(modes_hz.tolist()), start=1)
         ]
@@ -287,7 +288,7 @@ def _list_modal_parameters(model: MechanicalModel, recording: Recording) -> tupl
 
 
 def _write_remarks(balanced: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
-    """Sentences on what the parameters of a structure mean."""
+    """Write sentences on what the parameters of a structure mean."""
     if kind == "gravity":
         return (
             "The weight is linearised: its stiffness is mass times lever times the acceleration of gravity at the mean "

@@ -18,7 +18,7 @@ from analysis.diagnosis.first_model.free_motion import convert_free_motion
 from analysis.diagnosis.first_model.infer_quantity import infer_quantities
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
-from analysis.diagnosis.settings import DEPENDENT_SIGNALS
+from analysis.diagnosis.settings import SINGULAR_VALUE_RATIO
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
@@ -218,7 +218,7 @@ def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
     # sum would otherwise appear to drive the motion.
     x, y = (stacked - stacked.mean(axis=0) for stacked in (np.vstack(regressor_rows), np.vstack(motion_targets)[:, 0]))
     column_stds = np.maximum(x.std(axis=0), 1e-300)
-    scaled_gains = np.linalg.lstsq(x / column_stds, y, rcond=DEPENDENT_SIGNALS)[0][: motions[0].force.shape[1]]
+    scaled_gains = np.linalg.lstsq(x / column_stds, y, rcond=SINGULAR_VALUE_RATIO)[0][: motions[0].force.shape[1]]
     main_command = int(np.argmax(np.abs(scaled_gains)))
     gains = scaled_gains / column_stds[: len(scaled_gains)]
     return np.asarray(gains / gains[main_command]), main_command

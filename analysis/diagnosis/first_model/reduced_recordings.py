@@ -19,19 +19,20 @@ from equalizer.signals.unit_system import determine_unit_system
 
 
 def is_reduction_needed(balances: Sequence[Balance]) -> bool:
-    """Whether commands must be reduced: a balance has linear terms beyond one body per command, or integrated motions,
-    and every named law is a column of the regression (a law of the command acts on the whole command, not on a
-    part)."""
+    """Whether commands must be reduced: a balance has linear terms beyond one body per command (further motions, linear
+    laws or a delay), or integrated accelerations; False where a named law is no column of the regression, because a law
+    of the command acts on the whole command, not on a part. balances: at least one."""
     if not all(law.has_column for balance in balances for law in balance.named):
         return False
     motion = balances[0].search.regression.motions[0]
+    # `order` counts the time derivatives in the measurement: 2 is an acceleration, whose integrals are the motion.
     if len(motion.channels) > len(balances) or motion.order == 2:
         return True
     return any(balance.linear_laws or balance.search.regression.base_terms.delay_s for balance in balances)
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
-    """Reduce the commands of recordings; the driven motions become the response, position and excitation are dropped.
+    """Reduce the commands of recordings. The driven motions become the response; position and excitation are removed.
     recordings: those of the balances, in the same order."""
     reduced_recordings, first_part = [], 0
     for recording in recordings:
@@ -46,24 +47,24 @@ def _reduce_recording(
 ) -> Recording:
     """Reduce one recording. parts: start and stop of each, in samples. first_part: index of its first part among all
     motions."""
-    command = recording.command.samples.copy()
+    command_samples = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
         for part_index, (start, stop) in enumerate(parts, first_part):
             motion = regression.motions[part_index]
             remaining_force = motion.force[:, axis] - _compute_other_linear_force(balance, motion)
-            # Order 2: the response is an acceleration. Below the band of its integrals no motion balances the force.
-            command[start:stop, axis] = (
+            # Order 2, a measured acceleration: below the band of its integrals no motion balances the force.
+            command_samples[start:stop, axis] = (
                 motion.filter_to_band(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
             )
     response, is_integrated = _extract_driven_motions(recording, parts, balances, first_part)
     return replace(
         recording,
-        command=replace(recording.command, samples=command),
+        command=replace(recording.command, samples=command_samples),
         response=response,
         position=None,
         excitation=None,
-        # An integrated motion is already centred in the steps.
+        # `compute_motions` has already advanced an integrated motion by the half sample of a zero-order hold.
         hold=Hold.BAND_LIMITED if is_integrated else recording.hold,
     )
 
@@ -76,34 +77,39 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     weights = regression.fit_weights(
         regression.select_columns([*linear_laws, *(judged_law.law_index for judged_law in balance.named)])
     )
-    # The constant force, the last column of the base, stays in the command, for the later fit.
-    weights = np.delete(weights, regression.base - 1)
-    motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // motion_count]
-    columns = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
-    # Columns come in groups (accelerations, velocities, positions) with one column per motion, then the linear laws.
-    has_other_motions = motion_count > motion.force.shape[1]
-    is_subtracted = [
-        k >= regression.matrices or (has_other_motions and k % motion_count != regression.base_terms.driven_channel)
-        for k in range(columns.shape[1])
+    # The last column of the base is the constant force, which stays in the command for the later fit.
+    weights = np.delete(weights, regression.base_column_count - 1)
+    motion_columns = [motion.acceleration, motion.velocity, motion.position][
+        : regression.matrix_column_count // motion_count
     ]
-    return np.asarray(columns[:, is_subtracted] @ weights[: columns.shape[1]][is_subtracted])
+    columns = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
+    # The first `matrix_column_count` columns are accelerations, velocities and positions, each group with one column
+    # per motion: the column number modulo the number of motions is the motion's channel. Linear laws follow.
+    has_undriven_motions = motion_count > motion.force.shape[1]
+    subtracted_columns = [
+        column >= regression.matrix_column_count
+        or (has_undriven_motions and column % motion_count != regression.base_terms.driven_channel)
+        for column in range(columns.shape[1])
+    ]
+    return np.asarray(columns[:, subtracted_columns] @ weights[: columns.shape[1]][subtracted_columns])
 
 
 def _extract_driven_motions(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> tuple[Signal, bool]:
-    """Extract the driven motions, and whether they are integrals of measured accelerations."""
+    """Return the driven motions as a signal, one channel per command or fewer, and whether they are positions that were
+    integrated from accelerations."""
     regression = balances[0].search.regression
     measured_motion = find_motion_signal(recording)
     assert measured_motion is not None
     motion_count = len(regression.motions[0].channels)
     driven_channels = [
-        k if motion_count <= len(balances) else balances[k].search.regression.base_terms.driven_channel
-        for k in range(min(motion_count, len(balances)))
+        axis if motion_count <= len(balances) else balances[axis].search.regression.base_terms.driven_channel
+        for axis in range(min(motion_count, len(balances)))
     ]
     samples, order = measured_motion.samples.copy(), regression.motions[0].order
     quantities, units = measured_motion.quantities, measured_motion.units
-    if order == 2:
+    if order == 2:  # measured accelerations
         for part_index, (start, stop) in enumerate(parts, first_part):
             samples[start:stop] = regression.motions[part_index].position
         units = tuple(determine_unit_system(recording.command.units, (unit,)).length for unit in units)

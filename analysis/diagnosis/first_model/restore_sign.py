@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.settings import (
-    PUSHED_BOTH_WAYS,
-    REVERSAL_NEAR_ZERO,
-    SIGNED_SPEED_BETTER,
-    SIGNED_SPEED_FITS,
-    UNSIGNED_BELOW_ZERO,
+    LEAST_SIGN_SHARE,
+    REVERSAL_SPEED_SHARE,
+    SIGNED_SPEED_ERROR_RATIO,
+    SIGNED_SPEED_FIT_SHARE,
+    UNSIGNED_NEGATIVE_SHARE,
 )
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
@@ -29,17 +29,18 @@ of fits. Chosen by hand."""
 def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """Return the recordings with signed speeds, and a sentence about it. All are returned unchanged, with an empty
     sentence, where one of them is not an unsigned speed with a single command (`_is_unsigned_speed`), or where the
-    filter predicts a signed speed too poorly (`SIGNED_SPEED_FITS`, `SIGNED_SPEED_BETTER`). At least one recording."""
+    filter predicts a signed speed too poorly (`SIGNED_SPEED_FIT_SHARE`, `SIGNED_SPEED_ERROR_RATIO`). At least one
+    recording."""
     if any(not _is_unsigned_speed(recording) for recording in recordings):
         return recordings, ""
     restored_recordings = []
     for recording in recordings:
         magnitude = recording.response.samples[:, 0]
-        signed_speed, unexplained_share = _find_signs(recording.command.samples[:, 0], magnitude)
+        signed_speed, unexplained_share = _estimate_signed_speed(recording.command.samples[:, 0], magnitude)
         unsigned_unexplained_share = _compute_unexplained_share(recording.command.samples[:, 0], magnitude)
         if (
-            unexplained_share > 1 - SIGNED_SPEED_FITS
-            or unexplained_share > SIGNED_SPEED_BETTER * unsigned_unexplained_share
+            unexplained_share > 1 - SIGNED_SPEED_FIT_SHARE
+            or unexplained_share > SIGNED_SPEED_ERROR_RATIO * unsigned_unexplained_share
         ):
             return recordings, ""
         restored_recordings.append(
@@ -53,8 +54,9 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
 
 
 def _is_unsigned_speed(recording: Recording) -> bool:
-    """Whether the only response, a speed or position without NaN, is never negative beyond noise and below
-    `REVERSAL_NEAR_ZERO` of its rms in at least 5 % of the samples, though the only command has both signs."""
+    """Whether the only response, a speed or position without NaN, is never below -`UNSIGNED_NEGATIVE_SHARE` of its rms
+    and is below `REVERSAL_SPEED_SHARE` of its rms in at least 5 % of the samples, though each sign of the only command
+    has more than `LEAST_SIGN_SHARE` of its power."""
     response, command = recording.response, recording.command
     if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
         return False
@@ -63,19 +65,19 @@ def _is_unsigned_speed(recording: Recording) -> bool:
         return False
     rms = float(np.sqrt(np.mean(speed**2)))
     command_power = float(np.sum(force**2))
-    power_by_sign = [float(np.sum(force[force * sign > 0] ** 2)) for sign in (1, -1)]
-    is_often_near_zero = float(np.quantile(speed, 0.05)) < REVERSAL_NEAR_ZERO * rms
+    powers_by_sign = [float(np.sum(force[force * sign > 0] ** 2)) for sign in (1, -1)]
+    is_often_near_zero = float(np.quantile(speed, 0.05)) < REVERSAL_SPEED_SHARE * rms
     return (
         rms > 0
-        and float(speed.min()) > -UNSIGNED_BELOW_ZERO * rms
+        and float(speed.min()) > -UNSIGNED_NEGATIVE_SHARE * rms
         and is_often_near_zero
-        and min(power_by_sign) > PUSHED_BOTH_WAYS * command_power
+        and min(powers_by_sign) > LEAST_SIGN_SHARE * command_power
     )
 
 
-def _find_signs(command: FloatArray, magnitude: FloatArray) -> tuple[FloatArray, float]:
-    """Find the signed speed (n,), and the share of its power that the filter does not predict. The first signs are
-    those of the sum of the command over the last quarter of the taps."""
+def _estimate_signed_speed(command: FloatArray, magnitude: FloatArray) -> tuple[FloatArray, float]:
+    """Estimate the signed speed (n,), and the share of its power that the filter does not predict. The signs of the
+    first iterate are those of the command's sum over the latest quarter of the taps, a time chosen by hand."""
     regressors = _build_regressors(command)
     stretches = _split_at_minima(magnitude)
     command_sums = np.concatenate([[0.0], np.cumsum(command)])
@@ -121,8 +123,9 @@ def _predict_speed(regressors: FloatArray, speed: FloatArray) -> FloatArray:
 
 
 def _split_at_minima(magnitude: FloatArray) -> list[slice]:
-    """Split the samples at local minima of the magnitude below `REVERSAL_NEAR_ZERO` of its rms."""
-    threshold = REVERSAL_NEAR_ZERO * float(np.sqrt(np.mean(magnitude**2)))
+    """Split the samples at local minima of the magnitude below `REVERSAL_SPEED_SHARE` of its rms; each starts a
+    slice."""
+    threshold = REVERSAL_SPEED_SHARE * float(np.sqrt(np.mean(magnitude**2)))
     is_minimum = (
         (magnitude[1:-1] <= magnitude[:-2]) & (magnitude[1:-1] <= magnitude[2:]) & (magnitude[1:-1] < threshold)
     )

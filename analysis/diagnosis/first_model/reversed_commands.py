@@ -2,10 +2,11 @@
 or amplifier.
 
 A passive device has no negative mass and no negative damping. The force of each axis, F = m a + d v + k x, is therefore
-balanced with both signs of the command, with m >= 0 and d >= 0 in either. The sign is reversed where that lowers the
-cross-validated error by more than `REVERSED_SIGN_GAIN` and `improves_significantly`. A spring alone does not determine
-the sign, because k may have either. The reversed commands are listed in the recording's `meta`; a model is
-written for the commands as they were recorded (`recorded_conditions`). Called by `one_motion_per_force`.
+balanced twice, with the recorded and with the negated command, each time with m >= 0 and d >= 0. The sign is reversed
+where that lowers the cross-validated error by more than `REVERSED_SIGN_GAIN` and significantly
+(`improves_significantly`). A spring alone does not determine the sign, because k may be positive or negative. The
+reversed commands are listed in the recording's `meta`, so that a model is written for the commands as recorded
+(`recorded_conditions`). Called by `one_motion_per_force`.
 """
 
 from collections.abc import Sequence
@@ -27,15 +28,15 @@ from equalizer.signals.signal import FloatArray, Signal
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """Negate the commands whose sign is opposite to the motion that they drive; returns the recordings and a sentence
-    about these commands. Unchanged, and "", where there are none, the forces cannot be balanced, or the motion was free
-    (no command). Where the motion was imposed, the response (force) is negated instead. recordings: alike in channels,
-    units and rate."""
+    about these commands. Returns them unchanged, with an empty sentence, where there are none, the forces cannot be
+    balanced, or the motion was free (no command). Where the motion was imposed, the response (force) is negated
+    instead. recordings: at least one, with the same channels, units and rate."""
     if is_free_motion(recordings[0]):
         return recordings, ""
-    driven = convert_all_to_force_driven(recordings)
-    axis_count = len(driven[0].command.channels)
+    force_driven = convert_all_to_force_driven(recordings)
+    axis_count = len(force_driven[0].command.channels)
     try:
-        motions = compute_motions(observe_parts(driven, len(driven[0].response.channels)))
+        motions = compute_motions(observe_parts(force_driven, len(force_driven[0].response.channels)))
         if len(motions[0].channels) != axis_count:
             return recordings, ""
         reversed_axes = [axis for axis in range(axis_count) if _is_reversed(motions, axis)]
@@ -43,8 +44,8 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
         return recordings, ""
     if not reversed_axes:
         return recordings, ""
-    names = [driven[0].command.channels[axis] for axis in reversed_axes]
-    is_motion_imposed = driven[0] is not recordings[0]
+    names = [force_driven[0].command.channels[axis] for axis in reversed_axes]
+    is_motion_imposed = force_driven[0] is not recordings[0]
     signs = np.ones(axis_count)
     signs[reversed_axes] = -1.0
     verb = "is" if len(names) == 1 else "are"
@@ -61,13 +62,15 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
-    """Whether the force balance of an axis has a clearly smaller cross-validated error with the force negated."""
-    recorded, negated = (
+    """Whether negating the force lowers the cross-validated error of an axis's balance by more than
+    `REVERSED_SIGN_GAIN` and significantly."""
+    recorded_regression, negated_regression = (
         build_regression([replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)
     )
     recorded_structure, negated_structure = (
-        Structure((), regression.cross_validate(regression.select_columns(()))) for regression in (recorded, negated)
+        Structure((), regression.cross_validate(regression.select_columns(())))
+        for regression in (recorded_regression, negated_regression)
     )
     return negated_structure.error < (1 - REVERSED_SIGN_GAIN) * recorded_structure.error and improves_significantly(
         recorded_structure, negated_structure

@@ -1,4 +1,4 @@
-"""Build the error measure by forces along the measured motion: choose its frequency band, compute the forces' noise.
+"""Build the error measure on forces along the measured motion: choose its frequency band, compute the forces' noise.
 
 Theory of operation. With the motion q measured, the force that a model misses follows without simulation (inverse
 dynamics): the model's force M a + D v + K q + (effects along q) is compared with the actuator's force, both low-pass
@@ -25,25 +25,25 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import compute_low_pass_gain, filter_low_pass
 from equalizer.signals.signal import FloatArray, Signal
 
-ACTUATOR_ERROR = 0.01
+ACTUATOR_ERROR_SHARE = 0.01
 """Least uncertainty of an actuator's force, relative to its rms; it is added to the noise. By hand."""
 NOISE_SHARE = 0.02
 """Largest force noise due to the motion's noise, relative to the force's rms; differentiation amplifies it. By hand."""
-WIDEST_BAND, NARROWEST_BAND = 0.2, 0.002
+WIDEST_BAND_SHARE, NARROWEST_BAND_SHARE = 0.2, 0.002
 """Largest and smallest end of the band, relative to the sample rate. By hand."""
-TRIED_BANDS = 24
-"""Number of ends that are tried down to the narrowest band, in a geometric series. By hand."""
-BAND_OVER_MEDIAN = 10.0
+TRIED_BAND_COUNT = 24
+"""Number of band ends that are tried, in a geometric series down to the narrowest band. By hand."""
+MAX_BAND_TO_MEDIAN = 10.0
 """Largest end of the band, relative to the frequency below which half of the force's power lies: far above it there is
 noise alone. By hand."""
-ASSUMED_NOISE = 1e-4
+ASSUMED_NOISE_SHARE = 1e-4
 """Root of the motion's noise density relative to the motion's standard deviation, assumed where it is not known. By
 hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceMeasure:
-    """The error measure by predicted forces with the noise of its forces."""
+    """The error measure on forces, with the noise of its forces."""
 
     measure: PredictedForce
     """Compares the forces in N (N m)."""
@@ -54,9 +54,9 @@ class ForceMeasure:
 def build_predicted_force_measure(
     records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
 ) -> ForceMeasure:
-    """Build the error measure by forces along the measured motion, with its noise. records: at least one, with motion
-    (`has_motion`). floors: noise of their signals. band_hz: end of the band in Hz; None = by the noise. Raises
-    numpy.linalg.LinAlgError where the measured outputs do not determine the model's motion."""
+    """Build the error measure on forces along the measured motion, with its noise. records: at least one, with motion
+    (`has_motion`), of one rate. floors: noise of their signals. band_hz: end of the band in Hz; None = chosen by the
+    noise. Raises numpy.linalg.LinAlgError where the measured outputs do not determine the model's motion."""
     motions = [
         choose_measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)
     ]
@@ -74,7 +74,7 @@ def build_predicted_force_measure(
     # An unsuitable model overestimates the noise, so it is limited to the strongest force; that of an idle axis may be
     # less than the noise.
     noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in force_floors]), np.std(forces, axis=0).max())
-    noise = np.asarray(np.hypot(noise, ACTUATOR_ERROR * np.sqrt(np.mean(forces**2, axis=0))))
+    noise = np.asarray(np.hypot(noise, ACTUATOR_ERROR_SHARE * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz
     band_motions = tuple(compute_band_motion(motion.position, rate_hz, band_hz) for motion in motions)
     measure = PredictedForce(tuple(force_records), band_motions, noise, noise, band_hz)
@@ -93,17 +93,24 @@ def _choose_band_hz(
     none."""
     rate_hz = records[0].recording.sample_rate_hz
     force_power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in applied_forces)
-    widest_share = (
-        BAND_OVER_MEDIAN * float(np.median([_compute_median_hz(force, rate_hz) for force in applied_forces])) / rate_hz
+    widest_useful_share = (
+        MAX_BAND_TO_MEDIAN
+        * float(np.median([_compute_median_hz(force, rate_hz) for force in applied_forces]))
+        / rate_hz
     )
     for band_hz in (
-        np.geomspace(min(max(widest_share, NARROWEST_BAND), WIDEST_BAND), NARROWEST_BAND, TRIED_BANDS) * rate_hz
+        np.geomspace(
+            min(max(widest_useful_share, NARROWEST_BAND_SHARE), WIDEST_BAND_SHARE),
+            NARROWEST_BAND_SHARE,
+            TRIED_BAND_COUNT,
+        )
+        * rate_hz
     ):
-        noise = min(
+        least_noise = min(
             float(np.max(_compute_force_noise(model, motion, floor, float(band_hz)).response_rms))
             for motion, floor in zip(motions, floors, strict=True)
         )
-        if noise <= NOISE_SHARE * np.sqrt(force_power):
+        if least_noise <= NOISE_SHARE * np.sqrt(force_power):
             break
     return float(band_hz)
 
@@ -115,8 +122,9 @@ def _compute_median_hz(force: FloatArray, rate_hz: float) -> float:
 
 
 def _build_force_record(record: Observed, force: FloatArray, band_hz: float) -> Observed:
-    """Build the record with the filtered force of its actuators as the response; the samples at its ends, at most an
-    eighth each, have no role. force: (n, m), N (N m). band_hz: end of the band in Hz."""
+    """Build the record with the filtered force of its actuators as the response; the samples at its ends that the
+    filter distorts, at most an eighth (by hand) each, have no role. force: (n, m), N (N m), means over the step after
+    each sample; half a step of delay makes them means around the sample. band_hz: end of the band in Hz."""
     recording = record.recording
     rate_hz, command = recording.sample_rate_hz, recording.command
     filtered_force = filter_low_pass(force, rate_hz, band_hz, delay_s=0.5 / rate_hz)
@@ -139,13 +147,14 @@ def _compute_force_noise(
     model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float
 ) -> NoiseFloor:
     """Compute the noise of the force along the motion, from the motion's noise through the model's inverse response up
-    to `band_hz` (Hz). Frequencies below 1e-3 Hz (by hand) count as 1e-3 Hz."""
+    to `band_hz` (Hz). Frequencies below 1e-3 Hz (by hand) count as 1e-3 Hz; a density of the motion's noise that is not
+    finite is replaced by `ASSUMED_NOISE_SHARE`."""
     frequency_hz, input_count = floor.frequency_hz, model.inputs
     pass_gain = compute_low_pass_gain(frequency_hz, band_hz)[:, None, None]
     power_gain = (
         np.abs(pass_gain * compute_inverse_response(model, np.maximum(frequency_hz, 1e-3))[:, :input_count]) ** 2
     )
-    assumed_density = (ASSUMED_NOISE * np.std(motion.position, axis=0)) ** 2
+    assumed_density = (ASSUMED_NOISE_SHARE * np.std(motion.position, axis=0)) ** 2
     density = np.einsum("lij,lj->li", power_gain, np.where(np.isfinite(motion.noise), motion.noise, assumed_density))
     degrees_of_freedom = np.full(input_count, float(np.max(floor.response.freedom, initial=1.0)))
     force_noise = ChannelNoise(np.sqrt(density.mean(axis=0)), density, degrees_of_freedom, np.zeros(input_count))

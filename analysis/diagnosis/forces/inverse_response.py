@@ -58,7 +58,8 @@ def make_fast_inverse_response(
     model: MechanicalModel, line_count: int, highest_hz: float
 ) -> Callable[[FloatArray], ComplexArray]:
     """Return `compute_inverse_response` of this model as a function of frequency (Hz): the partial fraction expansion
-    above `MAX_SOLVED_LINES` lines where its error is small, else the exact solution. line_count: number of lines;
+    above `MAX_SOLVED_LINES` lines where its error is within `FIT_TOLERANCE`, else the exact solution. line_count: of
+    the spectrum;
     highest_hz: the highest of them. Raises as `compute_inverse_response`, at once or when the function is called."""
     if line_count > MAX_SOLVED_LINES and (expansion := _fit_partial_fractions(model, highest_hz)) is not None:
         return expansion
@@ -85,23 +86,25 @@ def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callabl
         response: ComplexArray = (_evaluate_basis(frequency_hz, poles, angular_unit) @ coefficients).reshape(
             -1, 2 * m, m
         )
-        below_lines = frequency_hz < lines_hz[0]
-        if below_lines.any():
-            response[below_lines] = compute_inverse_response(model, frequency_hz[below_lines])
+        is_below_lines = frequency_hz < lines_hz[0]
+        if is_below_lines.any():
+            response[is_below_lines] = compute_inverse_response(model, frequency_hz[is_below_lines])
         return response
 
     return evaluate
 
 
-def _fit_coefficients(basis: ComplexArray, exact: ComplexArray) -> ComplexArray | None:
+def _fit_coefficients(basis: ComplexArray, exact_response: ComplexArray) -> ComplexArray | None:
     """Fit the coefficients, (functions, entries), by least squares to every other line; None where the error at the
     lines between exceeds `FIT_TOLERANCE`. basis: (lines, functions); exact: (lines, entries)."""
-    line_magnitude = np.abs(exact).max(axis=1)[:, None]
-    basis, exact = basis / line_magnitude, exact / line_magnitude
+    line_magnitude = np.abs(exact_response).max(axis=1)[:, None]
+    basis, exact_response = basis / line_magnitude, exact_response / line_magnitude
     # Columns scaled to equal norm, so that units do not matter; singular values at rounding errors (1e-14) are dropped.
     column_norms = np.linalg.norm(basis[::2], axis=0)
-    coefficients = np.linalg.lstsq(basis[::2] / column_norms, exact[::2], rcond=1e-14)[0] / column_norms[:, None]
-    return coefficients if np.all(np.abs(basis[1::2] @ coefficients - exact[1::2]) <= FIT_TOLERANCE) else None
+    coefficients = (
+        np.linalg.lstsq(basis[::2] / column_norms, exact_response[::2], rcond=1e-14)[0] / column_norms[:, None]
+    )
+    return coefficients if np.all(np.abs(basis[1::2] @ coefficients - exact_response[1::2]) <= FIT_TOLERANCE) else None
 
 
 def compute_transmission_zeros(model: MechanicalModel, largest_magnitude: float) -> ComplexArray:
@@ -122,14 +125,17 @@ def compute_transmission_zeros(model: MechanicalModel, largest_magnitude: float)
 def _choose_lines(poles: ComplexArray, highest_hz: float) -> FloatArray:
     """Choose the lines (Hz), rising: over the range up to highest_hz, and about each pole. poles: (k,), rad/s;
     the half-width of a nearly undamped pole is set to 1e-6 of its magnitude, so that lines do not coincide."""
-    half_width = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
-    near_poles = (np.abs(poles.imag)[:, None] + half_width[:, None] * POLE_LINE_OFFSETS).ravel() / (2 * np.pi)
-    # Every other line tests the fit: near a pole, a second line 1 % higher. The lowest line is at 1e-6 of the range.
-    log_spaced = np.geomspace(1e-4 * highest_hz, highest_hz, RANGE_LINE_COUNT)
-    evenly_spaced = np.linspace(0.0, highest_hz, RANGE_LINE_COUNT)
+    half_widths = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
+    pole_lines_hz = (np.abs(poles.imag)[:, None] + half_widths[:, None] * POLE_LINE_OFFSETS).ravel() / (2 * np.pi)
+    # Every other line tests the fit: near a pole, a second line 1 % higher. The lowest line is at 1e-6 of the range,
+    # the lowest logarithmically spaced one at 1e-4. Chosen by hand.
+    log_spaced_hz = np.geomspace(1e-4 * highest_hz, highest_hz, RANGE_LINE_COUNT)
+    evenly_spaced_hz = np.linspace(0.0, highest_hz, RANGE_LINE_COUNT)
     return np.unique(
         np.clip(
-            np.concatenate([near_poles, 1.01 * near_poles, log_spaced, evenly_spaced]), 1e-6 * highest_hz, highest_hz
+            np.concatenate([pole_lines_hz, 1.01 * pole_lines_hz, log_spaced_hz, evenly_spaced_hz]),
+            1e-6 * highest_hz,
+            highest_hz,
         )
     )
 

@@ -83,9 +83,11 @@ def compute_axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequen
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
     output_matrix = np.vstack([discrete_model.motion[: 2 * m], discrete_model.response, discrete_model.position])
-    responses = _compute_frequency_response(discrete_model.transition, discrete_model.by_axis_force, output_matrix, z)
+    responses = _compute_frequency_response(
+        discrete_model.transition, discrete_model.state_by_port_force, output_matrix, z
+    )
     # A force takes effect from the next sample on; its direct feedthrough is read one sample late.
-    response = responses[:, 2 * m : 2 * m + p] + discrete_model.response_by_axis_force * (1 / z)[:, None, None]
+    response = responses[:, 2 * m : 2 * m + p] + discrete_model.response_by_port_force * (1 / z)[:, None, None]
     if model.sensor.bandwidth_hz > 0:
         decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)
         response = response * ((1 - decay) / (1 - decay / z))[:, None, None]

@@ -32,7 +32,7 @@ first model. Chosen."""
 
 
 def should_use_rigid_model(recordings: Sequence[Recording]) -> bool:
-    """Whether a rigid model can be fitted and is preferred: in any recording, a controller made the commands or a
+    """Whether a rigid model can be fitted and is preferred, because in a recording a controller made the commands or a
     motion was imposed."""
     return can_be_rigid(recordings) and any(
         is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
@@ -42,12 +42,13 @@ def should_use_rigid_model(recordings: Sequence[Recording]) -> bool:
 def can_be_rigid(recordings: Sequence[Recording]) -> bool:
     """Whether, in every recording, one position or velocity was measured for each command, and all responses are of the
     same derivative of the position."""
-    return all(_is_square(recording) for recording in recordings)
+    return all(_is_motion_paired(recording) for recording in recordings)
 
 
 def fit_rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
     """Fit the model with one body per command to at least one recording. Raises MechanicalModelError where the fitted
-    mass matrix is not positive definite, or where no motion was measured."""
+    mass matrix is not positive definite, or where no motion was measured; numpy.linalg.LinAlgError where a fit or an
+    eigenvalue computation fails."""
     model = _make_unit_mass_model(recordings[0], name)
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
@@ -58,7 +59,7 @@ def fit_rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalMod
     return model
 
 
-def _is_square(recording: Recording) -> bool:
+def _is_motion_paired(recording: Recording) -> bool:
     """Whether there is one response per command, all responses are of one derivative of the position (an unknown
     quantity counts as acceleration), and a position or velocity was measured for each."""
     derivative_orders = [DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recording.response.quantities]
@@ -126,11 +127,11 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
     return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=tolerance)
 
 
-def _compute_least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
+def _compute_least_mass(accelerations: FloatArray, forces: FloatArray) -> FloatArray:
     """Compute lower bounds (m,) of the diagonal masses: the inertial force of each body is at least `MASSLESS_SHARE` of
     the force (standard deviations), because a simulation needs positive masses. acceleration, force: (samples, m). A
     body without acceleration gets a huge finite bound (the divisor is at least 1e-300)."""
-    return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
+    return np.asarray(MASSLESS_SHARE * forces.std(axis=0) / np.maximum(accelerations.std(axis=0), 1e-300))
 
 
 def _solve_least_squares(regressors: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:

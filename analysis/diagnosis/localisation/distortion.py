@@ -169,7 +169,7 @@ def _compute_distortions(
 ) -> list[Distortion]:
     """Compute all kinds of distortion in one cell. in_band: (lines,), the lines of its band. whole_band: whether that
     is the whole driven band."""
-    power, noise_power = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
+    power, noise_power = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.mean_variance[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[in_band & spectrum.lines.driven])))
     excess_by_kind: list[tuple[Kind, tuple[float, float, float], float, int]] = []
     for kind, is_detection, reached_lines in _list_detection_masks(spectrum, in_band):
@@ -180,11 +180,11 @@ def _compute_distortions(
     if spectrum.count > 1:
         # Each line has count - 1 independent differences between periods, whose mean square is `spread`; the sum over
         # them is divided by count - 1 again below.
-        spreads = np.repeat(spectrum.spread[in_band, channel], spectrum.count - 1)
+        spreads = np.repeat(spectrum.period_variance[in_band, channel], spectrum.count - 1)
         distortion_power = compute_excess_power(
             spreads,
-            np.repeat(spectrum.floor[in_band, channel], spectrum.count - 1),
-            float(spectrum.floor_freedom[channel]),
+            np.repeat(spectrum.noise_variance[in_band, channel], spectrum.count - 1),
+            float(spectrum.noise_freedom[channel]),
         )
         excess_by_kind.append(("varying", distortion_power, 1 / (spectrum.count - 1), int(in_band.sum())))
     return [

@@ -1,4 +1,4 @@
-"""Fault localisation by subspace projection: which component (entry) explains the residual's spectra best?
+"""Localise a fault by subspace projection: rank the components (entries) by how well they explain residual spectra.
 
 A force at an axis, of any cause, moves all channels in the proportions of the model's frequency response; an error of
 one sensor appears in its channel alone. At each line, the residual in units of the noise is projected onto the
@@ -16,60 +16,70 @@ from scipy.special import stdtr
 
 from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra
 from analysis.diagnosis.settings import (
-    ENTRY_ANGLE,
-    ENTRY_LOUD,
+    ENTRY_DIRECTION_SINE,
+    ENTRY_LINE_POWER_RATIO,
     ENTRY_PER_DIMENSION,
     ENTRY_SENSOR_PENALTY,
-    SENSOR_ABSENT,
+    SENSOR_ABSENT_SHARE,
+    SENSOR_CHANGE_POWER_RATIO,
     SENSOR_LEAST_LINES,
-    SENSOR_LOUD,
-    SENSOR_PRESENT,
-    SENSOR_SHOWN,
+    SENSOR_LINE_POWER_RATIO,
+    SENSOR_PRESENT_SHARE,
 )
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BLOCK_LINES = 8
-"""Number of neighbouring (correlated) lines that count as one when two entries are compared."""
+"""Number of neighbouring (correlated) lines that count as one when two entries are compared. Chosen."""
 _TINY = np.finfo(np.float64).tiny
 """Smallest positive normal number: lower limit of divisors."""
 
 
 @dataclass(frozen=True, slots=True)
-class SensorRule:
+class SensorComparison:
     """Result of comparing the position's residual with the motion that the response's residual implies by integration.
     A force would cause both, so that a residual of the response alone is an error of its sensor."""
 
     verdict: Literal["response sensor", "motion", "undecided"]
     expected: float
     """Power of the position, over its noise power, that the response's residual implies if it is real motion; mean over
-    the lines where it exceeds the noise sufficiently. 0 where these are too few."""
+    the lines where it exceeds the noise (`SENSOR_CHANGE_POWER_RATIO`, `SENSOR_LINE_POWER_RATIO`). 0 on fewer than
+    `SENSOR_LEAST_LINES` such lines."""
     observed: float
-    """Power of the position's residual on these lines, over its noise power, noise subtracted; 0 where they are too
-    few."""
+    """Power of the position's residual on these lines, over its noise power, noise subtracted; 0 on fewer than
+    `SENSOR_LEAST_LINES` lines."""
 
 
-def compare_sensors(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
+def compare_sensors(spectra: ResidualSpectra, derivative: int) -> SensorComparison | None:
     """Test whether the response's residual is real motion or an error of the response sensor. derivative: order of the
     time derivative of the position that the response is. None unless the spectra have one position channel per
     response channel."""
-    p = spectra.responses
-    if spectra.residual.shape[2] != 2 * p:
+    response_count = spectra.responses
+    if spectra.residual.shape[2] != 2 * response_count:
         return None
     derivative_power_gain = (2 * np.pi * spectra.frequency_hz) ** (2 * derivative)
-    response, position = np.abs(spectra.residual[:, :, :p]) ** 2, np.abs(spectra.residual[:, :, p:]) ** 2
-    noise = spectra.noise[:, :, p:]
-    motion_power = np.maximum(response - spectra.noise[:, :, :p], 0.0) / derivative_power_gain[:, None]
-    is_informative = (motion_power > SENSOR_SHOWN * noise) & (response > SENSOR_LOUD * spectra.noise[:, :, :p])
+    response_power, position_power = (
+        np.abs(spectra.residual[:, :, :response_count]) ** 2,
+        np.abs(spectra.residual[:, :, response_count:]) ** 2,
+    )
+    position_noise = spectra.noise[:, :, response_count:]
+    motion_power = (
+        np.maximum(response_power - spectra.noise[:, :, :response_count], 0.0) / derivative_power_gain[:, None]
+    )
+    is_informative = (motion_power > SENSOR_CHANGE_POWER_RATIO * position_noise) & (
+        response_power > SENSOR_LINE_POWER_RATIO * spectra.noise[:, :, :response_count]
+    )
     if is_informative.sum() < SENSOR_LEAST_LINES:
-        return SensorRule("undecided", 0.0, 0.0)
-    expected = float(np.mean((motion_power / noise)[is_informative]))
-    observed = float(np.mean(((position - noise) / noise)[is_informative]))
-    # Median over lines, so that a few strong lines do not dominate.
-    motion_share = float(np.median(np.clip((position - noise)[is_informative] / motion_power[is_informative], 0, 2)))
-    if motion_share < SENSOR_ABSENT:
-        return SensorRule("response sensor", expected, observed)
-    return SensorRule("motion" if motion_share > SENSOR_PRESENT else "undecided", expected, observed)
+        return SensorComparison("undecided", 0.0, 0.0)
+    expected = float(np.mean((motion_power / position_noise)[is_informative]))
+    observed = float(np.mean(((position_power - position_noise) / position_noise)[is_informative]))
+    # Median over lines, so that a few strong lines do not dominate; ratios are limited to 0 .. 2, about the expected 1.
+    motion_share = float(
+        np.median(np.clip((position_power - position_noise)[is_informative] / motion_power[is_informative], 0, 2))
+    )
+    if motion_share < SENSOR_ABSENT_SHARE:
+        return SensorComparison("response sensor", expected, observed)
+    return SensorComparison("motion" if motion_share > SENSOR_PRESENT_SHARE else "undecided", expected, observed)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +121,7 @@ class EntryPoint:
 
     ranking: tuple[EntryScore, ...]
     """Entries by rising score plus penalty, the best first; empty without entries or lines above the noise."""
-    rule: SensorRule | None
+    sensor_comparison: SensorComparison | None
     """Result of comparing position and response; None where they could not be compared (`compare_sensors`)."""
     lines: int
     """Number of lines above the noise, over all experiments."""
@@ -125,70 +135,78 @@ def rank_entries(
 
     Raises ValueError where there are lines above the noise and an entry's directions have the wrong shape.
     """
-    whitened = spectra.residual / np.sqrt(np.maximum(spectra.noise, _TINY))
-    total_power = np.sum(np.abs(whitened) ** 2, axis=2)
-    channels = whitened.shape[2]
-    above_noise = total_power / channels > ENTRY_LOUD
-    rule = None if derivative is None else compare_sensors(spectra, derivative)
-    if not above_noise.any() or not entries:
-        return EntryPoint((), rule, int(above_noise.sum()))
+    whitened_residual = spectra.residual / np.sqrt(np.maximum(spectra.noise, _TINY))
+    total_power = np.sum(np.abs(whitened_residual) ** 2, axis=2)
+    channel_count = whitened_residual.shape[2]
+    is_above_noise = total_power / channel_count > ENTRY_LINE_POWER_RATIO
+    sensor_comparison = None if derivative is None else compare_sensors(spectra, derivative)
+    if not is_above_noise.any() or not entries:
+        return EntryPoint((), sensor_comparison, int(is_above_noise.sum()))
     weights = 1 / np.sqrt(np.maximum(spectra.noise.mean(axis=0), _TINY))
     bases = [_compute_basis(entry, weights) for entry in entries]
-    unexplained = [_compute_unexplained_power(whitened, total_power, basis) for basis in bases]
+    unexplained_powers = [_compute_unexplained_power(whitened_residual, total_power, basis) for basis in bases]
     log_powers = [
-        np.log1p(power / max(channels - basis.shape[2], 1)) for power, basis in zip(unexplained, bases, strict=True)
+        np.log1p(power / max(channel_count - basis.shape[2], 1))
+        for power, basis in zip(unexplained_powers, bases, strict=True)
     ]
-    scores = [float(np.mean(log_power[above_noise])) for log_power in log_powers]
+    scores = [float(np.mean(log_power[is_above_noise])) for log_power in log_powers]
     ranked = sorted(
-        range(len(entries)), key=lambda k: scores[k] + _compute_penalty(rule, entries[k], bases[k].shape[2])
+        range(len(entries)),
+        key=lambda index: scores[index] + _compute_penalty(sensor_comparison, entries[index], bases[index].shape[2]),
     )
-    best = ranked[0]
+    best_index = ranked[0]
     ranking = []
-    for k in ranked:
-        indistinguishable = tuple(
-            entries[j].name for j in ranked if j != k and _compute_mean_sine(bases[j], bases[k]) < ENTRY_ANGLE
+    for index in ranked:
+        equivalents = tuple(
+            entries[rival_index].name
+            for rival_index in ranked
+            if rival_index != index and _compute_mean_sine(bases[rival_index], bases[index]) < ENTRY_DIRECTION_SINE
         )
-        is_best = k == best or entries[best].name in indistinguishable
-        p_value = 1.0 if is_best else _test_against_best(log_powers[k], log_powers[best], above_noise)
-        explained_shares = 1 - unexplained[k][above_noise] / total_power[above_noise]
-        entry = entries[k]
+        is_best = index == best_index or entries[best_index].name in equivalents
+        p_value = 1.0 if is_best else _test_against_best(log_powers[index], log_powers[best_index], is_above_noise)
+        explained_shares = 1 - unexplained_powers[index][is_above_noise] / total_power[is_above_noise]
+        entry = entries[index]
         share = float(np.median(explained_shares))
-        ranking.append(EntryScore(entry.name, entry.place, entry.axis, scores[k], share, p_value, indistinguishable))
-    return EntryPoint(tuple(ranking), rule, int(above_noise.sum()))
+        ranking.append(EntryScore(entry.name, entry.place, entry.axis, scores[index], share, p_value, equivalents))
+    return EntryPoint(tuple(ranking), sensor_comparison, int(is_above_noise.sum()))
 
 
 def _compute_basis(entry: Entry, weights: FloatArray) -> ComplexArray:
-    """(lines, channels, k): orthonormal basis of the entry's directions at each line, in units of the noise. weights:
-    (lines, channels), 1 / noise."""
-    lines, channels = weights.shape
+    """Compute (lines, channels, k): orthonormal basis of the entry's directions at each line, in units of the noise.
+    weights: (lines, channels), 1 / rms noise. Raises ValueError where the directions have another shape."""
+    line_count, channel_count = weights.shape
     shape = entry.directions.shape
-    if entry.directions.ndim != 3 or shape[0] not in (1, lines) or shape[1] != channels:
-        raise ValueError(f"the directions of '{entry.name}' must have shape ({lines}, {channels}, k), not {shape}")
-    directions = np.broadcast_to(entry.directions, (lines, *shape[1:])) * weights[:, :, None]
+    if entry.directions.ndim != 3 or shape[0] not in (1, line_count) or shape[1] != channel_count:
+        raise ValueError(
+            f"the directions of '{entry.name}' must have shape ({line_count}, {channel_count}, k), not {shape}"
+        )
+    directions = np.broadcast_to(entry.directions, (line_count, *shape[1:])) * weights[:, :, None]
     norms = np.linalg.norm(directions, axis=1, keepdims=True)
     return np.asarray(np.linalg.qr(directions / np.maximum(norms, _TINY))[0], dtype=np.complex128)
 
 
-def _compute_unexplained_power(whitened: ComplexArray, total_power: FloatArray, basis: ComplexArray) -> FloatArray:
-    """(experiments, lines): power of the whitened residual outside the subspace of the basis."""
-    projections = np.einsum("lck,elc->elk", basis.conj(), whitened)
+def _compute_unexplained_power(
+    whitened_residual: ComplexArray, total_power: FloatArray, basis: ComplexArray
+) -> FloatArray:
+    """Compute (experiments, lines): power of the whitened residual outside the subspace of the basis."""
+    projections = np.einsum("lck,elc->elk", basis.conj(), whitened_residual)
     return np.asarray(np.maximum(total_power - np.sum(np.abs(projections) ** 2, axis=2), 0.0))
 
 
-def _compute_penalty(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
-    """Penalty of an entry's score: for each dimension beyond the first, and for a contradiction to the comparison of
-    position and response."""
-    parsimony = ENTRY_PER_DIMENSION * (dimensions - 1)
-    if rule is None or rule.verdict == "undecided":
-        return parsimony
-    of_response_sensor = entry.place == "sensor" and not entry.is_position_error
-    allowed = of_response_sensor if rule.verdict == "response sensor" else not of_response_sensor
-    return parsimony if allowed else parsimony + ENTRY_SENSOR_PENALTY
+def _compute_penalty(comparison: SensorComparison | None, entry: Entry, dimension_count: int) -> float:
+    """Compute the penalty of an entry's score: for each dimension beyond the first, and for a contradiction to the
+    comparison of position and response."""
+    dimension_penalty = ENTRY_PER_DIMENSION * (dimension_count - 1)
+    if comparison is None or comparison.verdict == "undecided":
+        return dimension_penalty
+    is_response_sensor = entry.place == "sensor" and not entry.is_position_error
+    is_consistent = is_response_sensor if comparison.verdict == "response sensor" else not is_response_sensor
+    return dimension_penalty if is_consistent else dimension_penalty + ENTRY_SENSOR_PENALTY
 
 
 def _compute_mean_sine(basis: ComplexArray, rival_basis: ComplexArray) -> float:
-    """Mean over lines of the sine of the largest principal angle between two subspaces; 1 where they have different
-    dimensions."""
+    """Compute the mean over lines of the sine of the largest principal angle between two subspaces; 1 where they have
+    different dimensions."""
     if basis.shape[2] != rival_basis.shape[2]:
         return 1.0
     cosines = np.linalg.svd(np.einsum("lck,lcj->lkj", basis.conj(), rival_basis), compute_uv=False)[:, -1]
@@ -196,14 +214,14 @@ def _compute_mean_sine(basis: ComplexArray, rival_basis: ComplexArray) -> float:
 
 
 def _test_against_best(
-    log_power: FloatArray, best_log_power: FloatArray, above_noise: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+    log_power: FloatArray, best_log_power: FloatArray, is_above_noise: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 ) -> float:
-    """p-value of a one-sided paired t-test against the best entry, over blocks of neighbouring lines above noise; 1 for
-    fewer than three blocks."""
-    difference = (log_power - best_log_power)[above_noise]
-    blocks = len(difference) // _BLOCK_LINES
-    if blocks < 3:
+    """Compute the p-value of a one-sided paired t-test against the best entry, over blocks of neighbouring lines above
+    the noise; 1 for fewer than three blocks (chosen)."""
+    difference = (log_power - best_log_power)[is_above_noise]
+    block_count = len(difference) // _BLOCK_LINES
+    if block_count < 3:
         return 1.0
-    block_means = difference[: blocks * _BLOCK_LINES].reshape(blocks, _BLOCK_LINES).mean(axis=1)
-    standard_error = float(block_means.std(ddof=1)) / np.sqrt(blocks)
-    return float(stdtr(blocks - 1, -block_means.mean() / max(standard_error, _TINY)))
+    block_means = difference[: block_count * _BLOCK_LINES].reshape(block_count, _BLOCK_LINES).mean(axis=1)
+    standard_error = float(block_means.std(ddof=1)) / np.sqrt(block_count)
+    return float(stdtr(block_count - 1, -block_means.mean() / max(standard_error, _TINY)))

@@ -1,8 +1,8 @@
-"""Localises a mismatch: the component through which it enters the model, the states that it depends on, and its kind.
+"""Localise a mismatch: find the component through which it enters the model, and the states that it depends on.
 
 `find_entry_point` compares the residual's spectra with the model's responses to a force at each axis and to an error of
 each sensor (`entry_point`); `find_state_dependences` then tests the residual of that component against position,
-velocity, command and time (`state_dependence`).
+velocity, command and time (`state_dependence`). Both are called by `result.examine_fits`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,32 +39,33 @@ class Localisation:
     """Where a mismatch is: the states that it depends on, the component of entry, and the kinds of distortion."""
 
     states: Mapping[str, tuple[StateMismatch, ...]] = field(default_factory=dict)
-    """Significant state dependences, by "before", "retuned", "after"."""
+    """Significant state dependences by model: "before" (as given), "retuned", "after" (with the effects)."""
     entry: EntryPoint | None = None
     """Entry point of the re-tuned model's residual; None where the residual is noise, where the noise is not known, or
     where no free simulation was compared."""
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
+    """Distortion of the first recording (`find_distortions`)."""
 
 
 def find_entry_point(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
 ) -> EntryPoint | None:
-    """Entry point of the residual of the first recording, which represents the device. fitted: the re-tuned model;
-    floor: noise of that recording; cells: mismatch map of the re-tuned model. None where no cell exceeds the noise, no
-    free simulation was compared, or the spectra cannot be computed."""
+    """Find the entry point of the residual of the first recording, which represents the device. fitted: the re-tuned
+    model; floor: noise of that recording; cells: mismatch map of the re-tuned model. None where no cell exceeds the
+    noise, no free simulation was compared, or the spectra cannot be computed."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]
-    recording, p = record.recording, record.recording.response.samples.shape[1]
+    recording, response_count = record.recording, record.recording.response.samples.shape[1]
     predicted = record.measured - fitted.residuals[0] * measure.unit
-    position = predicted[:, p:] if predicted.shape[1] > p else None
+    position = predicted[:, response_count:] if predicted.shape[1] > response_count else None
     spectra = compute_residual_spectra(
-        recording, Prediction(predicted[:, :p], position), floor, record.fit | record.choose
+        recording, Prediction(predicted[:, :response_count], position), floor, record.fit | record.choose
     )
     if spectra is None:
         return None
-    model, position_compared = tuning.tune(fitted.deviations), spectra.residual.shape[2] > p
-    entries = _list_possible_entries(model, recording, spectra.frequency_hz, position_compared)
+    model, is_position_compared = tuning.tune(fitted.deviations), spectra.residual.shape[2] > response_count
+    entries = _list_possible_entries(model, recording, spectra.frequency_hz, is_position_compared)
     derivative_orders = {_DERIVATIVES.get(quantity) for quantity in recording.response.quantities}
     return rank_entries(spectra, entries, derivative_orders.pop() if len(derivative_orders) == 1 else None)
 
@@ -77,9 +78,9 @@ def find_state_dependences(
     entry: EntryPoint | None,
     computed_evidence: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
-    """State dependences of the residual of the first recording: of the sensor's error where a sensor is the best entry,
-    else of the missing force. cells: mismatch map of `fitted`. computed_evidence: evidence of `fitted`; computed here
-    if empty."""
+    """Find the states on which the first recording's residual depends: those of the sensor's error where a sensor is
+    the best entry, else those of the missing force. cells: mismatch map of `fitted`; no state where none exceeds the
+    noise. computed_evidence: evidence of `fitted`; computed here if empty."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
     recording, evidence = (
@@ -96,27 +97,32 @@ def find_state_dependences(
 def _list_possible_entries(
     model: MechanicalModel, recording: Recording, frequency_hz: FloatArray, with_position: bool
 ) -> tuple[Entry, ...]:
-    """Entries at which a mismatch may enter the model: a force along an axis, forces along several, or an error of a
-    sensor. frequency_hz: (lines,). with_position: whether the position is compared in addition to the response."""
+    """List the entries at which a mismatch may enter the model: a force along an axis, forces along several axes, an
+    error of a channel, or errors of several response channels. frequency_hz: (lines,). with_position: whether the
+    position is compared in addition to the response."""
     transfer = compute_axis_transfer(model, recording.sample_rate_hz, frequency_hz)
     forces = np.concatenate([transfer.response, transfer.position], axis=1) if with_position else transfer.response
     axes = tuple(shorten_axis_name(channel, recording.command.channels) for channel in recording.command.channels)
-    p, channel_count = model.outputs, forces.shape[1]
+    response_count, channel_count = model.outputs, forces.shape[1]
     identity = np.eye(channel_count, dtype=np.complex128)[None]
     entries = [Entry(f"a force along {axis}", "mechanism", axis, forces[:, :, [k]]) for k, axis in enumerate(axes)]
     entries += [Entry("forces along several axes", "mechanism", None, forces)] if len(axes) > 1 else []
     entries += [
         Entry(f"an error of the {name} channel", "sensor", name, identity[:, :, [k]])
-        for k, name in enumerate(recording.response.channels[:p])
+        for k, name in enumerate(recording.response.channels[:response_count])
     ]
-    entries += [Entry("errors of several response channels", "sensor", None, identity[:, :, :p])] if p > 1 else []
+    entries += (
+        [Entry("errors of several response channels", "sensor", None, identity[:, :, :response_count])]
+        if response_count > 1
+        else []
+    )
     if with_position and recording.position is not None:
         entries += [
             Entry(
                 f"an error of the position channel {name}",
                 "sensor",
                 name,
-                identity[:, :, [p + k]],
+                identity[:, :, [response_count + k]],
                 is_position_error=True,
             )
             for k, name in enumerate(recording.position.channels)

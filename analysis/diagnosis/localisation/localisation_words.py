@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
-from analysis.diagnosis.settings import ENTRY_AS_GOOD_P, ENTRY_LEAST_LINES
+from analysis.diagnosis.settings import ENTRY_LEAST_LINES, ENTRY_RIVAL_P
 from analysis.diagnosis.unit_wording import format_share
 from analysis.wording import conjoin, format_p_text
 
@@ -48,7 +48,7 @@ def write_entry_sentence(entry: EntryPoint | None) -> str:
             (
                 f"The mismatch after re-tuning enters as {best_entry.name}{sources}: this explains "
                 f"{explained_text}{_describe_rival_entries(entry)}.",
-                _write_sensor_rule_sentence(entry),
+                _write_sensor_comparison(entry),
             ),
         )
     )
@@ -59,8 +59,8 @@ def write_states_sentence(states: Sequence[StateMismatch]) -> str:
     if not states:
         return ""
     state_phrases = [
-        f"{state.output}, driven by {state.input}, {state.region.words} ({format_share(state.region.share)} of the "
-        f"mismatch, {format_p_text(state.region.p_value)})"
+        f"{state.output}, driven by {state.input}, {state.region.description} ({format_share(state.region.share)} of "
+        f"the mismatch, {format_p_text(state.region.p_value)})"
         for state in states
     ]
     return f"The mismatch depends on a state: {'; '.join(state_phrases)}."
@@ -82,7 +82,7 @@ def _describe_rival_entries(entry: EntryPoint) -> str:
         return equivalents_text
     next_entry = rivals[0]
     p_text = format_p_text(next_entry.p_value)
-    if next_entry.p_value > ENTRY_AS_GOOD_P:
+    if next_entry.p_value > ENTRY_RIVAL_P:
         return (
             f"{equivalents_text}; {next_entry.name} would explain it about equally well ({_format_share(next_entry)}, "
             f"{p_text})"
@@ -93,11 +93,11 @@ def _describe_rival_entries(entry: EntryPoint) -> str:
     )
 
 
-def _write_sensor_rule_sentence(entry: EntryPoint) -> str:
-    """Write a sentence on the comparison of position and response (`SensorRule`); empty where it is undecided."""
-    if entry.rule is None or entry.rule.verdict == "undecided":
+def _write_sensor_comparison(entry: EntryPoint) -> str:
+    """Write a sentence on the comparison of position and response (`SensorComparison`); empty where it is undecided."""
+    if entry.sensor_comparison is None or entry.sensor_comparison.verdict == "undecided":
         return ""
-    if entry.rule.verdict == "motion":
+    if entry.sensor_comparison.verdict == "motion":
         return (
             "The position shows the mismatch, too: the motion of the device itself differs from the model, and no "
             "sensor of the response is at fault."

@@ -31,6 +31,7 @@ from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.types import Mapper
 
 Cells = tuple[MismatchCell, ...]
+"""The mismatch map of one model: cells of all records."""
 STRETCH_COUNT = 16
 """Number of equal stretches of a record over which error powers are compared with noise. Chosen by hand."""
 
@@ -67,8 +68,8 @@ def build_mismatch_maps(
     map_: Mapper = map,
 ) -> MismatchMaps:
     """Build the maps of all stages, tested against noise, the mismatch of clean recordings (learned; None: none), and
-    the error of the stage "after" on held-out samples. stages: fits by name ("before", "retuned", "after"). floors:
-    noise of each record."""
+    the error of the stage "after" on held-out samples. stages: fits by name ("before", "retuned", "after"; the last is
+    required). floors: noise of each record. map_: a possibly parallel `map`."""
     # Stages that share a fit are computed once; the last item is the held-out error of the stage "after".
     fits = list({id(fitted): fitted for fitted in stages.values()}.values())
 
@@ -132,11 +133,11 @@ def _test_against_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> 
     if len(finite_ratios) < len(power_ratios) or len(finite_ratios) < 2 or np.ptp(finite_ratios) == 0:
         return 0.0 if not finite_ratios.size or finite_ratios.mean() > 1 else 1.0
     t_statistic = (finite_ratios.mean() - 1.0) / (finite_ratios.std(ddof=1) / np.sqrt(len(finite_ratios)))
-    p_of_mean, p_of_sum = (
+    mean_p_value, sum_p_value = (
         float(stdtr(len(finite_ratios) - 1, -t_statistic)),
         float(chdtrc(len(finite_ratios), finite_ratios.sum())),
     )
-    return min(2 * min(p_of_mean, p_of_sum), 1.0)
+    return min(2 * min(mean_p_value, sum_p_value), 1.0)
 
 
 def compute_cells(
@@ -170,7 +171,7 @@ MAX_NEIGHBOUR_RATIO = 2.1
 
 @dataclass(frozen=True, slots=True)
 class _HeldOutShare:
-    """Mismatch of a held-out cell as a share of the signal."""
+    """Mismatch of a held-out cell as a share of the signal, rms."""
 
     fold: tuple[int, str, float]
     """Index of the record, driven input, and level of the cell."""
@@ -211,7 +212,8 @@ def collect_model_error(held_out_cells: Sequence[MismatchCell]) -> ModelError:
 
 
 def adjust_for_model_error(cells: Sequence[MismatchCell], model_error: ModelError) -> tuple[MismatchCell, ...]:
-    """Return the cells with p-values against noise and model error together; `beyond_noise` is unchanged."""
+    """Return the cells with p-values against noise and model error together, and newly adjusted; `beyond_noise` is
+    unchanged."""
     return adjust_cell_p_values([replace(cell, p_value=_compute_p_value(cell, model_error)) for cell in cells])
 
 

@@ -69,5 +69,5 @@ def _make_state_row(state: StateMismatch) -> Mismatch:
     """Convert a region of state to a row without a level, because it covers all levels; its share is limited to 1."""
     region = state.region
     return Mismatch(
-        state.output, state.input, state.band_hz, None, region.words, min(region.share, 1.0), region.p_value
+        state.output, state.input, state.band_hz, None, region.description, min(region.share, 1.0), region.p_value
     )

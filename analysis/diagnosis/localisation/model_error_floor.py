@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from analysis.diagnosis.data.spectral_lines import Band
-from analysis.diagnosis.settings import LEARNED_TOO_MUCH
+from analysis.diagnosis.settings import LARGEST_LEARNED_SHARE
 from analysis.wording import conjoin
 
 
@@ -64,7 +64,7 @@ def describe_model_error_floor(floor: ModelErrorFloor, channels: Sequence[str]) 
         "counts as noise here, with its distribution over frequency. An effect is named only where it explains more "
         f"than {floor.margin_factor:.2g} times as much of the diagnosed recordings as of a clean one."
     )
-    if max(floor.channels) <= LEARNED_TOO_MUCH:
+    if max(floor.channels) <= LARGEST_LEARNED_SHARE:
         return text
     return (
         f"{text} This is a large difference: a fault that the clean recordings also contain cannot be found, and "

@@ -1,7 +1,8 @@
-"""Power spectrum of the residual, by segment and octave; called by `mismatch_cells`.
+"""Compute the power of the residual, the noise and the signal by segment and octave. Called by `mismatch_cells`.
 
-In periodic segments: the spectrum of the mean period, whose lines are independent. Elsewhere: Hann windows that overlap
-by half (Welch, IEEE Trans. Audio Electroacoust. 15:70, 1967), whose correlation reduces the degrees of freedom. Powers
+In periodic segments, the spectrum is that of the mean period, whose lines are independent. In all others, it is the
+mean over Hann windows that overlap by half (Welch, IEEE Trans. Audio Electroacoust. 15:70, 1967), whose correlation
+reduces the degrees of freedom. Powers
 are mean squares in the signal's unit squared, one-sided: twice the squared magnitudes of the lines of positive
 frequency.
 """
@@ -62,7 +63,7 @@ class ResidualLines:
     noise: FloatArray
     """Mean square of the residual that is expected from noise alone."""
     signal: FloatArray
-    """Mean square of the response less its noise, weak channels raised by `_LEAST_AMPLITUDE_SHARE`."""
+    """Mean square of the response less its noise, weak channels raised to `_LEAST_AMPLITUDE_SHARE`."""
     whitened: FloatArray
     """Mean over lines of residual power / noise power: 1 for noise alone."""
     signal_to_noise: FloatArray
@@ -89,23 +90,28 @@ def compute_residual_lines(recording: Recording, observation: Observation, used:
     """Compute the residual power by segment and octave. used: (n,), mask of the samples to use. Segments of rest, and
     those without a complete period or window of used, finite samples, are left out; a recording without segments counts
     as one segment."""
-    usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
+    is_usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
     settled_periods = {period.index: period for period in find_settled_periods(recording)}
     residual = observation.measured - observation.predicted
     octave_lines: list[ResidualLines] = []
-    for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
+    for segment_index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         if segment.kind == "rest":
             continue
-        if index in settled_periods:
+        if segment_index in settled_periods:
             starts = tuple(
-                start for start in settled_periods[index].starts if usable[start : start + segment.period].all()
+                start
+                for start in settled_periods[segment_index].starts
+                if is_usable[start : start + segment.period].all()
             )
             if starts:
                 octave_lines += _sum_period_octaves(
-                    recording, observation, residual, Periods(index, segment, starts, settled_periods[index].settled)
+                    recording,
+                    observation,
+                    residual,
+                    Periods(segment_index, segment, starts, settled_periods[segment_index].settled),
                 )
         else:
-            octave_lines += _sum_window_octaves(recording, observation, residual, (segment, usable))
+            octave_lines += _sum_window_octaves(recording, observation, residual, (segment, is_usable))
     return octave_lines
 
 
@@ -115,28 +121,28 @@ def _sum_period_octaves(
     """Compute the residual power of the mean period, by octave of the driven band; empty where no line is driven.
     residual: (n, channels)."""
     excitation = compute_mean_spectrum(select_instrument_signal(recording), periods)
-    driven = find_detection_lines(excitation, compute_hold_samples(select_instrument_signal(recording)))
-    if driven is None:
+    detection_lines = find_detection_lines(excitation, compute_hold_samples(select_instrument_signal(recording)))
+    if detection_lines is None:
         return []
     lines_hz = periods.compute_line_frequencies(recording.sample_rate_hz)
-    response = np.abs(compute_mean_spectrum(observation.measured, periods)) ** 2
+    response_power = np.abs(compute_mean_spectrum(observation.measured, periods)) ** 2
     residual_power = np.abs(compute_mean_spectrum(residual, periods)) ** 2
-    noise = _compute_noise_power(observation, lines_hz, periods.count) / periods.length
+    noise_power = _compute_noise_power(observation, lines_hz, periods.count) / periods.length
     inputs = "+".join(find_driven_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
-    lowest_hz, highest_hz = (float(line) for line in lines_hz[driven.driven][[0, -1]])
-    in_driven_band = (lines_hz >= lowest_hz) & (lines_hz <= highest_hz)
-    seconds = periods.count * periods.length / recording.sample_rate_hz
+    lowest_hz, highest_hz = (float(line) for line in lines_hz[detection_lines.driven][[0, -1]])
+    is_in_driven_band = (lines_hz >= lowest_hz) & (lines_hz <= highest_hz)
+    duration_s = periods.count * periods.length / recording.sample_rate_hz
     octave_lines = []
     for band in list_octaves(lowest_hz, highest_hz):
-        in_octave = in_driven_band & select_lines_in_band(lines_hz, band)
-        if (in_octave & driven.driven).any():
-            segment_facts = (inputs, periods.segment.amplitude, band, seconds, float(in_octave.sum()))
+        is_in_octave = is_in_driven_band & select_lines_in_band(lines_hz, band)
+        if (is_in_octave & detection_lines.driven).any():
+            segment_properties = (inputs, periods.segment.amplitude, band, duration_s, float(is_in_octave.sum()))
             octave_lines.append(
                 _sum_lines(
-                    segment_facts,
-                    residual_power[in_octave],
-                    noise[in_octave],
-                    response[in_octave],
+                    segment_properties,
+                    residual_power[is_in_octave],
+                    noise_power[is_in_octave],
+                    response_power[is_in_octave],
                     observation.quantities,
                 )
             )
@@ -146,40 +152,46 @@ def _sum_period_octaves(
 def _sum_window_octaves(
     recording: Recording, observation: Observation, residual: FloatArray, segment_and_mask: tuple[Segment, Mask]
 ) -> list[ResidualLines]:
-    """Compute the residual power of Hann windows, by octave from the second line on; empty where the segment is shorter
-    than 16 samples (too few lines), has no usable window, or a command is missing. residual: (n, channels).
+    """Compute the residual power of Hann windows, by octave of the driven band, from the second line on; empty where
+    the window is shorter than 16 samples (chosen; it has too few lines), no window is usable, or a command is missing.
+    residual: (n, channels).
     segment_and_mask: the segment, and the mask (n,) of usable samples."""
-    segment, usable = segment_and_mask
+    segment, is_usable = segment_and_mask
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     all_starts = range(segment.start, segment.stop - length + 1, max(length // 2, 1))
-    starts = [start for start in all_starts if usable[start : start + length].all()]
+    starts = [start for start in all_starts if is_usable[start : start + length].all()]
     command = select_instrument_signal(recording)[segment.start : segment.stop]
     if length < 16 or not starts or not np.isfinite(command).all():
         return []
     lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
-    excitation = np.sum(_compute_window_power(select_instrument_signal(recording), starts, length), axis=2)
-    response = _compute_window_power(observation.measured, starts, length)
+    excitation_power = np.sum(_compute_window_power(select_instrument_signal(recording), starts, length), axis=2)
+    response_power = _compute_window_power(observation.measured, starts, length)
     residual_power = _compute_window_power(residual, starts, length)
-    noise = np.broadcast_to(_compute_noise_power(observation, lines_hz, 1) / length, response.shape)
+    noise_power = np.broadcast_to(_compute_noise_power(observation, lines_hz, 1) / length, response_power.shape)
     inputs = "+".join(find_driven_inputs(command.var(axis=0), recording.command.channels))
     octaves = list_octaves(2 * float(lines_hz[0]), float(lines_hz[-1]))
-    lines_by_band = [(octave, select_lines_in_band(lines_hz, octave)) for octave in octaves]
-    strongest_power = max(float(excitation[:, lines].sum(axis=1).max(initial=0.0)) for _, lines in lines_by_band)
+    octave_masks = [(octave, select_lines_in_band(lines_hz, octave)) for octave in octaves]
+    strongest_power = max(
+        float(excitation_power[:, is_in_band].sum(axis=1).max(initial=0.0)) for _, is_in_band in octave_masks
+    )
     octave_lines = []
-    for band, lines in lines_by_band:
-        window_powers = excitation[:, lines].sum(axis=1)
-        if not lines.any() or window_powers.max() <= _DRIVEN_BAND_SHARE * strongest_power:
+    for band, is_in_band in octave_masks:
+        window_powers = excitation_power[:, is_in_band].sum(axis=1)
+        if not is_in_band.any() or window_powers.max() <= _DRIVEN_BAND_SHARE * strongest_power:
             continue
-        driven_lines = np.ix_(window_powers > _DRIVEN_WINDOW_SHARE * window_powers.max(), lines)
-        windows, width = len(driven_lines[0]), int(lines.sum())
-        independent_lines = windows * width / (_HANN_NEIGHBOUR_FACTOR * (_HANN_OVERLAP_FACTOR if windows > 1 else 1.0))
-        duration_s = windows * length / 2 / recording.sample_rate_hz
-        segment_facts = (inputs, segment.amplitude, band, duration_s, max(independent_lines, 1.0))
+        driven_lines = np.ix_(window_powers > _DRIVEN_WINDOW_SHARE * window_powers.max(), is_in_band)
+        window_count, line_count = len(driven_lines[0]), int(is_in_band.sum())
+        independent_lines = (
+            window_count * line_count / (_HANN_NEIGHBOUR_FACTOR * (_HANN_OVERLAP_FACTOR if window_count > 1 else 1.0))
+        )
+        duration_s = window_count * length / 2 / recording.sample_rate_hz
+        segment_properties = (inputs, segment.amplitude, band, duration_s, max(independent_lines, 1.0))
         powers = [
-            line_power[driven_lines].reshape(windows * width, -1) for line_power in (residual_power, noise, response)
+            line_power[driven_lines].reshape(window_count * line_count, -1)
+            for line_power in (residual_power, noise_power, response_power)
         ]
-        per_window = _sum_lines(segment_facts, powers[0], powers[1], powers[2], observation.quantities)
-        octave_lines.append(_divide_by_windows(per_window, windows))
+        window_sum = _sum_lines(segment_properties, powers[0], powers[1], powers[2], observation.quantities)
+        octave_lines.append(_divide_by_windows(window_sum, window_count))
     return octave_lines
 
 
@@ -191,24 +203,25 @@ def _compute_window_power(samples: FloatArray, starts: Sequence[int], length: in
     return np.abs(compute_line_spectra((windows - windows.mean(axis=1, keepdims=True)) * taper[:, None])) ** 2
 
 
-def _compute_noise_power(observation: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
+def _compute_noise_power(observation: Observation, lines_hz: FloatArray, period_count: int) -> FloatArray:
     """Compute the noise power of a line times the length of a period, (lines, channels), for a mean of `periods`
     periods. The part of the rounding error that repeats in every period does not average out."""
     density = np.stack(
         [np.interp(lines_hz, observation.noise_hz, channel) for channel in observation.noise.density.T], axis=1
     )
-    return (density - observation.noise.rounding) / periods + observation.noise.rounding
+    return (density - observation.noise.rounding) / period_count + observation.noise.rounding
 
 
 def _sum_lines(
-    segment_facts: tuple[str, float, Band, float, float],
+    segment_properties: tuple[str, float, Band, float, float],
     residual: FloatArray,
     noise: FloatArray,
     response: FloatArray,
     quantities: tuple[str, ...],
 ) -> ResidualLines:
-    """Sum the powers over lines. segment_facts: input, amplitude, band (Hz), duration (s) and number of independent
-    lines. residual, noise, response: (lines, channels), squared magnitudes of the lines of positive frequency."""
+    """Sum the powers over lines. segment_properties: input, amplitude, band (Hz), duration (s) and number of
+    independent lines. residual, noise, response: (lines, channels), squared magnitudes of the lines of positive
+    frequency."""
     signal = np.maximum(response - noise, 0.0)
     strongest_signal = np.stack(
         [
@@ -219,9 +232,9 @@ def _sum_lines(
     )
     floored_signal = np.maximum(signal, _LEAST_AMPLITUDE_SHARE**2 * strongest_signal)
     positive_noise = np.maximum(noise, np.finfo(np.float64).tiny)
-    line_count = segment_facts[4]
+    line_count = segment_properties[4]
     return ResidualLines(
-        *segment_facts,
+        *segment_properties,
         2 * residual.sum(axis=0),
         2 * noise.sum(axis=0),
         2 * floored_signal.sum(axis=0),
@@ -230,11 +243,11 @@ def _sum_lines(
     )
 
 
-def _divide_by_windows(summed: ResidualLines, windows: int) -> ResidualLines:
+def _divide_by_windows(window_sum: ResidualLines, window_count: int) -> ResidualLines:
     """Divide the sums over all windows by their number, which gives the mean squares of a window. Ratios and line
     counts are kept."""
     return ResidualLines(
-        summed.input, summed.amplitude, summed.band_hz, summed.seconds, summed.lines,
-        summed.residual / windows, summed.noise / windows, summed.signal / windows,
-        summed.whitened, summed.signal_to_noise,
+        window_sum.input, window_sum.amplitude, window_sum.band_hz, window_sum.seconds, window_sum.lines,
+        window_sum.residual / window_count, window_sum.noise / window_count, window_sum.signal / window_count,
+        window_sum.whitened, window_sum.signal_to_noise,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Mean spectrum of each periodic segment with its variance, corrected for the command's content on silent lines.
+"""Compute the mean spectrum of each periodic segment and its variance, corrected for the command on silent lines.
 
 Silent lines are those that the excitation does not drive; `distortion`, which calls this module, finds nonlinear
 distortion there. With feedback, distortion of the response also appears in the command: the linear response to the
@@ -45,28 +45,28 @@ class SegmentSpectrum:
     """(lines,)"""
     mean: ComplexArray
     """Mean over the periods, less the response to the command's silent lines."""
-    error: FloatArray
+    mean_variance: FloatArray
     """Variance of the mean in squared units of the channel, that of the subtracted response included."""
-    spread: FloatArray
-    """Variance of one period, from the differences between periods; equal to `floor` where there is one period."""
-    floor: FloatArray
+    period_variance: FloatArray
+    """Variance of one period, from the differences between periods; equal to `noise_variance` with one period."""
+    noise_variance: FloatArray
     """Variance of one period from noise alone, without the rounding that repeats in every period."""
     count: int
     """Number of periods."""
-    floor_freedom: FloatArray
-    """(channels,): degrees of freedom of `floor`; 0 where unknown."""
+    noise_freedom: FloatArray
+    """(channels,): degrees of freedom of `noise_variance`; 0 where unknown."""
 
 
 def compute_segment_spectra(
     recording: Recording,
     signal: Signal,
     noise: ChannelNoise,
-    floor_hz: FloatArray,
+    noise_hz: FloatArray,
     periods: Sequence[tuple[Periods, DetectionLines]],
 ) -> list[SegmentSpectrum]:
     """Compute the spectrum of each periodic segment, ordered by the first occurrence of its length of period; segments
-    with equal length share one estimate of the linear response. noise: of the signal; floor_hz: (lines,), frequencies
-    of its density."""
+    with equal length share one estimate of the linear response. noise: of the signal; noise_hz: (lines,), frequencies
+    of its density; periods: with their driven and silent lines."""
     spectra = []
     for length in dict.fromkeys(period.length for period, _ in periods):
         equal_periods = [(period, lines) for period, lines in periods if period.length == length]
@@ -74,24 +74,22 @@ def compute_segment_spectra(
             compute_period_spectra(recording.command.samples, period).mean(axis=0) for period, _ in equal_periods
         ]
         responses = [compute_period_spectra(signal.samples, period) for period, _ in equal_periods]
-        driven = [
+        driven_commands = [
             np.where(lines.driven[:, None], excitation, 0)
             for (_, lines), excitation in zip(equal_periods, commands, strict=True)
         ]
-        linear_response = _estimate_linear_response(driven, commands, responses)
+        linear_response = _estimate_linear_response(driven_commands, commands, responses)
         lines_hz = equal_periods[0][0].compute_line_frequencies(recording.sample_rate_hz)
-        floor = _interpolate_noise(noise, floor_hz, lines_hz) / length
+        noise_variance = _interpolate_noise(noise, noise_hz, lines_hz) / length
         for (period, lines), command, response in zip(equal_periods, commands, responses, strict=True):
-            mean, error, spread = _estimate_mean(response, floor, noise.rounding / length)
+            mean, mean_variance, period_variance = _estimate_mean(response, noise_variance, noise.rounding / length)
             if linear_response is not None:
-                contribution, contribution_error = compute_command_contribution(
+                contribution, contribution_variance = compute_command_contribution(
                     linear_response, np.where(lines.driven[:, None], 0, command)
                 )
-                mean, error = mean - contribution, error + contribution_error
-            spectrum_values = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
-            spectra.append(
-                SegmentSpectrum(join_driven_input_names(recording, period), period.segment.amplitude, *spectrum_values)
-            )
+                mean, mean_variance = mean - contribution, mean_variance + contribution_variance
+            args = (lines, lines_hz, mean, mean_variance, period_variance, noise_variance, period.count, noise.freedom)
+            spectra.append(SegmentSpectrum(join_driven_input_names(recording, period), period.segment.amplitude, *args))
     return spectra
 
 
@@ -103,38 +101,40 @@ def join_driven_input_names(recording: Recording, periods: Periods) -> str:
     )
 
 
-def _interpolate_noise(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
+def _interpolate_noise(noise: ChannelNoise, noise_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
     """Interpolate the noise density to the frequencies `lines_hz`, (lines, channels), without the part of rounding that
-    repeats in every period. floor_hz: frequencies of the density."""
-    return np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1) - noise.rounding
+    repeats in every period. noise_hz: frequencies of the density."""
+    return np.stack([np.interp(lines_hz, noise_hz, channel) for channel in noise.density.T], axis=1) - noise.rounding
 
 
 def _estimate_mean(
-    response: ComplexArray, floor: FloatArray, rounding: FloatArray
+    response: ComplexArray, noise_variance: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Estimate the mean over periods, the variance of the mean, and that of one period (not smoothed); each (lines,
-    channels). response: (periods, lines, channels). floor: noise variance of one period, the lower limit of the
-    smoothed variance. rounding: (channels,), variance of the rounding error that repeats in every period."""
+    channels). response: (periods, lines, channels). noise_variance: that of one period, the lower limit of the smoothed
+    variance. rounding: (channels,), variance of the rounding error that repeats in every period."""
     period_count = len(response)
-    spread = compute_period_variance(response) if period_count > 1 else floor
-    smoothed_spread = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
-    return response.mean(axis=0), smoothed_spread / period_count + rounding, spread
+    period_variance = compute_period_variance(response) if period_count > 1 else noise_variance
+    smoothed_variance = np.maximum(noise_variance, smooth_over_lines(period_variance, _SMOOTHED_LINES))
+    return response.mean(axis=0), smoothed_variance / period_count + rounding, period_variance
 
 
 def _estimate_linear_response(
-    driven: Sequence[ComplexArray], commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]
+    driven_commands: Sequence[ComplexArray], commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]
 ) -> ComplexArray | None:
     """Estimate the linear frequency response at all lines, (lines, outputs, inputs); None where the commands are
-    negligible on silent lines (`_NEGLIGIBLE_SHARE`), or fewer than two lines determine it. driven: commands, zero on
-    silent lines; responses: (periods, lines, outputs) per segment."""
+    negligible on silent lines (`_NEGLIGIBLE_SHARE`), or fewer than two lines determine it. driven_commands: commands
+    set to zero on silent lines; responses: (periods, lines, outputs) per segment."""
     is_negligible = all(
-        np.abs(command - driven_lines).max(initial=0.0) <= _NEGLIGIBLE_SHARE * np.abs(command).max(initial=0.0)
-        for driven_lines, command in zip(driven, commands, strict=True)
+        np.abs(command - driven_command).max(initial=0.0) <= _NEGLIGIBLE_SHARE * np.abs(command).max(initial=0.0)
+        for driven_command, command in zip(driven_commands, commands, strict=True)
     )
     return (
         None
         if is_negligible
-        else interpolate_response(estimate_line_responses(driven, [response.mean(axis=0) for response in responses]))
+        else interpolate_response(
+            estimate_line_responses(driven_commands, [response.mean(axis=0) for response in responses])
+        )
     )
 
 

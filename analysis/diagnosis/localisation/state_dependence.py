@@ -1,8 +1,8 @@
-"""Tests on which states a mismatch depends, for the missing force along each axis or a sensor's error.
+"""Test the dependence of a mismatch on states: that of the missing force along each axis, or of a sensor's error.
 
-A state is a variable of the motion or of the signals: position, velocity, command, response, time. Each test asks
-whether the mismatch is larger in a region of it, or follows its sign (`state_regions`); its p-value is multiplied by
-the number of all tests (Bonferroni). A dependence is stated where the p-value is at most `FALSE_DISCOVERY_RATE` and the
+A state is a variable of the motion or of the signals: position, velocity, command, response, time. The mismatch may be
+larger in a region of the state, or follow its sign (`state_regions`); the p-value of each test is multiplied by the
+number of all tests (Bonferroni). A dependence is stated where the p-value is at most `FALSE_DISCOVERY_RATE` and the
 region has a larger share of the mismatch than of the samples. Called by `localisation`.
 """
 
@@ -22,7 +22,7 @@ from analysis.diagnosis.localisation.state_regions import (
     StateRegion,
     find_state_regions,
 )
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, STATE_CROWDED, STATES_NAMED
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MOST_NAMED_STATES, STATE_CONCENTRATION
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
@@ -45,7 +45,8 @@ def find_force_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], unit_system: UnitSystem
 ) -> tuple[StateMismatch, ...]:
     """Find regions of state in which the missing force is larger or whose sign it follows, along each driven axis with
-    a cell beyond noise. p-values are corrected for all regions tested. unit_system: units of the coordinates."""
+    a cell beyond noise. p-values are corrected for all regions tested; only significant ones are returned
+    (`_correct_p_values`). unit_system: units of the coordinates."""
     axis_states = []
     for axis_index, channel in enumerate(recording.command.channels):
         channel_cells = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
@@ -81,7 +82,8 @@ def find_error_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
 ) -> tuple[StateMismatch, ...]:
     """Find regions of response or time in which the error (reading minus prediction) is larger, for each response
-    channel among `channels` with a cell beyond noise. p-values are corrected for all regions tested."""
+    channel among `channels` with a cell beyond noise. p-values are corrected for all regions tested; only significant
+    ones are returned (`_correct_p_values`)."""
     channel_states = []
     for channel_index, channel in enumerate(recording.response.channels):
         quantity = recording.response.quantities[channel_index]
@@ -112,7 +114,7 @@ def find_error_states(
 
 def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group: int) -> tuple[StateMismatch, ...]:
     """Correct p-values by Bonferroni over all groups (axes or channels), with tests_per_group tests each. Returns only
-    the significant and informative dependences, of each group the `STATES_NAMED` with the largest share."""
+    the significant and informative dependences, of each group the `MOST_NAMED_STATES` with the largest share."""
     test_count = tests_per_group * len(groups)
     significant_states = []
     for group in groups:
@@ -125,16 +127,17 @@ def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group
             for state in corrected
             if state.region.p_value <= FALSE_DISCOVERY_RATE and _is_informative(state.region)
         ]
-        significant_states += sorted(significant, key=lambda state: -state.region.share)[:STATES_NAMED]
+        significant_states += sorted(significant, key=lambda state: -state.region.share)[:MOST_NAMED_STATES]
     return tuple(significant_states)
 
 
 def _is_informative(region: StateRegion) -> bool:
-    """Whether a region is of the kind "sign", or its share of the mismatch is more than `STATE_CROWDED` times its share
-    of the samples. Never for a middle region: no mechanical effect is confined to the middle of a state's range."""
-    if region.words.startswith(MIDDLE_REGION_PHRASE):
+    """Whether a region is of the kind "sign", or its share of the mismatch is more than `STATE_CONCENTRATION` times its
+    share of the samples. Never for a middle region: no mechanical effect is confined to the middle of a state's
+    range."""
+    if region.description.startswith(MIDDLE_REGION_PHRASE):
         return False
-    return region.criterion == "sign" or region.share > STATE_CROWDED * region.occupied
+    return region.criterion == "sign" or region.share > STATE_CONCENTRATION * region.sample_share
 
 
 def _assign_strata(recording: Recording, used_samples: Mask, driving_signal: FloatArray) -> IntArray:

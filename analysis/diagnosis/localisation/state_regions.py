@@ -1,4 +1,4 @@
-"""Dependence of a residual on a state variable: where it is large, and whether its mean follows the state.
+"""Test the dependence of a residual on a state variable: where it is large, and whether its mean follows the state.
 
 State variables are position, velocity, command, response and time. Samples are sorted into bins of the state; tested
 are the power per bin (size) and the mean per bin (sign) against permutations of blocks of samples within a segment
@@ -21,17 +21,17 @@ from equalizer.signals.signal import FloatArray
 
 StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BIN_COUNT = 12
-"""Number of bins of a state, with equally many samples each as far as equal values allow."""
+"""Number of bins of a state, with equally many samples each as far as equal values allow. Chosen."""
 PERMUTATIONS = 60
-"""Number of permutations of blocks."""
+"""Number of permutations of blocks. Chosen: p-values below ten over it are those of a fitted tail."""
 _LEAST_CONCENTRATION = 1.5
-"""Least ratio of a bin's mean square to the expected one, for the bin to belong to a region."""
+"""Least ratio of a bin's mean square to the expected one, for the bin to belong to a region. Chosen."""
 _LEAST_SHARE = 0.05
-"""Least share of the power that bin means must explain."""
+"""Least share of the power that bin means must explain. Chosen."""
 _SMALLEST_NORMAL = np.finfo(np.float64).tiny
 """Smallest normal number, against divisions by zero."""
 _LEAST_EXPECTED = 1e-9
-"""Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested."""
+"""Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested. Chosen."""
 MIDDLE_REGION_PHRASE = "at middling"
 """First words of the text for a region with neither small nor large values of a state."""
 _DISPLAY_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
@@ -74,23 +74,23 @@ class StateRegion:
     """size: the mismatch is larger in the region; sign: its mean follows the state."""
     share: float
     """Share of the mismatch's power: inside the region (size), or explained by the bin means (sign)."""
-    occupied: float
+    sample_share: float
     """Share of the samples in the region; 1 for sign."""
     p_value: float
-    words: str
+    description: str
     """Text for `Mismatch.state`: "near v = 0"."""
 
 
 def find_state_regions(
     disturbance: Disturbance, states: Sequence[State], seed: int, permutations: int = PERMUTATIONS
 ) -> tuple[StateRegion, ...]:
-    """Regions with a concentration of at least `_LEAST_CONCENTRATION`, or with bin means that explain `_LEAST_SHARE` of
-    the power: the smallest p-value first, then the largest share. Empty with fewer than ten samples per bin, or for a
-    disturbance of zeros. p-values are of single tests, by block permutation within segments, and not compared with a
-    limit here; they depend on the seed in their third digit.
+    """Find regions with a concentration of at least `_LEAST_CONCENTRATION`, or with bin means that explain
+    `_LEAST_SHARE` of the power, ordered by p-value, then by falling share. Empty with fewer than ten samples per bin
+    (chosen), or for a disturbance of zeros. p-values are of single tests, by block permutation within segments, and not
+    compared with a limit here; they depend on the seed.
 
     The size is tested for every state (over the magnitude of velocity, command and response), the sign for position and
-    velocity only.
+    velocity only. Time is tested only with `Disturbance.signal`.
 
     Raises ValueError where a state has another length than the disturbance.
     """
@@ -103,13 +103,16 @@ def find_state_regions(
     used_indices = np.flatnonzero(is_used)[np.argsort(disturbance.strata[is_used], kind="stable")]
     values, strata = disturbance.values[used_indices], disturbance.strata[used_indices]
     generator = np.random.default_rng(seed)
-    block_length = compute_block_length(values)
+    block_samples = compute_block_length(values)
     regions: list[StateRegion] = []
     motion_states = [(state, state.values[used_indices]) for state in states if state.kind != "time"]
     if motion_states:
-        expected = _compute_stratum_mean_square(values, strata)
+        expected_power = _compute_stratum_mean_square(values, strata)
         regions += _test_states(
-            _Sample(values, expected, strata, block_length, is_constant=True), motion_states, permutations, generator
+            _Sample(values, expected_power, strata, block_samples, is_constant=True),
+            motion_states,
+            permutations,
+            generator,
         )
     time_states = [(state, _locate_in_stratum(strata)) for state in states if state.kind == "time"]
     if time_states and disturbance.signal is not None:
@@ -117,7 +120,7 @@ def find_state_regions(
         power_share = _compute_stratum_mean_square(values, strata) / np.maximum(
             _compute_stratum_mean_square(disturbance.signal[used_indices], strata), _SMALLEST_NORMAL
         )
-        time_sample = _Sample(values, power_share * signal_power, strata, block_length, is_constant=False)
+        time_sample = _Sample(values, power_share * signal_power, strata, block_samples, is_constant=False)
         regions += _test_states(time_sample, time_states, permutations, generator)
     return tuple(sorted(regions, key=lambda region: (region.p_value, -region.share)))
 
@@ -130,8 +133,8 @@ class _Sample:
     expected: FloatArray
     """Expected mean square of each sample if it did not depend on the state."""
     strata: IntArray
-    block: int
-    """Length of a block of permuted samples."""
+    block_samples: int
+    """Length of a block of permuted samples, in samples."""
     is_constant: bool
     """Whether `expected` is constant within each stratum, so that permutation does not change it."""
 
@@ -139,33 +142,35 @@ class _Sample:
 def _test_states(
     sample: _Sample, states: Sequence[tuple[State, FloatArray]], permutations: int, generator: np.random.Generator
 ) -> list[StateRegion]:
-    """Regions of all states, from one set of permutations. states: with their values at the used samples."""
+    """Find the regions of all states, from one set of permutations. states: with their values at the used samples."""
     size_bins = [_assign_equal_bins(np.abs(values) if _uses_magnitude(state) else values) for state, values in states]
     sign_bins = [_assign_equal_bins(values) for state, values in states if _has_sign(state)]
     total_power, counts = float(np.sum(sample.values**2)), [np.bincount(labels) for labels in sign_bins]
     constant_expected = [_sum_by_bin(labels, sample.expected) for labels in size_bins] if sample.is_constant else []
 
     def compute_statistics(order: IntArray) -> FloatArray:
-        permuted = sample.values[order]
-        power = permuted**2
+        permuted_values = sample.values[order]
+        power = permuted_values**2
         expected_sums = constant_expected or [_sum_by_bin(labels, sample.expected[order]) for labels in size_bins]
         size_statistics = [
             _compute_unevenness(_sum_by_bin(labels, power), expected)
             for labels, expected in zip(size_bins, expected_sums, strict=True)
         ]
         sign_statistics = [
-            float(np.sum(_sum_by_bin(labels, permuted) ** 2 / count)) / total_power
+            float(np.sum(_sum_by_bin(labels, permuted_values) ** 2 / count)) / total_power
             for labels, count in zip(sign_bins, counts, strict=True)
         ]
         return np.array(size_statistics + sign_statistics)
 
-    p_values = compute_permutation_p_values(compute_statistics, sample.strata, sample.block, permutations, generator)
+    p_values = compute_permutation_p_values(
+        compute_statistics, sample.strata, sample.block_samples, permutations, generator
+    )
     regions = []
     for (state, values), bins, p_value in zip(states, size_bins, p_values, strict=False):
         region = _find_region(state, values, bins, sample)
         if region is not None:
-            share, occupied, description = region
-            regions.append(StateRegion(state.kind, state.symbol, "size", share, occupied, float(p_value), description))
+            share, coverage, description = region
+            regions.append(StateRegion(state.kind, state.symbol, "size", share, coverage, float(p_value), description))
     sign_states = [state for state, _ in states if _has_sign(state)]
     for state, bins, p_value in zip(sign_states, sign_bins, p_values[len(states) :], strict=True):
         means = _sum_by_bin(bins, sample.values) / np.bincount(bins)
@@ -177,62 +182,63 @@ def _test_states(
 
 
 def _find_region(state: State, values: FloatArray, bins: IntArray, sample: _Sample) -> tuple[float, float, str] | None:
-    """`share`, `occupied` and `words` of a `StateRegion`: the adjacent bins of at least `_LEAST_CONCENTRATION` that
-    contain the largest; None where no bin reaches it."""
+    """Find `share`, `sample_share` and `description` of a `StateRegion`: the adjacent bins of at least
+    `_LEAST_CONCENTRATION` that contain the largest; None where no bin reaches it."""
     power = sample.values**2
     is_one_stratum = bool((sample.strata == sample.strata[0]).all())
-    expected = _sum_by_bin(bins, sample.expected)
-    ratio = _sum_by_bin(bins, power) / np.maximum(
-        expected, max(_LEAST_EXPECTED * float(expected.mean()), _SMALLEST_NORMAL)
+    expected_power = _sum_by_bin(bins, sample.expected)
+    power_ratio = _sum_by_bin(bins, power) / np.maximum(
+        expected_power, max(_LEAST_EXPECTED * float(expected_power.mean()), _SMALLEST_NORMAL)
     )
-    peak_bin = int(np.argmax(ratio))
-    if ratio[peak_bin] < _LEAST_CONCENTRATION:
+    peak_bin = int(np.argmax(power_ratio))
+    if power_ratio[peak_bin] < _LEAST_CONCENTRATION:
         return None
     first_bin = last_bin = peak_bin
-    while first_bin > 0 and ratio[first_bin - 1] >= _LEAST_CONCENTRATION:
+    while first_bin > 0 and power_ratio[first_bin - 1] >= _LEAST_CONCENTRATION:
         first_bin -= 1
-    while last_bin < len(ratio) - 1 and ratio[last_bin + 1] >= _LEAST_CONCENTRATION:
+    while last_bin < len(power_ratio) - 1 and power_ratio[last_bin + 1] >= _LEAST_CONCENTRATION:
         last_bin += 1
-    in_region = (bins >= first_bin) & (bins <= last_bin)
-    share = float(power[in_region].sum() / max(float(power.sum()), _SMALLEST_NORMAL))
-    centre = float(np.average(values[in_region], weights=power[in_region]))
+    is_in_region = (bins >= first_bin) & (bins <= last_bin)
+    share = float(power[is_in_region].sum() / max(float(power.sum()), _SMALLEST_NORMAL))
+    centre = float(np.average(values[is_in_region], weights=power[is_in_region]))
     description = describe_region(
-        state.kind, state.symbol, state.unit, (first_bin, last_bin, len(ratio)), centre, is_one_stratum
+        state.kind, state.symbol, state.unit, (first_bin, last_bin, len(power_ratio)), centre, is_one_stratum
     )
-    return share, float(np.mean(in_region)), description
+    return share, float(np.mean(is_in_region)), description
 
 
 def _compute_unevenness(observed: FloatArray, expected: FloatArray) -> float:
-    """Chi-squared statistic of bin powers against the expected ones, over the total power."""
-    total = float(expected.sum())
-    populated = expected > _LEAST_EXPECTED * total / len(expected)
+    """Compute the chi-squared statistic of bin powers against the expected ones, over the total power; 0 without
+    power."""
+    total_power = float(expected.sum())
+    is_populated = expected > _LEAST_EXPECTED * total_power / len(expected)
     return (
-        float(np.sum((observed - expected)[populated] ** 2 / expected[populated])) / total
-        if total > _SMALLEST_NORMAL
+        float(np.sum((observed - expected)[is_populated] ** 2 / expected[is_populated])) / total_power
+        if total_power > _SMALLEST_NORMAL
         else 0.0
     )
 
 
 def _locate_in_stratum(strata: IntArray) -> FloatArray:
-    """(n,): relative position of each sample in its stratum, 0 to 1. strata: (n,), sorted."""
+    """Compute (n,): relative position of each sample in its stratum, from 0 to below 1. strata: (n,), sorted."""
     _, first, stratum_index, length = np.unique(strata, return_index=True, return_inverse=True, return_counts=True)
     return np.asarray((np.arange(len(strata)) - first[stratum_index]) / length[stratum_index], dtype=np.float64)
 
 
 def _sum_by_bin(bins: IntArray, weights: FloatArray) -> FloatArray:
-    """(bins,): sum of the weights in each bin."""
+    """Compute (bins,): sum of the weights in each bin."""
     return np.asarray(np.bincount(bins, weights), dtype=np.float64)
 
 
 def _compute_stratum_mean_square(values: FloatArray, strata: IntArray) -> FloatArray:
-    """(n,): mean square of the values in the stratum of each sample."""
+    """Compute (n,): mean square of the values in the stratum of each sample."""
     _, stratum_indices = np.unique(strata, return_inverse=True)
     mean = _sum_by_bin(stratum_indices, values**2) / np.bincount(stratum_indices)
     return np.asarray(mean[stratum_indices], dtype=np.float64)
 
 
 def _assign_equal_bins(values: FloatArray) -> IntArray:
-    """(n,): bin numbers of values (n,), in bins of equal count as far as equal values allow."""
+    """Assign bin numbers (n,) to values (n,), in bins of equal count as far as equal values allow."""
     edges = np.unique(np.quantile(values, np.linspace(0, 1, _BIN_COUNT + 1)[1:-1]))
     return np.unique(np.searchsorted(edges, values, side="right"), return_inverse=True)[1].astype(np.int64)
 
@@ -250,8 +256,8 @@ def _has_sign(state: State) -> bool:
 def describe_region(
     kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, is_one_stratum: bool
 ) -> str:
-    """Words for a region of the state, such as "near x = 12 mm". bins: first and last of it, and the number of all.
-    centre: mean state of the mismatch in it."""
+    """Describe a region of the state, such as "near x = 12 mm". bins: its first and last bin, and the number of all
+    bins. centre: mean of the state in the region, weighted by the mismatch's power, in `unit`."""
     first_bin, last_bin, bin_count = bins
     is_lowest, is_highest = first_bin == 0, last_bin == bin_count - 1
     if kind == "time":
@@ -266,10 +272,15 @@ def describe_region(
 
 
 def describe_dependence(symbol: str, means: FloatArray) -> str:
-    """Words for the trend of the bin means: by the sign of the state where their sign changes, else depending on it.
-    means: over bins of equal count, in the order of the state."""
-    lower, upper = means[: len(means) // 2].mean(), means[len(means) // 2 :].mean()
-    largest = max(abs(lower), abs(upper))
-    if largest > 0 and lower * upper < 0 and min(abs(lower), abs(upper)) > largest / 3:
+    """Describe the trend of the bin means: by the sign of the state where the means of the lower and the upper half
+    have opposite signs and the smaller is more than a third (chosen) of the larger, else depending on it. means: over
+    bins of equal count, in the order of the state."""
+    lower_mean, upper_mean = means[: len(means) // 2].mean(), means[len(means) // 2 :].mean()
+    largest_magnitude = max(abs(lower_mean), abs(upper_mean))
+    if (
+        largest_magnitude > 0
+        and lower_mean * upper_mean < 0
+        and min(abs(lower_mean), abs(upper_mean)) > largest_magnitude / 3
+    ):
         return f"by the sign of {symbol}"
     return f"depending on {symbol}"

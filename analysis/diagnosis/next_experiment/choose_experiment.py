@@ -1,4 +1,4 @@
-"""Optimal design of experiments for model discrimination: which recordings separate the named effect from its rivals?
+"""Choose the recordings that best discriminate the named effect from its rivals (optimal experiment design).
 
 Method of Hunter and Reiner (Technometrics 7:307, 1965): the experiment with the largest difference between the
 predictions of both models after the rival's parameters are re-tuned. The information of the existing recordings is the
@@ -22,16 +22,16 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment
-from analysis.diagnosis.settings import TELLING_GAIN
+from analysis.diagnosis.settings import DISCRIMINATING_GAIN
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 MOST_RECORDINGS = 3
-"""Largest number of recordings that are proposed together. Chosen heuristically."""
+"""Largest number of recordings that are proposed together. Chosen."""
 RETUNING_STEPS = 3
-"""Largest number of Gauss-Newton steps of the rival's re-tuning. Chosen heuristically."""
+"""Largest number of Gauss-Newton steps of the rival's re-tuning. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +53,8 @@ class PredictedGain:
     gain: float
     """Expected log-likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
     shared: float = 0.0
-    """The same with the `MOST_RECORDINGS`-th part of the prior information; such gains add up to a lower bound of the
-    joint gain of several recordings (module docstring)."""
+    """The gain with the prior information shared by `MOST_RECORDINGS` recordings, at most `gain`; such gains add up to
+    a lower bound of the joint gain of several recordings (module docstring)."""
 
 
 def predict_gains(
@@ -70,7 +70,7 @@ def predict_gains(
 
 @dataclass(frozen=True, slots=True)
 class ExperimentSet:
-    """Experiments proposed together, and the rivals that they discriminate; empty where no experiment would."""
+    """Experiments proposed together, and the rivals that they discriminate; empty where no experiment discriminates."""
 
     experiments: tuple[Experiment, ...]
     discriminated: tuple[int, ...]
@@ -80,9 +80,10 @@ class ExperimentSet:
 
 
 def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
-    """Choose recordings that discriminate the rivals of one effect (gain of at least `TELLING_GAIN`). If single
-    recordings discriminate all rivals, that with the largest gain per minute; else a greedy set cover: each next
-    recording reduces the missing gain most per minute. predicted: per rival, the gains of one menu, in its order."""
+    """Choose recordings that discriminate the rivals of one effect (gain of at least `DISCRIMINATING_GAIN`). If single
+    recordings discriminate all rivals, that with the largest gain per minute is chosen; else a greedy set cover, in
+    which each next recording reduces the missing gain most per minute. predicted: per rival, the gains of one menu, in
+    its order."""
     single_gains, shared_gains = (
         np.array(
             [[float(getattr(prediction, name)) for prediction in rival_gains] for rival_gains in predicted]
@@ -97,9 +98,9 @@ def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> Experime
     rivals = [
         int(index)
         for index in np.argsort(-largest_gain_by_rival, kind="stable")
-        if largest_gain_by_rival[index] >= TELLING_GAIN
+        if largest_gain_by_rival[index] >= DISCRIMINATING_GAIN
     ]
-    # Where no set discriminates all rivals, the rival with the smallest gain is left out.
+    # Where no set discriminates all remaining rivals, the one with the smallest gain is removed.
     while rivals:
         chosen = _choose_single(single_gains[rivals], duration_min) or _choose_cover(shared_gains[rivals], duration_min)
         if chosen:
@@ -115,67 +116,80 @@ def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> Experime
 
 
 def _choose_single(gains: FloatArray, duration_min: FloatArray) -> list[int]:
-    """Index of the recording that alone discriminates all rivals, with the largest gain per minute; empty where none
-    does. gains: (rivals, menu); duration_min: (menu,)."""
+    """Choose the index of the recording that alone discriminates all rivals, with the largest gain per minute; empty
+    where none does. gains: (rivals, menu); duration_min: (menu,), minutes."""
     smallest_gain = gains.min(axis=0)
-    if not (smallest_gain >= TELLING_GAIN).any():
+    if not (smallest_gain >= DISCRIMINATING_GAIN).any():
         return []
-    return [int(np.argmax(np.where(smallest_gain >= TELLING_GAIN, smallest_gain / duration_min, -np.inf)))]
+    return [int(np.argmax(np.where(smallest_gain >= DISCRIMINATING_GAIN, smallest_gain / duration_min, -np.inf)))]
 
 
 def _choose_cover(gains: FloatArray, duration_min: FloatArray) -> list[int]:
-    """Indices of at most `MOST_RECORDINGS` recordings that together discriminate all rivals, without a redundant one;
-    empty where the greedy search finds none. gains: (rivals, menu); duration_min: (menu,)."""
+    """Choose the indices of at most `MOST_RECORDINGS` recordings that together discriminate all rivals; the first
+    chosen one that proves redundant is removed. Empty where the greedy search finds none. gains: (rivals, menu);
+    duration_min: (menu,), minutes."""
     chosen: list[int] = []
-    while (deficit := np.maximum(TELLING_GAIN - gains[:, chosen].sum(axis=1), 0.0)).any():
+    while (deficit := np.maximum(DISCRIMINATING_GAIN - gains[:, chosen].sum(axis=1), 0.0)).any():
         if len(chosen) == min(MOST_RECORDINGS, len(duration_min)):
             return []
         added_gain = np.minimum(gains, deficit[:, None]).sum(axis=0) / duration_min
         added_gain[chosen] = -np.inf
         chosen.append(int(np.argmax(added_gain)))
-    redundant = (k for k in chosen if (gains[:, [j for j in chosen if j != k]].sum(axis=1) >= TELLING_GAIN).all())
-    redundant_index = next(redundant, None)
+    redundant_indices = (
+        tested_index
+        for tested_index in chosen
+        if (
+            gains[:, [kept_index for kept_index in chosen if kept_index != tested_index]].sum(axis=1)
+            >= DISCRIMINATING_GAIN
+        ).all()
+    )
+    redundant_index = next(redundant_indices, None)
     return [index for index in chosen if index != redundant_index]
 
 
-def make_document_entry(best: ExperimentSet, effect_names: Sequence[str]) -> NextExperiment | None:
-    """Proposed recordings as an entry of the diagnosis document; None for an empty set. effect_names: name of the named
-    effect, then of each rival."""
-    if not best.experiments:
+def make_document_entry(experiment_set: ExperimentSet, effect_names: Sequence[str]) -> NextExperiment | None:
+    """Make the entry of the diagnosis document on the proposed recordings; None for an empty set. effect_names: name of
+    the named effect, then of each rival."""
+    if not experiment_set.experiments:
         return None
-    has_added_mass = any(experiment.added for experiment in best.experiments)
+    has_added_mass = any(experiment.added for experiment in experiment_set.experiments)
     weight_remark = (
         "; the recording's meta must state the weight (added_mass_kg, or added_inertia_kg_m2)" if has_added_mass else ""
     )
-    first_command, *later_commands = (experiment.words for experiment in best.experiments)
+    first_command, *later_commands = (experiment.words for experiment in experiment_set.experiments)
     place = "in these recordings together" if later_commands else "there"
     return NextExperiment(
         command="; then ".join([f"record {first_command}", *later_commands]),
-        splits=(effect_names[0], *dict.fromkeys(effect_names[1 + rival_index] for rival_index in best.discriminated)),
+        splits=(
+            effect_names[0],
+            *dict.fromkeys(effect_names[1 + rival_index] for rival_index in experiment_set.discriminated),
+        ),
         why=f"{place} their predictions differ by more than noise and tolerances can explain: the log likelihood of "
-        f"the true effect would exceed that of the others by at least {best.gain:.3g}{weight_remark}",
+        f"the true effect would exceed that of the others by at least {experiment_set.gain:.3g}{weight_remark}",
     )
 
 
 def _compute_gains(
     bench: Bench, named_fit: Fitted, rival: Fitted, information: FloatArray, experiment: Experiment
 ) -> tuple[float, float]:
-    """`gain` and `shared` of `PredictedGain` for one experiment."""
-    base = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
+    """Compute `gain` and `shared` of `PredictedGain` for one experiment; 0 where a simulation diverged. A
+    log-likelihood ratio is half a difference of squares in units of the noise."""
+    rival_signals = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
     difference = (
-        _simulate(bench, named_fit.deviations, named_fit.hypothesis, named_fit.hypothesis.point, experiment) - base
+        _simulate(bench, named_fit.deviations, named_fit.hypothesis, named_fit.hypothesis.point, experiment)
+        - rival_signals
     )
     columns = []
     for index in range(len(rival.deviations)):
-        displaced = rival.deviations.copy()
-        displaced[index] += DIFFERENCE_STEP
-        displaced_signals = _simulate(bench, displaced, rival.hypothesis, rival.hypothesis.point, experiment)
-        columns.append((displaced_signals - base) / DIFFERENCE_STEP)
+        displaced_deviations = rival.deviations.copy()
+        displaced_deviations[index] += DIFFERENCE_STEP
+        displaced_signals = _simulate(bench, displaced_deviations, rival.hypothesis, rival.hypothesis.point, experiment)
+        columns.append((displaced_signals - rival_signals) / DIFFERENCE_STEP)
     for index, free_parameter in enumerate(rival.hypothesis.parameters):
         point = rival.hypothesis.point.copy()
         point[index] += free_parameter.difference_step
         columns.append(
-            (_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base)
+            (_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - rival_signals)
             / free_parameter.difference_step
         )
     sensitivities = np.array(columns)
@@ -191,9 +205,9 @@ def _compute_gains(
 def _retune_rival(
     bench: Bench, rival: Fitted, information: FloatArray, prediction: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
-    """Sum of squared differences plus prior penalty that remains after the rival is re-tuned by Gauss-Newton steps.
-    prediction: the experiment, the difference of the predictions (samples,) in units of the noise, and the
-    sensitivities (d, samples) to the rival's parameters."""
+    """Re-tune the rival by Gauss-Newton steps, and return the sum of the remaining squared differences and of the prior
+    penalty. prediction: the experiment, the difference of the predictions (n c,) in units of the noise, and the
+    sensitivities (d, n c) to the rival's parameters."""
     experiment, difference, sensitivities = prediction
     parameter_change, deviation_count = np.zeros(len(information)), len(rival.deviations)
     target = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + difference
@@ -233,12 +247,12 @@ def _retune_rival(
 def _simulate(
     bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
 ) -> FloatArray:
-    """Simulated response and position of an experiment, flattened to (samples,), in units of the noise."""
+    """Simulate response and position of an experiment, flattened to (n c,), in units of the noise."""
     model: MechanicalModel = bench.tuning.tune(deviations)
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-        simulated = simulate_mechanism(
+        simulation = simulate_mechanism(
             model, experiment.commands, bench.sample_rate_hz, hypothesis.list_placed_effects(point), bench.hold
         )
-        signals = np.hstack([simulated.response, simulated.position])[:, : len(bench.noise)]
+        signals = np.hstack([simulation.response, simulation.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

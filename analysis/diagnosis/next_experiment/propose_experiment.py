@@ -1,4 +1,4 @@
-"""Proposes the next recordings after a search whose data cannot distinguish effects. Called by `assemble_findings`."""
+"""Propose the next recordings after a search whose data cannot distinguish effects. Called by `assemble_findings`."""
 
 from dataclasses import dataclass
 
@@ -21,12 +21,12 @@ from equalizer.effects.placing import find_place
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 3
-"""Rivals whose experiments are simulated; each takes a second or more."""
+"""Largest number of rivals whose experiments are simulated. Chosen: each takes a second or more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """Recordings of the menu that would distinguish the named effect from its rivals, with what each would gain."""
+    """Recordings of the menu that distinguish the named effect from its rivals, with their expected gain."""
 
     names: tuple[str, ...]
     """The named effect, then its rivals."""
@@ -42,8 +42,9 @@ class Proposal:
 
 
 def propose_experiment(context: SearchContext, explanation: Explanation) -> Proposal | None:
-    """Propose recordings for the first effect that some recording would distinguish from one of its rivals, else for
-    the last that has rivals; None where no rival is as good as the named effects."""
+    """Propose recordings for the first named effect that a recording of the menu distinguishes from one of its rivals,
+    else an empty set for the last effect with rivals. None where no effect has a rival that fits as well; effects that
+    depend on a recorded condition, and axes without a command, are skipped."""
     proposal = None
     for fitted_candidates in explanation.rounds[: len(explanation.steps)]:
         rivals = _select_rivals(fitted_candidates)
@@ -61,25 +62,26 @@ def propose_experiment(context: SearchContext, explanation: Explanation) -> Prop
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = list_experiments(context.tuning.model, rate_hz, axis, level)
-        predicted = [
+        predicted_gains = [
             predict_gains(bench, named_fit, rival.fitted, _compute_recorded_information(context, rival), menu)
             for rival in rivals
         ]
         names = (claim.effect.name, *(rival.newest for rival in rivals))
-        proposal = Proposal(names, axis, level, choose_experiments(predicted))
+        proposal = Proposal(names, axis, level, choose_experiments(predicted_gains))
         if proposal.document is not None:
             break
     return proposal
 
 
 def _select_rivals(fitted_candidates: tuple[FittedCandidate, ...]) -> list[FittedCandidate]:
-    """The best rivals, each of another name, that the data do not distinguish from the named effect."""
-    best = fitted_candidates[0]
+    """Select the best rivals, at most `MOST_RIVALS` of different names, that the data do not distinguish from the named
+    effect."""
+    named_candidate = fitted_candidates[0]
     rivals: dict[str, FittedCandidate] = {}
     for candidate in fitted_candidates[1:]:
         if (
-            candidate.newest != best.newest
-            and is_equal_rival(best, candidate)
+            candidate.newest != named_candidate.newest
+            and is_equal_rival(named_candidate, candidate)
             and not _has_conditions(candidate.fitted)
         ):
             rivals.setdefault(candidate.newest, candidate)
@@ -87,18 +89,22 @@ def _select_rivals(fitted_candidates: tuple[FittedCandidate, ...]) -> list[Fitte
 
 
 def _has_conditions(fitted: Fitted) -> bool:
+    """Whether an effect of the fit depends on a recorded condition, such as a temperature."""
     return any(claim.effect.with_conditions for claim in fitted.hypothesis.claims)
 
 
 def _compute_recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
-    """Information matrix of a candidate's parameters from the existing recordings, calibration included."""
+    """Compute the information matrix (d, d) of a candidate's parameters, the re-tuned ones first, from the existing
+    recordings and the calibration."""
     fitted = candidate.fitted
     effect_columns = compute_effect_columns(
         context.measure, context.tuning, fitted, stack_fit_residuals(context.measure, fitted.residuals)
     )
-    columns = np.vstack([compute_sensitivity(context, fitted.deviations, fitted.hypothesis).columns, effect_columns])
-    information = columns @ columns.T
-    t = len(fitted.deviations)
+    sensitivities = np.vstack(
+        [compute_sensitivity(context, fitted.deviations, fitted.hypothesis).columns, effect_columns]
+    )
+    information = sensitivities @ sensitivities.T
+    tuned_count = len(fitted.deviations)
     # The calibration's prior: deviations are in its standard deviations, so that each has the information 1.
-    information[:t, :t] += np.eye(t)
+    information[:tuned_count, :tuned_count] += np.eye(tuned_count)
     return np.asarray(information)

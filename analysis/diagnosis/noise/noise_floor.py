@@ -1,6 +1,6 @@
-"""Noise floor of a recording's response and position, by the first of three methods that the data allow: differences
-between repeated periods, samples at rest, spectral lines above the driven band. Called by `choose_measure` and
-`rigid_model`."""
+"""Estimate the noise floor of a recording's response and position, by the first of three methods that the data allow:
+differences between repeated periods, samples at rest, spectral lines above the driven band. Called by `choose_measure`
+and `rigid_model`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -122,12 +122,12 @@ def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> 
 def _describe_variation(signal: Signal, noise: ChannelNoise) -> list[str]:
     """Describe, in a sentence per channel, segments whose periods differ by more than noise; empty without any."""
     remarks = []
-    for index, name in enumerate(signal.channels):
-        varying = sum(segment.varies[index] for segment in noise.segments)
-        if varying:
-            substitute = "that measured at rest" if noise.more_than_rest[index] else "that of the other segments"
+    for channel, name in enumerate(signal.channels):
+        varying_count = sum(segment.varies[channel] for segment in noise.segments)
+        if varying_count:
+            substitute = "that measured at rest" if noise.more_than_rest[channel] else "that of the other segments"
             remarks.append(
-                f"{name} ({signal.quantities[index]}): {varying} of {len(noise.segments)} segments differ between "
-                f"periods by more than the quietest segment; the noise is {substitute}."
+                f"{name} ({signal.quantities[channel]}): {varying_count} of {len(noise.segments)} segments differ "
+                f"between periods by more than the quietest segment; the noise is {substitute}."
             )
     return remarks

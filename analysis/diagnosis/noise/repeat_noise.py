@@ -35,34 +35,34 @@ def estimate_repeat_noise(
 ) -> ChannelNoise:
     """Estimate the noise of each channel from the differences between periods. samples: (n, channels); periods: at
     least two of each segment; lines_hz: (lines,), frequencies of the estimated density."""
-    spreads = [_estimate_spread(recording, samples, period, lines_hz) for period in periods]
+    segment_estimates = [_estimate_period_variance(recording, samples, period, lines_hz) for period in periods]
     density, freedom = (
-        np.stack([spread for spread, _ in spreads]),
-        np.stack([spread_freedom for _, spread_freedom in spreads]),
+        np.stack([segment_density for segment_density, _ in segment_estimates]),
+        np.stack([segment_freedom for _, segment_freedom in segment_estimates]),
     )
     variance = density.mean(axis=1)
-    is_moving = _find_moving_channels(samples, periods)
+    is_moving = _mask_moving_channels(samples, periods)
     is_pooled = is_moving & mask_quietest(np.where(is_moving, variance, np.inf), freedom)
     weights = np.where(is_pooled, freedom, 0.0)
     pooled_density = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
     pooled_freedom = weights.sum(axis=0)
-    varies = np.asarray(is_moving & ~is_pooled)
+    is_varying = np.asarray(is_moving & ~is_pooled)
     smoothed_density = smooth_over_lines(pooled_density, _SMOOTHED_LINES)
     smoothed_density *= pooled_density.mean(axis=0) / np.maximum(smoothed_density.mean(axis=0), _SMALLEST_NORMAL)
-    floor, above_rest = _limit_to_rest_noise(
-        recording, samples, smoothed_density, pooled_freedom, np.asarray(varies.any(axis=0))
+    limited_density, is_above_rest = _limit_to_rest_noise(
+        recording, samples, smoothed_density, pooled_freedom, np.asarray(is_varying.any(axis=0))
     )
-    total_density, rounding = add_repeating_rounding(floor, samples)
+    total_density, rounding = add_repeating_rounding(limited_density, samples)
     segments = tuple(
         SegmentNoise(
             period.index,
             period.segment.amplitude,
-            variance[row],
-            freedom[row],
-            tuple(is_pooled[row].tolist()),
-            tuple(varies[row].tolist()),
+            variance[segment_row],
+            freedom[segment_row],
+            tuple(is_pooled[segment_row].tolist()),
+            tuple(is_varying[segment_row].tolist()),
         )
-        for row, period in enumerate(periods)
+        for segment_row, period in enumerate(periods)
     )
     return ChannelNoise(
         np.sqrt(total_density.mean(axis=0)),
@@ -70,7 +70,7 @@ def estimate_repeat_noise(
         pooled_freedom,
         rounding,
         segments,
-        tuple(above_rest.tolist()),
+        tuple(is_above_rest.tolist()),
     )
 
 
@@ -88,10 +88,10 @@ def add_repeating_rounding(density: FloatArray, samples: FloatArray) -> tuple[Fl
 def mask_quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
     """Mask (rows, channels) of the variances that are not significantly larger than the smallest of their column (F
     test, `_SIGNIFICANCE`). variance, freedom: (rows, channels), variances and their degrees of freedom."""
-    smallest = np.argmin(variance, axis=0)
+    quietest_rows = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
-    bound = _compute_largest_ratio(freedom, freedom[smallest, columns])
-    return np.asarray(variance <= bound * variance[smallest, columns], dtype=np.bool_)
+    largest_ratio = _compute_largest_ratio(freedom, freedom[quietest_rows, columns])
+    return np.asarray(variance <= largest_ratio * variance[quietest_rows, columns], dtype=np.bool_)
 
 
 def count_equal_lines(density: FloatArray) -> FloatArray:
@@ -101,7 +101,7 @@ def count_equal_lines(density: FloatArray) -> FloatArray:
     return np.maximum(line_count, 1.0)
 
 
-def _estimate_spread(
+def _estimate_period_variance(
     recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Estimate the density (lines, channels) of the variance between the periods of a segment, interpolated to
@@ -114,7 +114,7 @@ def _estimate_spread(
     return density, freedom
 
 
-def _find_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
+def _mask_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
     """Mask (segments, channels) of the channels that move by at least `_LEAST_STEPS` rounding steps; True in all
     segments for a channel that moves by less in all of them."""
     rounding_steps = np.array([find_rounding_step(channel) for channel in samples.T])
@@ -125,27 +125,28 @@ def _find_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Ma
 
 
 def _limit_to_rest_noise(
-    recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: Mask
+    recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, is_varying: Mask
 ) -> tuple[FloatArray, Mask]:
-    """Replace the density by the noise at rest in channels with varying variance (`varied`) that significantly exceed
-    it, except at lines with a significantly lower density. Returns density (lines, channels) and mask (channels,) of
-    these channels. density: smoothed over lines; freedom: (channels,), of its mean over lines."""
-    no_channels = np.zeros(len(varied), dtype=np.bool_)
+    """Replace the density by the noise at rest in channels with varying variance (`is_varying`) that significantly
+    exceed it, except at lines with a significantly lower density. Returns density (lines, channels) and mask
+    (channels,) of these channels; unchanged, and False, where the recording has no noise at rest. density: smoothed
+    over lines; freedom: (channels,), of its mean over lines."""
+    no_channel = np.zeros(len(is_varying), dtype=np.bool_)
     fast_noise = estimate_fast_rest_noise(recording, samples)
-    if fast_noise is None or not varied.any():
-        return density, no_channels
-    at_rest = mask_quietest(fast_noise.variance, fast_noise.freedom)
-    weights = np.where(at_rest, fast_noise.freedom, 0.0)
+    if fast_noise is None or not is_varying.any():
+        return density, no_channel
+    is_quietest = mask_quietest(fast_noise.variance, fast_noise.freedom)
+    weights = np.where(is_quietest, fast_noise.freedom, 0.0)
     rest_variance = np.sum(weights * fast_noise.variance, axis=0) / weights.sum(axis=0)
-    above_rest = (
-        varied
+    is_above_rest = (
+        is_varying
         & (density.mean(axis=0) > _compute_largest_ratio(freedom, weights.sum(axis=0)) * rest_variance)
         & (rest_variance > 0)
     )
     # Taking the smaller of two estimates of the same noise would be biased: a line keeps only a much lower density.
     line_freedom = np.maximum(freedom * _SMOOTHED_LINES / len(density), 1.0)
     is_lower = rest_variance > _compute_largest_ratio(weights.sum(axis=0), line_freedom) * density
-    return np.where(above_rest & ~is_lower, rest_variance, density), np.asarray(above_rest, dtype=np.bool_)
+    return np.where(is_above_rest & ~is_lower, rest_variance, density), np.asarray(is_above_rest, dtype=np.bool_)
 
 
 def _compute_largest_ratio(freedom: FloatArray, denominator_freedom: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ def make_real_answer(
     nominal: Mapping[str, float],
 ) -> RealAnswer:
     """Make the document of a real recording from the findings of its diagnosis. names: folder, recording, title.
-    nominal: parameters known by other means, in SI (see `list_own_parameters`). Fields that only the caller can
+    nominal: parameters known by other means, in SI (see `list_model_parameters`). Fields that only the caller can
     fill (further tests, a pair, objections, duration) are left empty."""
     diagnosis, black_box = findings.diagnosis, findings.black_box
     folder, recording_name, title = names
@@ -57,7 +57,7 @@ def make_real_answer(
         effects=tuple(effect.effect for effect in diagnosis.effects),
         left=describe_remainder(diagnosis, extract_device(findings)),
         remarks=findings.remarks,
-        numbers=list_own_parameters(findings, nominal),
+        numbers=list_model_parameters(findings, nominal),
         stretches=list_held_out_stretches(findings.time_series),
         excerpt=select_excerpt(findings.time_series),
         further=(),
@@ -166,9 +166,9 @@ def _compute_relative_change(series: TimeSeries, start: int, stop: int) -> Float
     return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / channel_std))
 
 
-def list_own_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
-    """List mass, damping and stiffness of the re-tuned model with 95 % intervals, where it has one coordinate; else
-    empty, as where band powers were compared or errors are not known. nominal: values known by other means, in SI, by
+def list_model_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
+    """List mass, damping and stiffness of the re-tuned model with 95 % intervals. Empty where the model has more than
+    one coordinate, band powers were compared, or errors are not known. nominal: values known by other means, in SI, by
     "mass", "damping" and "stiffness".
 
     The intervals are those at the end of the search, on the samples that were fitted. Where the residual exceeds the

@@ -1,6 +1,7 @@
 """Document of the diagnosis of one real recording, format `hapteq-real-answer`, version 1: the values of a row of the
-table of real recordings, and of its section in the report. Made by `make_real_answer`, read by `real_report` and
-`real_summary`; field names are those of the file."""
+table of real recordings, and of its section in the report. Made by `make_real_answer` and
+`study.evaluation.real.diagnose_real`, stored by `real_answer_file`, read by `real_report` and `real_summary`. Field
+names are those of the file and therefore fixed."""
 
 import json
 from dataclasses import asdict
@@ -14,12 +15,14 @@ from equalizer.signals.listed_problems import ListedProblemsError
 
 FORMAT, VERSION = "hapteq-real-answer", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""Validation of all classes of the document: unknown fields, infinite numbers and NaN are refused."""
 
 Outcome = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained", "refused"]
+"""Verdict of the diagnosis as in `diagnosis.json`, or "refused" for an unsuitable recording."""
 
 
 class RealAnswerError(ListedProblemsError):
-    """A document that is no such answer. `problems`: one sentence each."""
+    """The document is not in this format. `problems`: one sentence each."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -49,7 +52,7 @@ class OwnParameter:
     low: float | None
     """Lower end of the 95 % interval; None = not known."""
     high: float | None
-    """Upper end of the 95 % interval."""
+    """Upper end of the 95 % interval; None = not known."""
     nominal: float | None
     """The value known by other means; None = not known."""
 
@@ -84,8 +87,11 @@ class PairOutcome:
     """Comparison of the device before and after a change. Errors on the held-out part of the recording from after."""
 
     changed: str
+    """What was changed on the device, in words."""
     before: str
+    """File names of the recording from before the change, joined by commas."""
     after: str
+    """File names of the recording from after the change, joined by commas."""
     verdict: Outcome
     named: tuple[str, ...]
     """Named effects in words, each with its parameters."""
@@ -114,6 +120,7 @@ class DrawnExcerpt:
     step_s: float
     """Time between samples, s."""
     measured: tuple[float, ...]
+    """Measured signal; 0 where it is missing."""
     retuned: tuple[float, ...]
     """Prediction of the re-tuned model."""
     after: tuple[float, ...]
@@ -150,15 +157,19 @@ class RealAnswer:
     left: str
     """Sentence on the unexplained remainder."""
     remarks: tuple[str, ...]
+    """Remarks of the diagnosis, as sentences."""
     numbers: tuple[OwnParameter, ...]
     """Mass, damping and stiffness of the simple model."""
     stretches: tuple[HeldOutStretch, ...]
+    """Held-out stretches, by channel."""
     excerpt: DrawnExcerpt | None
+    """Excerpt for the figure; None without held-out data."""
     further: tuple[FurtherTest, ...]
     """Predictions of other recordings of the same device."""
     pair: PairOutcome | None
     """Comparison before and after a change of the device; None where none was made."""
     objections: tuple[str, ...]
+    """Objections that an expert may raise, as sentences, from the description of the recording."""
     seconds: float
     """Duration of the diagnosis, s."""
     candidates: tuple[Candidate, ...] = ()

@@ -1,7 +1,7 @@
-"""Comparison of recordings of a faulty device with reference recordings of the same device without the fault.
+"""Compare recordings of a faulty device with reference recordings of the same device without the fault.
 
-First, faults that the recordings show directly are looked for: sensor faults in the readings, hum in a spectrum, steps
-of a quantized command, additional sensor noise. Without any, `contrast.rank_faults` tests every fault of the catalogue
+First, faults that the recordings show directly are sought: sensor faults in the readings, hum in a spectrum, steps of a
+quantized command, additional sensor noise. If there are none, `contrast.rank_faults` tests every fault of the catalogue
 by the error that it removes from a base model that is fitted to both sets of recordings. Reference recordings are
 called clean. Called by `diagnose`.
 """
@@ -30,16 +30,16 @@ SENSOR_NOISE, QUANTIZATION = "sensor_noise", "force_quantization"
 """Names of these two effects in the catalogue."""
 LARGEST_CLEAN_ERROR = 0.02
 """Relative prediction error of a model on a clean recording up to which the model is used alone to find faults. Chosen
-by hand, as `LARGEST_NOISE`."""
+by hand."""
 LARGEST_NOISE = 0.1
 """Variation between repeats, relative to the signal's standard deviation, above which it is more than sensor noise, as
-of a device with stick-slip."""
+of a device with stick-slip. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contrast:
-    """Faults that distinguish the recordings from clean ones. At most one of `sensor_fault`,
-    `signal_fault` and `comparison` is not None."""
+    """Faults that distinguish the recordings from clean ones. At most one of `sensor_fault`, `signal_fault` and
+    `comparison` is not None."""
 
     sensor_fault: Hypothesis | None
     """A sensor fault that the readings themselves show."""
@@ -48,11 +48,11 @@ class Contrast:
     comparison: Comparison | None
     """Test of every fault with a base model; None also where the recordings do not allow it."""
     decision: Decision | None
-    """The fault that `comparison` names, and its candidates."""
+    """The fault that `comparison` names, and its candidates; None without a comparison."""
 
     def withdraw_name(self, reason: str) -> "Contrast":
-        """The result with the fault that `decision` names made a candidate, for the reason `why_not`. Faults that the
-        recordings show directly stay named."""
+        """Return the result in which the fault that `decision` names is a candidate. reason: its `why_not`. Faults that
+        the recordings show directly stay named."""
         if self.decision is None or self.decision.named is None:
             return self
         candidates = ((self.decision.named, reason), *self.decision.unnamed)
@@ -60,11 +60,11 @@ class Contrast:
 
     @property
     def is_unexplained(self) -> bool:
-        """Whether faulty and clean recordings differ significantly (`Comparison.differ`), and no fault is named that
-        explains the difference."""
+        """Whether the comparison finds a significant difference between faulty and clean recordings
+        (`Comparison.has_difference`) and no fault is named; False without a comparison."""
         if self.comparison is None or self.decision is None or self.decision.named is not None:
             return False
-        return self.comparison.sets_differ
+        return self.comparison.has_difference
 
     @property
     def named_effects(self) -> frozenset[str]:
@@ -88,8 +88,8 @@ class Contrast:
         """
         if self.named_effects:
             return not (residual_is_noise or names & self.named_effects)
-        differ = self.comparison is None or self.comparison.sets_differ
-        return not differ and bool(names & self.tested_effects)
+        sets_differ = self.comparison is None or self.comparison.has_difference
+        return not sets_differ and bool(names & self.tested_effects)
 
     @property
     def tested_effects(self) -> frozenset[str]:
@@ -102,15 +102,17 @@ class Contrast:
 def find_contrast(
     recordings: Sequence[Recording], clean: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget
 ) -> Contrast:
-    """The difference between recordings and clean ones: the first fault that the recordings show directly, else the
-    comparison of all faults by base models. excluded: names of effects that are not considered."""
+    """Find the difference between recordings and clean ones: the first fault that the recordings show directly, else
+    the comparison of all faults by base models. excluded: names of effects that are not considered."""
     effects = [effect for effect in CATALOGUE if effect.name not in excluded]
     sensor_faults = find_sensor_faults(recordings, clean, effects)
     if sensor_faults:
         return Contrast(sensor_faults[0], None, None, None)
-    faulty, references = split_into_parts(recordings), split_into_parts(clean)
-    for name, detect in ((HUM, find_hum), (QUANTIZATION, find_quantization), (SENSOR_NOISE, find_sensor_noise)):
-        signal_fault = detect(faulty, references) if faulty and references and name not in excluded else None
+    faulty_parts, clean_parts = split_into_parts(recordings), split_into_parts(clean)
+    for name, find_fault in ((HUM, find_hum), (QUANTIZATION, find_quantization), (SENSOR_NOISE, find_sensor_noise)):
+        signal_fault = (
+            find_fault(faulty_parts, clean_parts) if faulty_parts and clean_parts and name not in excluded else None
+        )
         if signal_fault is not None:
             return Contrast(None, signal_fault, None, None)
     comparison = rank_faults(recordings, clean, excluded, time_left)
@@ -124,18 +126,18 @@ def find_contrast(
 
 def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
     """Whether the model, without re-tuning, predicts every clean recording with a relative error of at most
-    `LARGEST_CLEAN_ERROR`."""
+    `LARGEST_CLEAN_ERROR`; False where an error cannot be computed."""
     errors = [compute_prediction_error(recording, model, "all").without_gain for recording in clean]
     return all(error is not None and error <= LARGEST_CLEAN_ERROR for error in errors)
 
 
-def noise_is_from_repeats(chosen: MeasureChoice) -> bool:
+def is_noise_from_repeats(measure_choice: MeasureChoice) -> bool:
     """Whether the error measure is a free simulation, and its noise was estimated from repeats in every record and is
     at most `LARGEST_NOISE` times the standard deviation of each channel."""
-    signal_std = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
-    repeats = all(floor.method == "repeats" for floor in chosen.floors)
+    signal_std = np.nanstd(np.vstack([record.measured for record in measure_choice.measure.records]), axis=0)
+    has_repeats = all(floor.method == "repeats" for floor in measure_choice.floors)
     return (
-        repeats
-        and bool(np.all(chosen.measure.noise <= LARGEST_NOISE * signal_std))
-        and chosen.measure.name == "free simulation"
+        has_repeats
+        and bool(np.all(measure_choice.measure.noise <= LARGEST_NOISE * signal_std))
+        and measure_choice.measure.name == "free simulation"
     )

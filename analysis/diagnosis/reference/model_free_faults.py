@@ -1,4 +1,4 @@
-"""Detection of sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
+"""Detect sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
 
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
 therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`). Called by
@@ -27,7 +27,7 @@ at random: longer runs are backlash, or a sensor at rest."""
 FULL_STEP_SHARE = 0.75
 """Least median step after a repeat, relative to the median of the other steps: after backlash it is half of that or
 less."""
-STRETCH_COUNT = 3
+REFERENCE_STRETCH_COUNT = 3
 """Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
 READING_TOLERANCE = 1e-9
 """Relative difference up to which readings count as equal to a limit."""
@@ -38,22 +38,22 @@ def find_sensor_faults(
 ) -> tuple[Hypothesis, ...]:
     """Find the first fault of quantization, clipping and lost samples, in this order: at most one hypothesis, because
     quantized readings also repeat and accumulate at the largest value. reference_recordings: at least one, with the
-    channels of `recordings`; all with two or more complete samples per stretch. effects: those that may be named. Empty
+    channels of `recordings`, and two or more complete samples per stretch. effects: those that may be named. Empty
     without a fault, and where the fault found first is not among them."""
     effects_by_name = {effect.name: effect for effect in effects}
     readings = _stack_readings(recordings)
     reference_stretches = [
         stretch
         for recording in reference_recordings
-        for stretch in np.array_split(_stack_readings([recording]), STRETCH_COUNT)
+        for stretch in np.array_split(_stack_readings([recording]), REFERENCE_STRETCH_COUNT)
         if len(stretch)
     ]
-    for name, detect in (
+    for name, find_fault in (
         ("quantization", _find_quantization),
         ("sensor_clipping", _find_clipping),
         ("lost_samples", _find_lost_samples),
     ):
-        fault = detect(readings, reference_stretches)
+        fault = find_fault(readings, reference_stretches)
         if fault is not None:
             return (_make_hypothesis(effects_by_name[name], *fault),) if name in effects_by_name else ()
     return ()
@@ -80,22 +80,26 @@ def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -
     """Find quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every reference
     (0 where a reference lies on none). All channels have the fault if their steps are equal, else the one with the
     largest step. readings: (n, p); references: (samples, p) each."""
-    steps = {}
+    step_by_channel = {}
     for channel in range(readings.shape[1]):
         step = find_lattice_step(readings[:, channel])
         if step is not None and all(
             step > STEP_FACTOR * confirm_lattice_step(reference[:, channel], step) for reference in references
         ):
-            steps[channel] = step
-    has_equal_steps = bool(steps) and min(steps.values()) > (1 - STEP_TOLERANCE) * max(steps.values())
-    return _choose_channels(steps, has_equal_steps and len(steps) == readings.shape[1], readings.shape[1], "step")
+            step_by_channel[channel] = step
+    has_equal_steps = bool(step_by_channel) and min(step_by_channel.values()) > (1 - STEP_TOLERANCE) * max(
+        step_by_channel.values()
+    )
+    return _choose_channels(
+        step_by_channel, has_equal_steps and len(step_by_channel) == readings.shape[1], readings.shape[1], "step"
+    )
 
 
 def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find clipping: significantly more readings at the largest magnitude than in the references, which exceed that
     magnitude, and no more repeats below it than usual. All channels have the fault if none exceeds the largest limit,
     else the one with the largest limit. readings: (n, p); references: (samples, p) each."""
-    limits = {}
+    limit_by_channel = {}
     for channel in range(readings.shape[1]):
         limit, top_count = _count_top_readings(readings[:, channel])
         usual_count = max(
@@ -110,9 +114,11 @@ def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> Ch
             and _is_unusual(top_count, usual_count)
             and not _is_unusual(_count_repeats_below_top(readings[:, channel]), usual_repeats)
         ):
-            limits[channel] = limit
-    are_all_clipped = bool(limits) and bool(np.all(np.abs(readings) <= max(limits.values()) * (1 + READING_TOLERANCE)))
-    return _choose_channels(limits, are_all_clipped, readings.shape[1], "limit")
+            limit_by_channel[channel] = limit
+    are_all_clipped = bool(limit_by_channel) and bool(
+        np.all(np.abs(readings) <= max(limit_by_channel.values()) * (1 + READING_TOLERANCE))
+    )
+    return _choose_channels(limit_by_channel, are_all_clipped, readings.shape[1], "limit")
 
 
 def _count_repeats_below_top(values: FloatArray) -> int:
@@ -128,37 +134,41 @@ def _count_top_readings(values: FloatArray) -> tuple[float, int]:
     magnitudes = np.abs(values)
     largest_magnitude = float(magnitudes.max())
     is_at_limit = magnitudes >= largest_magnitude * (1 - READING_TOLERANCE)
-    smaller = magnitudes[~is_at_limit]
-    next_count = int(np.count_nonzero(smaller >= smaller.max() * (1 - READING_TOLERANCE))) if len(smaller) else 0
-    return largest_magnitude, int(np.count_nonzero(is_at_limit)) - next_count
+    smaller_magnitudes = magnitudes[~is_at_limit]
+    next_level_count = (
+        int(np.count_nonzero(smaller_magnitudes >= smaller_magnitudes.max() * (1 - READING_TOLERANCE)))
+        if len(smaller_magnitudes)
+        else 0
+    )
+    return largest_magnitude, int(np.count_nonzero(is_at_limit)) - next_level_count
 
 
 def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find lost samples: significantly more runs of repeats than in the references, short and followed by a full step.
     The parameter is the share of lost samples, and all channels have the fault. A sensor that rests for a while has not
     lost samples. readings: (n, p); references: (samples, p) each."""
-    repeated = _mark_repeats(readings)
+    is_repeat = _mark_repeats(readings)
     usual_count = max(float(_mark_run_starts(_mark_repeats(reference)).mean()) for reference in references) * len(
-        repeated
+        is_repeat
     )
-    run_count = int(_mark_run_starts(repeated).sum())
+    run_count = int(_mark_run_starts(is_repeat).sum())
     if (
         not _is_unusual(run_count, usual_count)
-        or repeated.sum() > LONGEST_MEAN_RUN * run_count
-        or not _has_full_steps(readings, repeated)
+        or is_repeat.sum() > LONGEST_MEAN_RUN * run_count
+        or not _has_full_steps(readings, is_repeat)
     ):
         return None
-    fraction = (float(repeated.sum()) - usual_count) / len(repeated)
+    fraction = (float(is_repeat.sum()) - usual_count) / len(is_repeat)
     return tuple(range(readings.shape[1])), {"fraction": fraction}
 
 
-def _has_full_steps(values: FloatArray, repeated: Mask) -> bool:
+def _has_full_steps(values: FloatArray, is_repeat: Mask) -> bool:
     """Whether the median step after a repeat exceeds `FULL_STEP_SHARE` of the median of the other steps, as after lost
-    samples; after backlash it is smaller. True where either kind of step does not occur. values: (n, p); repeated: as
+    samples; after backlash it is smaller. True where either kind of step does not occur. values: (n, p); is_repeat: as
     `_mark_repeats` returns it; a step is summed over the channels."""
     step_sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
-    follows_repeat = repeated[:-1] & ~repeated[1:]
-    is_regular = ~repeated[:-1] & ~repeated[1:]
+    follows_repeat = is_repeat[:-1] & ~is_repeat[1:]
+    is_regular = ~is_repeat[:-1] & ~is_repeat[1:]
     return (
         bool(np.median(step_sizes[follows_repeat]) > FULL_STEP_SHARE * np.median(step_sizes[is_regular]))
         if follows_repeat.any() and is_regular.any()
@@ -171,9 +181,9 @@ def _mark_repeats(values: FloatArray) -> Mask:
     return np.asarray((np.diff(values, axis=0) == 0).all(axis=1), dtype=np.bool_)
 
 
-def _mark_run_starts(repeated: Mask) -> Mask:
+def _mark_run_starts(is_repeat: Mask) -> Mask:
     """Mark the first repeat of each run: (n - 1,)."""
-    return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
+    return np.asarray(is_repeat & ~np.concatenate([[False], is_repeat[:-1]]), dtype=np.bool_)
 
 
 def _is_unusual(count: int, usual_count: float) -> bool:

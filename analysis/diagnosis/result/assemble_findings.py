@@ -1,4 +1,4 @@
-"""Assembles the findings of a finished search: the document (`Diagnosis`), and the data of figures and sentences.
+"""Assemble the findings of a finished search: the document (`Diagnosis`), and the data of figures and sentences.
 
 In this order: labels and re-tuned models, standard errors, mismatch maps of the given, re-tuned and completed model,
 examination of the fits (`examine_fits`), choice of the next recording, document. Called by `diagnose`.
@@ -45,8 +45,9 @@ if TYPE_CHECKING:
 def assemble_findings(
     result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: ModelErrorFloor
 ) -> Findings:
-    """The findings of a search. result.found.after: the model with the named effects, or the re-tuned model without
-    any. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
+    """Assemble the findings of a search. result.found.after: the model with the named effects, or the re-tuned model
+    without any. floors: noise of each record. names: of the recordings. learned: the residual of clean recordings,
+    counted as noise."""
     context, fits, verdict = result.context, result.found, result.judgement
     measure, tuning = context.full_measure, context.tuning
     recording, placed_effects = measure.records[0].recording, fits.after.fitted.hypothesis.list_placed_effects()
@@ -57,7 +58,7 @@ def assemble_findings(
     examination = examine_fits(result, floors[0], maps)
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
-    measure_remarks = (_describe_rest(measure), describe_model_error_floor(learned, channels), in_samples)
+    measure_remarks = (_describe_held_out_rest(measure), describe_model_error_floor(learned, channels), in_samples)
     return Findings(
         diagnosis=_build_document(result, errors, (maps, examination.localisation), proposal),
         explanation=fits,
@@ -86,7 +87,7 @@ def assemble_findings(
 
 
 def _build_models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
-    """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
+    """Build the re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, explanation = result.context.tuning, result.found
     fitted, labels = explanation.after.fitted, make_labels(recording, tuning.model)
     effects = (
@@ -97,8 +98,8 @@ def _build_models(result: SearchResult, recording: Recording) -> tuple[Mechanica
     return as_recorded(completed, recording), as_recorded(tuning.tune(explanation.retuned.fitted.deviations), recording)
 
 
-def _describe_rest(measure: ErrorMeasure) -> str:
-    """Sentence where the held-out samples contain no motion; else empty."""
+def _describe_held_out_rest(measure: ErrorMeasure) -> str:
+    """Describe in a sentence that the held-out samples contain no motion; empty where they do."""
     if not is_held_out_still(measure.records, measure.noise):
         return ""
     return (
@@ -108,16 +109,21 @@ def _describe_rest(measure: ErrorMeasure) -> str:
 
 
 def _collect_remarks(
-    leading: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
+    measure_remarks: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
-    """Remarks without repetition: `leading`, then on doubtful units, a constant force of the model, and the noise."""
-    of_noise = (remark for floor in floors for remark in floor.remarks)
-    texts = (*leading, *describe_unit_doubts(time_series), describe_unknown_units(tuning.model), *of_noise)
-    return tuple(dict.fromkeys(filter(None, texts)))
+    """Collect remarks without repetition: measure_remarks, then on doubtful and unknown units, and on the noise."""
+    noise_remarks = (remark for floor in floors for remark in floor.remarks)
+    remarks = (
+        *measure_remarks,
+        *describe_unit_doubts(time_series),
+        describe_unknown_units(tuning.model),
+        *noise_remarks,
+    )
+    return tuple(dict.fromkeys(filter(None, remarks)))
 
 
 def _measure_split_s(measure: ErrorMeasure) -> dict[str, float]:
-    """Seconds to fit, to choose and to test by."""
+    """Measure the duration (s) of the samples to fit, to choose and to test by; keys "fit", "choose", "test"."""
     rate_hz = measure.records[0].recording.sample_rate_hz
     return {
         part: sum(int(getattr(record, part).sum()) for record in measure.records) / rate_hz
@@ -126,8 +132,8 @@ def _measure_split_s(measure: ErrorMeasure) -> dict[str, float]:
 
 
 def _compute_standard_errors(result: SearchResult) -> FloatArray:
-    """Standard errors of the model's own parameters, then of the named effects' parameters; NaN where they are not
-    computed. See `compute_final_errors`."""
+    """Compute the standard errors of the model's own parameters, then of the named effects' parameters; NaN where they
+    are not computed. See `compute_final_errors`."""
     context, explanation = result.context, result.found
     own_count, effect_count = len(context.tuning.names), len(explanation.after.fitted.hypothesis.point)
     if explanation.statistic is not None:
@@ -142,14 +148,14 @@ def _compute_standard_errors(result: SearchResult) -> FloatArray:
 def _build_document(
     result: SearchResult, errors: FloatArray, examined: tuple[MismatchMaps, Localisation], proposal: "Proposal | None"
 ) -> Diagnosis:
-    """The document. errors: standard errors of all parameters. examined: mismatch maps and localisation."""
+    """Build the document. errors: standard errors of all parameters. examined: mismatch maps and localisation."""
     explanation, judgement = result.found, result.judgement
     measure, tuning, fitted = result.context.full_measure, result.context.tuning, explanation.after.fitted
-    maps, local = examined
+    maps, localisation = examined
     labels = make_labels(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judgement.verdict,
-        mismatch=list_mismatch_rows(maps.cells["before"], local.states["before"])
+        mismatch=list_mismatch_rows(maps.cells["before"], localisation.states["before"])
         or (
             ()
             if judgement.verdict == "no_mismatch"
@@ -160,7 +166,7 @@ def _build_document(
         remainder=()
         if judgement.verdict not in ("partly_explained", "unexplained")
         else list_impact_remainder(measure, explanation)
-        or list_mismatch_rows(maps.cells["after"], local.states["after"])
+        or list_mismatch_rows(maps.cells["after"], localisation.states["after"])
         or summarise_worst_channel(measure, explanation.after.score, fitted),
         fit=compute_fit_errors(measure, explanation),
         error=measure.name,
@@ -169,7 +175,7 @@ def _build_document(
 
 
 def _compute_interval_errors(result: SearchResult, errors: FloatArray) -> FloatArray:
-    """(parameters,): standard errors of the named effects' parameters for the intervals that are stated."""
+    """Compute (parameters,): standard errors of the named effects' parameters for the intervals that are stated."""
     own_count = len(result.context.tuning.names)
     if result.found.statistic is not None:
         return INTERVAL_FACTOR * errors[own_count:]
@@ -177,7 +183,8 @@ def _compute_interval_errors(result: SearchResult, errors: FloatArray) -> FloatA
 
 
 def _list_effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
-    """The named effects, with their gains on held-out data where samples were compared."""
+    """List the named effects, with their gains on held-out data where samples were compared and every step of the
+    search has its effect."""
     context, explanation = result.context, result.found
     effects = make_named_effects(explanation, _compute_interval_errors(result, errors), labels)
     if explanation.statistic is not None or len(explanation.steps) != len(effects):
@@ -187,8 +194,8 @@ def _list_effects_with_gains(result: SearchResult, errors: FloatArray, labels: L
 
 
 def _propose(context: SearchContext, explanation: Explanation, judgement: Judgement) -> "Proposal | None":
-    """Proposal of the next recording; None where no effect is named, or where recordings cannot be predicted by
-    simulation."""
+    """Propose the next recordings; None where no effect is named, where recordings cannot be predicted by simulation,
+    or no rival is as good."""
     if not judgement.named or context.full_measure.name != "free simulation" or explanation.statistic is not None:
         return None
     # Imported here: only named effects have rivals that a further recording could separate.
@@ -197,27 +204,28 @@ def _propose(context: SearchContext, explanation: Explanation, judgement: Judgem
     return propose_experiment(context, explanation)
 
 
-def list_channel_names(recording: Recording, count: int) -> tuple[str, ...]:
-    """Names of the response's channels, then of the position's, as many as `count`."""
+def list_channel_names(recording: Recording, channel_count: int) -> tuple[str, ...]:
+    """List the names of the response's channels, then of the position's, at most channel_count."""
     position = () if recording.position is None else recording.position.channels
-    return (*recording.response.channels, *position)[:count]
+    return (*recording.response.channels, *position)[:channel_count]
 
 
 def _build_time_series(measure: ErrorMeasure, explanation: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:
-    """Measured signals and those predicted at each stage, per recording."""
+    """Build, per record, the measured signals and those predicted at each stage. names: of the recordings; records
+    beyond them are numbered."""
     time_series = []
-    for index, record in enumerate(measure.records):
-        count = record.measured.shape[1]
+    for record_index, record in enumerate(measure.records):
+        channel_count = record.measured.shape[1]
         given_predicted, retuned_predicted, completed_predicted = (
-            record.measured - candidate.fitted.residuals[index] * measure.unit
+            record.measured - candidate.fitted.residuals[record_index] * measure.unit
             for candidate in (explanation.before, explanation.retuned, explanation.after)
         )
         time_series.append(
             TimeSeries(
-                name=names[index] if index < len(names) else f"recording {index + 1}",
+                name=names[record_index] if record_index < len(names) else f"recording {record_index + 1}",
                 sample_rate_hz=record.recording.sample_rate_hz,
-                channels=list_channel_names(record.recording, count),
-                units=_list_units(record.recording)[:count],
+                channels=list_channel_names(record.recording, channel_count),
+                units=_list_units(record.recording)[:channel_count],
                 measured=record.measured,
                 before=given_predicted,
                 retuned=retuned_predicted,
@@ -229,29 +237,29 @@ def _build_time_series(measure: ErrorMeasure, explanation: Explanation, names: S
 
 
 def _list_units(recording: Recording) -> tuple[str, ...]:
-    """Unit of each channel of the response, then of the position."""
+    """List the unit of each channel of the response, then of the position."""
     signals = [signal for signal in (recording.response, recording.position) if signal is not None]
     return tuple(
-        signal.unit if isinstance(signal.unit, str) else signal.unit[k]
+        signal.unit if isinstance(signal.unit, str) else signal.unit[channel]
         for signal in signals
-        for k in range(len(signal.channels))
+        for channel in range(len(signal.channels))
     )
 
 
 def list_impact_remainder(measure: ErrorMeasure, explanation: Explanation) -> tuple[Mismatch, ...]:
-    """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
-    ratio of amplitudes. For impacts, which are compared by band power because no simulation predicts single ones; empty
-    where samples were compared."""
+    """List a row for each channel whose band powers differ by more than chance (`EXPLAINED_BY_CHANCE`), the largest
+    error first; the share is the rms logarithm of the ratio of amplitudes, at most 1. For impacts, which are compared
+    by band power because no simulation predicts single ones; empty where samples were compared."""
     if explanation.statistic is None:
         return ()
     record, score = measure.records[0].recording, explanation.after.score
-    names = (*record.response.channels, *(() if record.position is None else record.position.channels))
-    errors_by_channel = np.maximum(score.fit, score.choose)
+    channel_names = (*record.response.channels, *(() if record.position is None else record.position.channels))
+    channel_errors = np.maximum(score.fit, score.choose)
     return tuple(
         Mismatch(
-            names[c], "+".join(record.command.channels), (0.0, record.sample_rate_hz / 2), None, None,
-            min(float(errors_by_channel[c] * explanation.statistic.chance[c]), 1.0), 0.0,
+            channel_names[channel], "+".join(record.command.channels), (0.0, record.sample_rate_hz / 2), None, None,
+            min(float(channel_errors[channel] * explanation.statistic.chance[channel]), 1.0), 0.0,
         )
-        for c in np.argsort(-errors_by_channel).tolist()
-        if errors_by_channel[c] > EXPLAINED_BY_CHANCE
+        for channel in np.argsort(-channel_errors).tolist()
+        if channel_errors[channel] > EXPLAINED_BY_CHANCE
     )  # fmt: skip

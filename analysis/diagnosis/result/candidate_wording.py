@@ -1,4 +1,4 @@
-"""Sentences for the user about classes of laws that the data cannot distinguish, and about unconfirmed candidates.
+"""Write sentences on classes of laws that the data cannot distinguish, and on unconfirmed candidates.
 
 A class contains a named effect and the effects that explain the held-out data equally well; where all of them belong to
 a family of `_LAW_FAMILIES`, the family's name replaces the list. Called by `wording`, `candidates`, `diagnosis_tables`,
@@ -54,7 +54,8 @@ _LAW_FAMILIES = (
         {"force_deadband", "coulomb_friction"},
     ),
 )  # fmt: skip
-"""Families of effects with similar forces or delays: (short name, beginning of a sentence, names of the members)."""
+"""Families of effects with similar forces or delays: (short name, beginning of a sentence, names of the members). A
+short name with a colon lists the members itself."""
 
 REFINEMENT_REASON = (
     "it holds the named law as a special case, and what it allows beyond that brings nothing on held-out data"
@@ -68,7 +69,7 @@ SENTENCE_COUNT = 3
 class DeviceWording:
     """Properties of the device and its recordings on which the wording depends."""
 
-    single: bool
+    is_single_axis: bool
     """Whether the device has a single axis, whose name is then left out."""
     system: UnitSystem
     """Units of the recordings."""
@@ -78,7 +79,8 @@ class DeviceWording:
 
 def format_class_noun(effect: NamedEffect) -> str:
     """Format the name of an effect with its class, such as "friction (dry friction, or 2 laws like it)"; the name of
-    the effect alone where it has no class, or no family contains the class."""
+    the effect alone where it has no class, or no family contains the class; the family's name alone where it lists the
+    members itself."""
     names = _list_class_names(effect)
     rival_count = len(names) - 1
     family = _find_family(names)
@@ -92,8 +94,8 @@ def format_class_noun(effect: NamedEffect) -> str:
 def describe_class(effect: NamedEffect) -> str:
     """Describe the effects that explain the data as well as this effect; empty where the data distinguish it from all
     others."""
-    inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
-    names = tuple(dict.fromkeys((*_list_class_names(effect), *inseparable)))
+    inseparable_names = [rival.effect for rival in effect.rivals if rival.inseparable]
+    names = tuple(dict.fromkeys((*_list_class_names(effect), *inseparable_names)))
     if len(names) < 2:
         return ""
     family = _find_family(_list_class_names(effect))
@@ -131,21 +133,27 @@ def _find_family(names: Sequence[str]) -> tuple[str, str] | None:
 
 def format_candidate(candidate: Candidate, device: DeviceWording | None = None) -> str:
     """Format a candidate: effect, place and, if there are any, parameters."""
-    place_text = format_place(candidate.place, candidate.axis, device is not None and device.single)
+    place_text = format_place(candidate.place, candidate.axis, device is not None and device.is_single_axis)
     values_text = format_candidate_parameters(candidate, device)
     return f"{get_noun(candidate.effect)} {place_text}{f', {values_text}' if values_text else ''}"
 
 
 def format_candidate_parameters(candidate: Candidate, device: DeviceWording | None = None) -> str:
-    """Format the parameters of a candidate with units; empty without parameters. device: None = not known: SI numbers
-    without units are given."""
+    """Format the parameters of a candidate with units; empty without parameters. device: None = not known; the numbers
+    are then in SI, without units, and with exponents such as e-5 instead of e-05."""
     if device is None:
         text = ", ".join(
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
         )
         return f"{text} (SI)" if text else ""
     units = {name: get_parameter_unit(candidate.effect, name, device.system) for name in candidate.parameters}
-    return format_parameters(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
+    return format_parameters(
+        candidate.effect,
+        {
+            parameter_name: Estimate(parameter_value, units[parameter_name])
+            for parameter_name, parameter_value in candidate.parameters.items()
+        },
+    )
 
 
 def describe_candidates(diagnosis: Diagnosis, device: DeviceWording | None = None) -> tuple[str, ...]:

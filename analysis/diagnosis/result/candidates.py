@@ -1,6 +1,6 @@
-"""Adds the results of force balances to a diagnosis: classes of effects, shares, candidates, and balance errors.
+"""Add the candidates and the other results of force balances to a diagnosis: classes, shares, and balance errors.
 
-A class holds effects that the data cannot distinguish; a candidate is a law that was found but is not confirmed. Gains
+A class contains effects that the data cannot distinguish; a candidate is a law that was found but not confirmed. Gains
 are fractions of the squared force error on held-out data (`judged_law`). `diagnose` calls
 `add_balances_with_given_model` where the user gave a model, `add_balances_with_fitted_model` where the model was fitted
 to the same recordings, and in both cases `collect_balance_errors`; for a fitted model `describe_linear_terms`, too.
@@ -17,7 +17,7 @@ from analysis.diagnosis.document import Candidate, Diagnosis, FoundLaw, NamedEff
 from analysis.diagnosis.effect_words import get_noun, get_place
 from analysis.diagnosis.result.candidate_wording import REFINEMENT_REASON
 from analysis.diagnosis.result.findings import BalanceErrors
-from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_OF_CEILING
+from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_CEILING_SHARE
 from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import shorten_axis_name
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 
 _NAME, _FREE_PARAMETER, _AXIS_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
-"""Regular expressions: names in a formula; its free parameters; position, velocity (v) or command (f) of an axis."""
+"""Regular expressions: names in a formula; its free parameters; position, velocity (v) or command (f) of an axis; below
+that, unsigned numbers."""
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
 MOST_CANDIDATES = 6
 """Largest number of candidates that a diagnosis lists. Chosen by hand."""
@@ -46,8 +47,6 @@ SPECIAL_CASE = (
 EQUALLY_GOOD = "equally good in its place on held-out data"
 DELAY_EFFECTS = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """Effects that delay a signal: with a single measured response, a late command and a late reading are equivalent."""
-
-
 LINEAR_DYNAMICS = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
 
 
@@ -74,20 +73,20 @@ def add_balances_with_given_model(
     balance_candidates = [
         _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.linear else law, axis, channels)
         for axis, law in sorted(judged_laws, key=lambda entry: (_rank_law(entry[1]), -entry[1].gain))
-        if law.share >= LAW_OF_CEILING and law.gain >= FURTHER_LAW_GAIN
+        if law.share >= LAW_CEILING_SHARE and law.gain >= FURTHER_LAW_GAIN
     ]
     ranked = sorted((*unconfirmed, *balance_candidates), key=lambda candidate: -candidate.held_out_gain)
-    listed = [candidate for candidate in ranked if (candidate.effect, candidate.axis) not in named_keys]
-    return replace(diagnosis, effects=effects, candidates=_deduplicate(listed)[:MOST_CANDIDATES])
+    unnamed = [candidate for candidate in ranked if (candidate.effect, candidate.axis) not in named_keys]
+    return replace(diagnosis, effects=effects, candidates=_deduplicate(unnamed)[:MOST_CANDIDATES])
 
 
 def _find_class(effect: NamedEffect, equivalents: tuple[str, ...]) -> tuple[str, ...]:
-    """Class of an effect: its name and its rivals that neither simulation nor balance can distinguish from it; empty
-    without such rivals. equivalents: rivals by the balance."""
-    distinguished = {rival.effect for rival in effect.rivals if not rival.inseparable}
-    names = [rival.effect for rival in effect.rivals if rival.inseparable]
-    names += [name for name in equivalents if name not in distinguished]
-    return tuple(dict.fromkeys((effect.effect, *names))) if names else ()
+    """Find the class of an effect: its name and its rivals that neither simulation nor balance can distinguish from it;
+    empty without such rivals. equivalents: rivals by the balance."""
+    distinguished_names = {rival.effect for rival in effect.rivals if not rival.inseparable}
+    class_names = [rival.effect for rival in effect.rivals if rival.inseparable]
+    class_names += [name for name in equivalents if name not in distinguished_names]
+    return tuple(dict.fromkeys((effect.effect, *class_names))) if class_names else ()
 
 
 def add_balances_with_fitted_model(
@@ -125,13 +124,13 @@ def add_balances_with_fitted_model(
         if law.formula is None or (law.simulated_as, shorten_axis_name(channels[axis], channels)) not in named_keys
     ]
     ranked += [(1, candidate) for candidate in unconfirmed]
-    listed = [c for _, c in sorted(ranked, key=lambda entry: entry[0]) if (c.effect, c.axis) not in named_keys]
+    unnamed = [c for _, c in sorted(ranked, key=lambda entry: entry[0]) if (c.effect, c.axis) not in named_keys]
     retuned = {**diagnosis.retuned, **unnamed_constants}
     verdict = diagnosis.verdict
     if not effects and diagnosis.effects:
         verdict = "parameters" if verdict == "explained" else "unexplained"
     return replace(
-        diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_deduplicate(listed)[:MOST_CANDIDATES]
+        diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_deduplicate(unnamed)[:MOST_CANDIDATES]
     )
 
 
@@ -150,24 +149,24 @@ def _find_matching_law(
 
 
 def _extract_form(formula: str) -> list[str]:
-    """Signals and functions of a formula in their order, without numbers and free parameters, to compare formulas. The
-    axis's own signals get the names of a balance (x, vx and fx become q, v and f)."""
+    """Extract the signals and functions of a formula in their order, without numbers and free parameters, to compare
+    formulas. Signals of an axis get the names of a balance (x, vx and fx become q, v and f)."""
     names = (_FREE_PARAMETER.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
     return [_AXIS_SIGNAL.sub(lambda match: match[1] or "q", name) for name in names if name]
 
 
 def _list_covered_names(effect: NamedEffect) -> tuple[str, ...]:
-    """Names that are not candidates once the effect is named: its own, those of its class, and its refinements."""
-    refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINEMENT_REASON)
-    return (effect.effect, *effect.class_, *refined)
+    """List the names that are no candidates once the effect is named: its own, its class, and its refinements."""
+    refinement_names = (rival.effect for rival in effect.rivals if rival.why_not == REFINEMENT_REASON)
+    return (effect.effect, *effect.class_, *refinement_names)
 
 
 def _rank_law(judged_law: "JudgedLaw") -> int:
-    """Rank of a candidate, 0 first. 0: physically possible parameters and a significant gain; 1: other laws; 2: linear
-    dynamics of a higher order; 3: laws that explain almost nothing (`LAW_OF_CEILING`)."""
+    """Rank a candidate, 0 first. 0: physically possible parameters and a significant gain; 1: other laws; 2: linear
+    dynamics of a higher order; 3: laws that explain almost nothing (`LAW_CEILING_SHARE`)."""
     if judged_law.law.linear:
         return 2
-    if judged_law.share < LAW_OF_CEILING:
+    if judged_law.share < LAW_CEILING_SHARE:
         return 3
     return 0 if judged_law.is_physical and (judged_law.gain_low > 0 or judged_law.confirmed_by_folds) else 1
 
@@ -175,17 +174,17 @@ def _rank_law(judged_law: "JudgedLaw") -> int:
 def describe_linear_terms(
     balances: "Sequence[Balance]", channels: tuple[str, ...], in_samples: bool = False
 ) -> tuple[str, ...]:
-    """Remarks on the linear terms of the fitted model other than mass, damping and stiffness. in_samples: whether times
+    """Describe the linear terms of the fitted model other than mass, damping and stiffness. in_samples: whether times
     are in samples, for recordings without a time axis."""
     remarks = []
     for channel, balance in zip(channels, balances, strict=False):
-        linear_part, motion = balance.search.regression.base_terms, balance.search.regression.motions[0]
+        base_terms, motion = balance.search.regression.base_terms, balance.search.regression.motions[0]
         law_names = [law.effect for law in balance.linear_laws]
-        delay_text = f"{linear_part.delay_s:.3g} samples" if in_samples else f"{1e3 * linear_part.delay_s:.3g} ms"
-        term_texts = [f"a delay of the command of {delay_text} (or a lag)"] if linear_part.delay_s else []
+        delay_text = f"{base_terms.delay_s:.3g} samples" if in_samples else f"{1e3 * base_terms.delay_s:.3g} ms"
+        term_texts = [f"a delay of the command of {delay_text} (or a lag)"] if base_terms.delay_s else []
         term_texts += [get_noun(name) for name in dict.fromkeys(law_names)]
         if len(motion.channels) > len(balances):
-            further_motions = [name for k, name in enumerate(motion.channels) if k != linear_part.driven_channel]
+            further_motions = [name for index, name in enumerate(motion.channels) if index != base_terms.driven_channel]
             term_texts.append(f"the motion of {conjoin(further_motions)}")
         if term_texts:
             place = f" along {channel}" if len(channels) > 1 else ""
@@ -199,34 +198,36 @@ def describe_linear_terms(
 def collect_balance_errors(
     diagnosis: Diagnosis, balances: "Sequence[Balance]", channels: tuple[str, ...]
 ) -> tuple[BalanceErrors, ...]:
-    """Errors of each axis's balance on held-out data, with the laws that the diagnosis names."""
+    """Collect the errors of each axis's balance on held-out data, without and with the named laws."""
     errors = []
     for axis, balance in enumerate(balances):
         letter = shorten_axis_name(channels[axis], channels)
-        names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-        laws = [law.law_index for law in balance.laws if law.simulated_as in names]
-        named_error = balance.compute_error(laws) if laws else balance.linear
+        named_effects = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
+        law_indices = [law.law_index for law in balance.laws if law.simulated_as in named_effects]
+        named_error = balance.compute_error(law_indices) if law_indices else balance.linear
         has_prior = balance.search.regression.prior is not None
         errors.append(
-            BalanceErrors(letter, balance.linear, named_error, balance.ceiling, bool(laws), balance.tested, has_prior)
+            BalanceErrors(
+                letter, balance.linear, named_error, balance.ceiling, bool(law_indices), balance.tested, has_prior
+            )
         )
     return tuple(errors)
 
 
 def _deduplicate(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates with each effect only once, at its highest rank; laws outside the catalogue are the same only if
+    """Remove repeated effects, each of which stays at its highest rank; laws outside the catalogue are equal only if
     their formulas and axes are. candidates: the best first."""
-    unique: dict[object, Candidate] = {}
+    unique_candidates: dict[object, Candidate] = {}
     for candidate in candidates:
         law = candidate.law
-        unique.setdefault(candidate.effect if law is None else (law.axis, law.expression), candidate)
-    return tuple(unique.values())
+        unique_candidates.setdefault(candidate.effect if law is None else (law.axis, law.expression), candidate)
+    return tuple(unique_candidates.values())
 
 
 def _compute_explained_share(balance: "Balance", law: "JudgedLaw") -> float:
-    """Share of the linear model's held-out error power that a law removes, 0 to 1. `JudgedLaw.share` is relative to the
-    decrease by all laws together, and is converted; only for a law of the command it is relative to the linear model's
-    error, as required."""
+    """Compute the share of the linear model's held-out error power that a law removes, 0 to 1. `JudgedLaw.share` is
+    relative to the decrease by all laws together, and is converted; that of a law of the command is already relative to
+    the linear model's error."""
     total_share = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
     return min(max(total_share * law.share, 0.0), 1.0)
 
@@ -267,7 +268,7 @@ def is_refinement_of(effect: str, special_case: str) -> bool:
 def _make_candidate(
     judged_law: "JudgedLaw", axis: str, channels: tuple[str, ...], effects: Sequence[NamedEffect] = ()
 ) -> Candidate:
-    """A law of a balance as a candidate of the document. axis: its letter. effects: the named effects."""
+    """Make a candidate of the document from a law of a balance. axis: its letter. effects: the named effects."""
     has_named_special_case = any(
         is_refinement_of(judged_law.law.effect, effect.effect) and effect.axis == axis for effect in effects
     )
@@ -287,7 +288,7 @@ def _make_candidate(
 
 
 def _write_found_law(judged_law: "JudgedLaw", axis: str, channels: tuple[str, ...]) -> FoundLaw | None:
-    """The formula of a law outside the catalogue, as the document writes it; None without valid parameters."""
+    """Write the formula of a law outside the catalogue for the document; None without a formula or axis letter."""
     # Imported on demand: few diagnoses have such a law.
     from analysis.diagnosis.confirm.laws_for_simulation import write_law
     from equalizer.effects.discovered_law import derive_axis_letters

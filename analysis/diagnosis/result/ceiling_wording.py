@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
-from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
+from analysis.diagnosis.settings import CONFIRMED_FIT_RATIO, EQUAL_ERROR_RATIO
 from analysis.diagnosis.unit_wording import format_error, format_error_of_signal, format_share
 from analysis.wording import capitalise
 
@@ -36,14 +36,14 @@ def describe_black_box(black_box: BlackBox | None, is_effect_named: bool) -> str
             f"{fit_text} {errors_text}. The black box predicts better: the data contain structure that no named effect "
             "explains."
         )
-    if black_box.physics_error * SAME_TO_READERS < black_box.test_error:
+    if black_box.physics_error * EQUAL_ERROR_RATIO < black_box.test_error:
         return f"{fit_text} {errors_text}. {capitalise(physics_name)} predicts better."
     return f"{fit_text} {errors_text}: the black box does not predict better."
 
 
 def is_black_box_better(black_box: BlackBox) -> bool:
-    """Whether the held-out error of the black box is smaller by more than the factor `SAME_TO_READERS`."""
-    return black_box.test_error * SAME_TO_READERS < black_box.physics_error
+    """Whether the held-out error of the black box is smaller by more than the factor `EQUAL_ERROR_RATIO`."""
+    return black_box.test_error * EQUAL_ERROR_RATIO < black_box.physics_error
 
 
 def describe_ceiling(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ def describe_error_change(
     first_error, last_error = getattr(errors, first_stage[0]), getattr(errors, last_stage[0])
     if first_error is None or last_error is None:
         return "how much better it predicts held-out data is not known"
-    verb = "falls" if last_error * SAME_TO_READERS < first_error else "goes"
+    verb = "falls" if last_error * EQUAL_ERROR_RATIO < first_error else "goes"
     return (
         f"the error on held-out data {verb} from {format_error_of_signal(first_error)} ({first_stage[1]}) to "
         f"{format_error(last_error)} ({last_stage[1]}){_describe_noise(errors, last_error, noise_method)}"
@@ -141,7 +141,7 @@ def describe_confirmation(fit: Errors, test: Errors) -> str:
             f"({format_error_of_signal(test.retuned)} compared with {format_error(test.after)})."
         )
     test_ratio, fit_ratio = test.after / test.noise, fit.after / fit.noise
-    if test_ratio > FIT_CONFIRMED * max(fit_ratio, 1.0):
+    if test_ratio > CONFIRMED_FIT_RATIO * max(fit_ratio, 1.0):
         return (
             f"The held-out data confirm this only in part: the error is {format_ratio(test_ratio)} the noise there and "
             f"{format_ratio(fit_ratio)} the noise on the fitted data."

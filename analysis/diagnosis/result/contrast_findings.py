@@ -17,7 +17,7 @@ from analysis.diagnosis.effect_words import get_parameter_unit
 from analysis.diagnosis.reference.compare_with_reference import Contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, SETS_AS_ONE
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, SAME_DEVICE_EXCESS
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
@@ -89,12 +89,16 @@ def _apply_comparison(
     diagnosis: Diagnosis, comparison: Comparison, decision: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
     """Put the decision of a comparison into a diagnosis. Without a named fault the verdict is `no_mismatch` where the
-    excess is at most `SETS_AS_ONE`, else `unexplained`. Errors are those of the faulty set."""
+    excess is at most `SAME_DEVICE_EXCESS`, else `unexplained`. Errors are those of the faulty set."""
     judged_fault = decision.named
     named_effects = () if judged_fault is None else (_name_fault(judged_fault, decision, recording, system),)
     candidates = tuple(_make_candidate(law, reason, recording) for law, reason in decision.unnamed)
     verdict: Verdict = (
-        "partly_explained" if named_effects else "no_mismatch" if comparison.excess <= SETS_AS_ONE else "unexplained"
+        "partly_explained"
+        if named_effects
+        else "no_mismatch"
+        if comparison.excess <= SAME_DEVICE_EXCESS
+        else "unexplained"
     )
     fit = Fit(
         _compute_errors(
@@ -109,13 +113,14 @@ def _apply_comparison(
         ),
     )
     error_kind = "predicted force" if comparison.by_force else f"windows of {comparison.step_s:.6f} s"
-    updated = _replace_effects(diagnosis, verdict, named_effects, candidates[:MAX_LISTED_CANDIDATES])
-    return replace(updated, fit=fit, error=error_kind)
+    updated_diagnosis = _replace_effects(diagnosis, verdict, named_effects, candidates[:MAX_LISTED_CANDIDATES])
+    return replace(updated_diagnosis, fit=fit, error=error_kind)
 
 
 def _compute_errors(comparison: Comparison, squares_before: float, squares_after: float) -> Errors:
     """Compute the errors of the faulty set before and after the fault is undone in its signals (`comparison`), rms over
-    the rms of its signal. squares_before, squares_after: sums of squared errors."""
+    the rms of its signal. No model is re-tuned, so that both errors before are equal; the noise is not known.
+    squares_before, squares_after: sums of squared errors."""
     relative_errors = [
         float(np.sqrt(square_sum / comparison.faulty_sample_count)) * comparison.faulty_share
         for square_sum in (squares_before, squares_after)
@@ -157,7 +162,9 @@ def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: Uni
             units.get(name, "1"),
             (value - T_QUANTILE * standard_error, value + T_QUANTILE * standard_error) if standard_error else None,
         )
-        for (name, value), standard_error in zip(judged_fault.values.items(), judged_fault.spread.values(), strict=True)
+        for (name, value), standard_error in zip(
+            judged_fault.values.items(), judged_fault.standard_errors.values(), strict=True
+        )
     }
 
 
@@ -218,7 +225,11 @@ def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> Name
         if effect is None
         else {parameter.name: parameter.find_unit(LINEAR, unit) for parameter in effect.parameters}
     )
-    estimates = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
+    estimates = {
+        parameter_name: Estimate(value, units[parameter_name])
+        for parameter_name, value in values.items()
+        if parameter_name in units
+    }
     axis = shorten_axis_name(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None
     return NamedEffect(name, place, axis, 1.0, 1.0, estimates)
 

@@ -1,8 +1,8 @@
-"""Table of errors of the given, the re-tuned and the completed model, on fitted and on held-out samples.
+"""Compute the errors of the given, the re-tuned and the completed model, on fitted and on held-out samples.
 
 Errors are rms residuals over the rms of the measured signal (`compute_signal_rms`), root mean square over the channels,
 and are listed with the error that noise alone would leave. For impacts they are errors of the logarithm of band
-amplitudes instead.
+amplitudes instead. Called by `assemble_findings` and `examine_fits`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,19 +15,19 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import HELD_OUT_SURPRISE, SAME_TO_READERS, STILL_SHARE
+from analysis.diagnosis.settings import EQUAL_ERROR_RATIO, HELD_OUT_SURPRISE, STILL_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 
 def compute_fit_errors(measure: ErrorMeasure, explanation: Explanation) -> Fit:
-    """The table for the document (`Fit`). "fit" includes the samples to choose by."""
+    """Compute the errors for the document (`Fit`). Its `fit` includes the samples to choose by."""
     if explanation.statistic is not None:
         return Fit(
             *(
-                _compute_log_errors(explanation, explanation.statistic, parts)
-                for parts in (("fit", "choose"), ("test",))
+                _compute_log_errors(explanation, explanation.statistic, roles)
+                for roles in (("fit", "choose"), ("test",))
             )
         )
     return Fit(
@@ -36,17 +36,17 @@ def compute_fit_errors(measure: ErrorMeasure, explanation: Explanation) -> Fit:
 
 
 def collect_channel_errors(explanation: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
-    """Rms errors over the test samples, in units of the noise, by stage and channel."""
+    """Collect the rms errors over the test samples, in units of the noise, by stage and channel."""
     stages = {"before": explanation.before, "retuned": explanation.retuned, "after": explanation.after}
     return {stage: dict(zip(names, candidate.score.test.tolist(), strict=True)) for stage, candidate in stages.items()}
 
 
-def _compute_log_errors(explanation: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
-    """Rms over the channels of the error of ln a (`band_power`), and its chance value in place of the noise. parts:
-    roles of the samples."""
+def _compute_log_errors(explanation: Explanation, statistic: Statistic, roles: tuple[str, ...]) -> Errors:
+    """Compute the rms over the channels and roles of the error of the logarithmic amplitude (`band_power`), with its
+    chance variation in place of the noise. roles: of the samples; an error that is not finite becomes None."""
 
     def compute_error(candidate: FittedCandidate) -> float | None:
-        log_errors = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
+        log_errors = np.array([getattr(candidate.score, role) for role in roles]) * statistic.chance
         mean_error = float(np.sqrt(np.mean(log_errors**2)))
         return mean_error if np.isfinite(mean_error) else None
 
@@ -56,29 +56,30 @@ def _compute_log_errors(explanation: Explanation, statistic: Statistic, parts: t
     )
 
 
-def _compute_errors(measure: ErrorMeasure, explanation: Explanation, parts: tuple[str, ...]) -> Errors:
-    """Normalised errors on the samples of these roles; None where there are none, or where held-out samples contain no
-    motion."""
-    if parts == ("test",) and is_held_out_still(measure.records, measure.noise):
+def _compute_errors(measure: ErrorMeasure, explanation: Explanation, roles: tuple[str, ...]) -> Errors:
+    """Compute the errors on the samples of these roles, relative to the signal; None where there are no samples, an
+    error is not finite, or held-out samples contain no motion."""
+    if roles == ("test",) and is_held_out_still(measure.records, measure.noise):
         return Errors(None, None, None, None)
-    masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
+    masks = [np.logical_or.reduce([getattr(record, role) for role in roles]) for record in measure.records]
     if not any(mask.any() for mask in masks):
         return Errors(None, None, None, None)
-    signal_size = np.maximum(compute_signal_rms(measure.records, masks), np.finfo(float).tiny)
+    signal_rms = np.maximum(compute_signal_rms(measure.records, masks), np.finfo(float).tiny)
 
     def compute_error(candidate: FittedCandidate) -> float | None:
-        rms = compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit / signal_size
-        mean_error = float(np.sqrt(np.mean(rms**2)))
+        error_ratios = (
+            compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit / signal_rms
+        )
+        mean_error = float(np.sqrt(np.mean(error_ratios**2)))
         return mean_error if np.isfinite(mean_error) else None
 
-    noise = float(np.sqrt(np.mean((measure.noise / signal_size) ** 2)))
+    noise = float(np.sqrt(np.mean((measure.noise / signal_rms) ** 2)))
     given_error, retuned_error, completed_error = (
-        compute_error(stage_error) for stage_error in (explanation.before, explanation.retuned, explanation.after)
+        compute_error(stage) for stage in (explanation.before, explanation.retuned, explanation.after)
     )
     # An error smaller than the noise refutes the estimate of the noise, such as one from above the driven band.
     is_noise_plausible = all(
-        stage_error is None or noise <= SAME_TO_READERS * stage_error
-        for stage_error in (given_error, retuned_error, completed_error)
+        stage is None or noise <= EQUAL_ERROR_RATIO * stage for stage in (given_error, retuned_error, completed_error)
     )
     return Errors(given_error, retuned_error, completed_error, noise if is_noise_plausible else None)
 
@@ -97,16 +98,17 @@ def is_held_out_still(records: Sequence[Observed], noise: FloatArray) -> bool:
 
 
 def _compute_mean_power(records: Sequence[Observed], masks: Sequence[Mask]) -> FloatArray:
-    """(c,): mean square of each channel about its rest value, over the masked samples."""
+    """Compute (c,): mean square of each channel about its rest value, over the masked samples."""
     deviations = [_subtract_rest(record, mask)[mask] for record, mask in zip(records, masks, strict=True)]
     return np.asarray(np.nanmean(np.concatenate(deviations) ** 2, axis=0))
 
 
 def _subtract_rest(record: Observed, mask: Mask) -> FloatArray:
-    """(n, c): speeds unchanged, because rest is zero; other channels about their mean over the masked samples."""
+    """Subtract the rest value, (n, c): 0 for speeds, for other channels their mean over the masked samples; nothing
+    where no sample is masked."""
     signals = (record.recording.response, record.recording.position)
     quantities = [quantity for signal in signals if signal is not None for quantity in signal.quantities]
-    speeds = [DERIVATIVE_OF_QUANTITY.get(quantity) == 1 for quantity in quantities[: record.measured.shape[1]]]
+    is_speed = [DERIVATIVE_OF_QUANTITY.get(quantity) == 1 for quantity in quantities[: record.measured.shape[1]]]
     if not mask.any():
         return record.measured
-    return np.asarray(record.measured - np.where(speeds, 0.0, np.nanmean(record.measured[mask], axis=0)))
+    return np.asarray(record.measured - np.where(is_speed, 0.0, np.nanmean(record.measured[mask], axis=0)))

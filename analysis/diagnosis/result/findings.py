@@ -63,7 +63,7 @@ class Signature:
     """(k,): abscissa of the measured points."""
     measured: FloatArray
     """(k,): mean of the missing force, or of the residual, at these points."""
-    spread: FloatArray
+    standard_error: FloatArray
     """(k,): standard error of that mean."""
     law_abscissa: FloatArray
     """(q,): abscissa of the law's points."""
@@ -93,6 +93,7 @@ class BalanceErrors:
     """Errors of one axis's force balance on held-out data: rms residual relative to the rms signal."""
 
     axis: str
+    """Letter of the axis."""
     linear: float
     """With mass, damping and stiffness alone."""
     named_error: float
@@ -102,7 +103,7 @@ class BalanceErrors:
     has_named_law: bool
     """Whether a law is named on this axis."""
     tested: bool = True
-    """Whether the held-out samples move enough to test laws by."""
+    """Whether the held-out samples contain enough motion to test laws."""
     is_model_given: bool = False
     """Whether the model was given: `linear` is then the error of the re-tuned model."""
 
@@ -123,15 +124,19 @@ class Findings(SummaryDisplay):
     """Findings of a diagnosis: the document (`diagnosis`), the improved model, and the data of figures and page."""
 
     diagnosis: Diagnosis
+    """The document."""
     explanation: Explanation
+    """Fits and candidates of the search."""
     given: MechanicalModel
     """The initial model; see `fitted`."""
     improved: MechanicalModel
     """The re-tuned model with the named effects among its `effects`; its inputs are the commands as recorded."""
     named: tuple[PlacedEffect, ...]
+    """The named effects with axes and fitted parameters."""
     evidence: tuple[Evidence, ...]
     """Motion, commands and residuals of the re-tuned model, per recording."""
     time_series: tuple[TimeSeries, ...]
+    """Measured and predicted signals, per recording."""
     noise_rms: Mapping[str, float]
     """Noise rms by channel, SI."""
     channel_errors: Mapping[str, Mapping[str, float]]
@@ -140,7 +145,9 @@ class Findings(SummaryDisplay):
     mismatch: tuple[Mismatch, ...]
     """All tested cells, not only the significant ones (see p_value and share)."""
     signatures: tuple[Signature, ...]
+    """Curves that show the named effects."""
     black_box: BlackBox | None
+    """Model without physics, for comparison; None where it was not fitted."""
     remarks: tuple[str, ...]
     """Remarks as sentences: assumptions, weaknesses, implausible results."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
@@ -191,7 +198,7 @@ class Findings(SummaryDisplay):
 
 
 def format_effect(effect: NamedEffect) -> str:
-    """Name and axis of the effect with its parameters and their units, on one line; values to four significant
+    """Format name and axis of the effect with its parameters and their units, on one line; values to four significant
     digits."""
     parameter_texts = ", ".join(
         f"{name} {estimate.value:.4g} {'' if estimate.unit == '1' else estimate.unit}".strip()

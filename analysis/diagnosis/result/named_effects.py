@@ -1,7 +1,8 @@
-"""The named effects for the document: parameters with intervals, rivals with reasons, probabilities.
+"""Make the named effects of the document: parameters with intervals, rivals with reasons, probabilities.
 
 A reported parameter's 95 % interval is value ± hypot(1.96 s, `INTERVAL_SHARE` value), with the standard error s
 propagated from the fit's coordinates. Probabilities of the candidates of a round fall exponentially with their errors.
+Called by `assemble_findings`, `examine_fits` and `unconfirmed_candidates`.
 """
 
 from collections.abc import Sequence
@@ -39,8 +40,8 @@ BY_CHANCE = "the error by chance alone"
 BY_NOISE = "the noise"
 """Units of errors in sentences: the difference between two simulations by chance, or the noise."""
 
-_SAME_ERROR = 0.005
-"""Relative difference of two errors below which they count as equal."""
+_EQUAL_ERROR_TOLERANCE = 0.005
+"""Relative difference of two errors up to which they count as equal. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,8 +57,8 @@ class Labels:
 
 
 def make_labels(recording: Recording, model: MechanicalModel) -> Labels:
-    """Channels of the command and the response, unit of the first response channel, and unit system and quantity of the
-    model."""
+    """Make the labels: channels of the command and the response, unit of the first response channel, and unit system
+    and quantity of the model."""
     unit = recording.response.unit
     return Labels(
         recording.command.channels,
@@ -69,12 +70,12 @@ def make_labels(recording: Recording, model: MechanicalModel) -> Labels:
 
 
 def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
-    """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,), standard
-    errors of the coordinates of the hypothesis's point (`compute_interval_errors`)."""
-    hypothesis, effects, coordinate = explanation.after.fitted.hypothesis, [], 0
+    """Make the effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,),
+    standard errors of the coordinates of the hypothesis's point (`compute_interval_errors`)."""
+    hypothesis, effects, start = explanation.after.fitted.hypothesis, [], 0
     shares = compute_step_shares(explanation.retuned, explanation.steps)
     for claim_index, claim in enumerate(hypothesis.claims):
-        coordinate_count = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
+        coordinate_count = claim.group_count * sum(not parameter.fixed for parameter in claim.effect.parameters)
         rivals, probability = _list_rivals(explanation, claim_index, labels)
         effects.append(
             NamedEffect(
@@ -84,18 +85,18 @@ def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Lab
                 share=shares[claim_index],
                 probability=probability,
                 parameters=_make_estimates(
-                    hypothesis, claim_index, errors, slice(coordinate, coordinate + coordinate_count), labels
+                    hypothesis, claim_index, errors, slice(start, start + coordinate_count), labels
                 ),
                 rivals=rivals,
                 law=extract_law(hypothesis, claim_index, find_axis_letter(claim, labels)),
             )
         )
-        coordinate += coordinate_count
+        start += coordinate_count
     return tuple(effects)
 
 
 def find_axis_letter(claim: Claim, labels: Labels) -> str | None:
-    """The axis letter of an effect's site; None where all axes share the effect."""
+    """Find the axis letter of an effect's site; None where all axes share the effect, or it has no single site."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
     is_sensor_effect = find_place(claim.effect) == "sensor"
@@ -103,40 +104,40 @@ def find_axis_letter(claim: Claim, labels: Labels) -> str | None:
     return shorten_axis_name(channels[claim.sites[0]], channels)
 
 
-def _list_rivals(explanation: Explanation, number: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
-    """The other effects tried in the round of an effect, each once, up to `MOST_RIVALS`; and the probability of the
-    named effect. number: index of the round."""
-    fitted_candidates = explanation.rounds[number]
-    error_in_limits = (
+def _list_rivals(explanation: Explanation, round_index: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
+    """List the other effects tried in the round of an effect, each once, up to `MOST_RIVALS`; also returns the
+    probability of the named effect."""
+    fitted_candidates = explanation.rounds[round_index]
+    relative_error = (
         explanation.after.score.worst_channel
         if explanation.statistic is None
         else explanation.after.score.worst_channel / EXPLAINED_BY_CHANCE
     )
     remaining_share = 1.0 if explanation.statistic is not None else _compute_remaining_share(explanation)
-    candidate_probabilities = compute_probabilities(fitted_candidates, error_in_limits, remaining_share)
-    best, by_name = fitted_candidates[0], _sum_by_name(fitted_candidates, candidate_probabilities)
+    candidate_probabilities = compute_probabilities(fitted_candidates, relative_error, remaining_share)
+    named, probability_by_name = fitted_candidates[0], _sum_by_name(fitted_candidates, candidate_probabilities)
     rivals: dict[str, Rival] = {}
     unit = BY_NOISE if explanation.statistic is None else BY_CHANCE
     for candidate in fitted_candidates[1:]:
         claim = candidate.fitted.hypothesis.claims[-1]
-        if claim.effect.name == best.newest or claim.effect.name in rivals:
+        if claim.effect.name == named.newest or claim.effect.name in rivals:
             continue
-        is_equal = is_equal_rival(best, candidate)
+        is_equal = is_equal_rival(named, candidate)
         rivals[claim.effect.name] = Rival(
             claim.effect.name,
-            by_name[claim.effect.name],
+            probability_by_name[claim.effect.name],
             is_equal,
-            _explain_rejection(best, candidate, is_equal, (labels, unit)),
+            _explain_rejection(named, candidate, is_equal, (labels, unit)),
         )
         if len(rivals) == MOST_RIVALS:
             break
-    return tuple(rivals.values()), by_name[best.newest]
+    return tuple(rivals.values()), probability_by_name[named.newest]
 
 
 def _sum_by_name(
     fitted_candidates: Sequence[FittedCandidate], candidate_probabilities: Sequence[float]
 ) -> dict[str, float]:
-    """Probability of each effect name, summed over its candidates at other axes or from other starts."""
+    """Sum the probabilities of each effect name over its candidates at other axes or from other starts, at most 1."""
     probability_by_name: dict[str, float] = {}
     for candidate, probability in zip(fitted_candidates, candidate_probabilities, strict=True):
         name = candidate.newest
@@ -144,15 +145,17 @@ def _sum_by_name(
     return probability_by_name
 
 
-def _explain_rejection(best: FittedCandidate, rival: FittedCandidate, is_equal: bool, words: tuple[Labels, str]) -> str:
-    """Reason for not choosing a rival. words: labels of the device, and the unit of errors."""
-    labels, unit = words
-    rival_error, best_error = rival.score.worst_channel, best.score.worst_channel
+def _explain_rejection(
+    named_candidate: FittedCandidate, rival: FittedCandidate, is_equal: bool, labels_and_unit: tuple[Labels, str]
+) -> str:
+    """Explain in words why a rival was not chosen. labels_and_unit: labels of the device, and the unit of errors."""
+    labels, unit = labels_and_unit
+    rival_error, best_error = rival.score.worst_channel, named_candidate.score.worst_channel
     claim = rival.fitted.hypothesis.claims[-1]
     axis = find_axis_letter(claim, labels)
     site = f" ({axis})" if axis else ""
-    if is_refined_candidate(rival, best):
-        gain = "too little" if rival_error < (1 - _SAME_ERROR) * best_error else "nothing"
+    if is_refined_candidate(rival, named_candidate):
+        gain = "too little" if rival_error < (1 - _EQUAL_ERROR_TOLERANCE) * best_error else "nothing"
         return (
             f"it contains the named law as a special case{site}, and its further parameters gain {gain}: its error "
             f"in the worst channel is {rival_error:.3g} times {unit}, that of the named law {best_error:.3g}"
@@ -169,20 +172,20 @@ def _explain_rejection(best: FittedCandidate, rival: FittedCandidate, is_equal: 
 
 
 def _make_estimates(
-    hypothesis: Hypothesis, number: int, errors: FloatArray, coordinates: slice, labels: Labels
+    hypothesis: Hypothesis, claim_index: int, errors: FloatArray, coordinates: slice, labels: Labels
 ) -> dict[str, Estimate]:
-    """Parameters of a claim with units and intervals. The variance of a parameter is the sum of its squared changes
-    when each coordinate moves by its standard error; covariances are left out. coordinates: the claim's coordinates of
-    the point."""
-    claim = hypothesis.claims[number]
-    values = report_parameters(hypothesis, number, hypothesis.point)
+    """Make the parameters of a claim with units and intervals. The variance of a parameter is the sum of its squared
+    changes when each coordinate moves by its standard error; covariances, and coordinates without a finite error, are
+    left out. coordinates: the claim's coordinates of the point. Parameters that are not finite are left out."""
+    claim = hypothesis.claims[claim_index]
+    values = report_parameters(hypothesis, claim_index, hypothesis.point)
     variances = {name: 0.0 for name in values}
     for coordinate in range(coordinates.start, coordinates.stop):
         if not np.isfinite(errors[coordinate]):
             continue
-        displaced = hypothesis.point.copy()
-        displaced[coordinate] += errors[coordinate]
-        for name, value in report_parameters(hypothesis, number, displaced).items():
+        displaced_point = hypothesis.point.copy()
+        displaced_point[coordinate] += errors[coordinate]
+        for name, value in report_parameters(hypothesis, claim_index, displaced_point).items():
             variances[name] += (value - values[name]) ** 2
     units = _find_units(claim.effect, values, labels)
     return {
@@ -193,57 +196,65 @@ def _make_estimates(
 
 
 def _find_units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
-    """Units by parameter, in the model's unit system: of a discovered law by its dimensions, else of the vocabulary."""
+    """Find the unit of each parameter in the model's unit system: by the dimensions of a discovered law, else from the
+    vocabulary."""
     if effect.law is not None:
         law = with_law_values(effect.law, values)
         units = derive_law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
         return dict(zip(values, units, strict=True))
-    return {p.name: p.find_unit(labels.system, labels.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
+    return {
+        parameter.name: parameter.find_unit(labels.system, labels.response_unit)
+        for parameter in EFFECTS_BY_NAME[effect.name].parameters
+    }
 
 
-def extract_law(hypothesis: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
-    """The discovered law of a claim, with its fitted parameters, as the document writes it; None for an effect of the
-    catalogue. axis: replaces that of the law."""
-    law = hypothesis.claims[number].effect.law
+def extract_law(hypothesis: Hypothesis, claim_index: int, axis: str | None) -> FoundLaw | None:
+    """Extract the discovered law of a claim, with its fitted parameters, for the document; None for an effect of the
+    catalogue. axis: replaces that of the law, unless None."""
+    law = hypothesis.claims[claim_index].effect.law
     if law is None:
         return None
-    fitted_law = with_law_values(law, _list_group_values(hypothesis, number, hypothesis.point)[0])
+    fitted_law = with_law_values(law, _list_group_values(hypothesis, claim_index, hypothesis.point)[0])
     return make_found_law(replace(fitted_law, axis=axis or fitted_law.axis))
 
 
 def _compute_interval(value: float, standard_error: float) -> tuple[float, float] | None:
-    """The 95 % interval of a value; None where no standard error is known (0 or infinite)."""
+    """Compute the 95 % interval of a value (1.96 standard deviations of the normal distribution); None where no
+    standard error is known (0, infinite or NaN)."""
     half_width = float(np.hypot(1.96 * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
     return (value - half_width, value + half_width) if np.isfinite(half_width) and half_width > 0 else None
 
 
-def report_parameters(hypothesis: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
-    """Parameters of a claim as the vocabulary defines them: of its first site, or, for an effect in
+def report_parameters(hypothesis: Hypothesis, claim_index: int, point: FloatArray) -> dict[str, float]:
+    """Report the parameters of a claim as the vocabulary defines them: of its first site, or, for an effect in
     `REPORTED_AT_LARGEST`, of the site with the largest main parameter. point: coordinates of the whole hypothesis."""
-    groups = _list_group_values(hypothesis, number, point)
-    claim = hypothesis.claims[number]
-    reported = [dict(claim.effect.report(values)) for values in groups]
-    if claim.effect.name in REPORTED_AT_LARGEST and len(reported) > 1:
-        main = EFFECTS_BY_NAME[claim.effect.name].main.name
-        return max(reported, key=lambda values: abs(values[main]))
-    return reported[0]
+    group_values = _list_group_values(hypothesis, claim_index, point)
+    claim = hypothesis.claims[claim_index]
+    reported_values = [dict(claim.effect.report(values)) for values in group_values]
+    if claim.effect.name in REPORTED_AT_LARGEST and len(reported_values) > 1:
+        main_parameter = EFFECTS_BY_NAME[claim.effect.name].main.name
+        return max(reported_values, key=lambda values: abs(values[main_parameter]))
+    return reported_values[0]
 
 
 REPORTED_AT_LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
 """Effects of which only the channel with the largest main parameter is reported."""
 
 
-def _list_group_values(hypothesis: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
-    """Parameters of each group of a claim (one group per site, or one for all), at a point of the hypothesis."""
+def _list_group_values(hypothesis: Hypothesis, claim_index: int, point: FloatArray) -> Sequence[dict[str, float]]:
+    """List the parameters of each group of a claim (one group per site, or one for all), at a point of the
+    hypothesis."""
     placed_effects = hypothesis.list_placed_effects(point)
-    first_group = sum(claim.groups for claim in hypothesis.claims[:number])
+    first_group = sum(claim.group_count for claim in hypothesis.claims[:claim_index])
     return [
-        dict(effect.values) for effect in placed_effects[first_group : first_group + hypothesis.claims[number].groups]
+        dict(effect.values)
+        for effect in placed_effects[first_group : first_group + hypothesis.claims[claim_index].group_count]
     ]
 
 
 def _compute_remaining_share(explanation: Explanation) -> float:
-    """Share of the re-tuned model's excess error over the noise that the effects leave, each in its worst channel."""
+    """Compute the share of the re-tuned model's excess error over the noise that remains with the effects, each in its
+    worst channel; 1 where the re-tuned model has no finite excess."""
     retuned_excess, remaining_excess = (
         max(candidate.score.worst_channel - 1.0, 0.0) for candidate in (explanation.retuned, explanation.after)
     )
@@ -253,26 +264,26 @@ def _compute_remaining_share(explanation: Explanation) -> float:
 def compute_probabilities(
     fitted_candidates: Sequence[FittedCandidate], error: float, remaining_share: float = 1.0
 ) -> tuple[float, ...]:
-    """Probability of each candidate of a round: proportional to exp(-excess / PROBABILITY_SCALE), the excess being its
-    mean log error above that of the first, preferred candidate (at least 0); 0 for a refinement of the first. The sum
-    is 1 - `compute_none_probability(error, remaining_share)`."""
+    """Compute the probability of each candidate of a round: proportional to exp(-excess / PROBABILITY_SCALE), the
+    excess being its mean log error above that of the first, preferred candidate (at least 0); 0 for a refinement of the
+    first. The sum is 1 - `compute_none_probability(error, remaining_share)`."""
     if not fitted_candidates:
         return ()
-    best = fitted_candidates[0]
+    first = fitted_candidates[0]
     excess = np.array(
-        [max(candidate.score.mean_log_error - best.score.mean_log_error, 0.0) for candidate in fitted_candidates]
+        [max(candidate.score.mean_log_error - first.score.mean_log_error, 0.0) for candidate in fitted_candidates]
     )
     is_refinement = np.array(
-        [candidate is not best and is_refined_candidate(candidate, best) for candidate in fitted_candidates]
+        [candidate is not first and is_refined_candidate(candidate, first) for candidate in fitted_candidates]
     )
     weights = np.where(is_refinement, 0.0, np.exp(-excess / PROBABILITY_SCALE))
-    some_is_right = 1 - compute_none_probability(error, remaining_share)
-    return tuple(some_is_right * float(weight) for weight in weights / weights.sum())
+    total_probability = 1 - compute_none_probability(error, remaining_share)
+    return tuple(total_probability * float(weight) for weight in weights / weights.sum())
 
 
 def compute_none_probability(error: float, remaining_share: float = 1.0) -> float:
-    """Probability that no candidate is right: a logistic function of ln(error - 1), or of the logarithm of the
-    remaining share if that gives less, from NO_CANDIDATE_LEAST to NO_CANDIDATE_MOST. A right law of a strong effect
+    """Compute the probability that no candidate is right: a logistic function of ln(error - 1), or of the logarithm of
+    the remaining share if that gives less, from NO_CANDIDATE_LEAST to NO_CANDIDATE_MOST. A right law of a strong effect
     leaves a small share, which may still be more than noise. error: of the explanation in the worst channel, in units
     of the noise; remaining_share: share of the mismatch that the explanation leaves."""
     excess = min(max(error - 1.0, 0.0) / NO_CANDIDATE_HALFWAY, remaining_share / NO_CANDIDATE_HALFWAY_SHARE)

@@ -1,4 +1,4 @@
-"""Checks whether the results of a diagnosis are physically plausible; one sentence for the report per doubt.
+"""Check whether the results of a diagnosis are physically plausible, and write a sentence for the report per doubt.
 
 Doubts are: a parameter at the bound of its fit, static friction below Coulomb friction, a confidence interval that
 contains the value without the effect, and negative damping or stiffness of the improved model (not passive, or
@@ -19,9 +19,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _BOUND_TOLERANCE = 1e-3
-"""Relative distance from a bound within which a parameter counts as at that bound."""
+"""Relative distance from a bound within which a parameter counts as at that bound. Chosen."""
 _EIGENVALUE_ROUNDING = 1e-6
-"""Magnitude of a negative eigenvalue that rounding may cause, relative to the largest eigenvalue."""
+"""Magnitude of a negative eigenvalue that rounding may cause, relative to the largest eigenvalue. Chosen."""
 
 
 def describe_doubts(findings: Findings) -> tuple[str, ...]:

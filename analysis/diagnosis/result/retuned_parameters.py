@@ -1,17 +1,20 @@
-"""The model's own parameters that re-tuning moved beyond their calibration, and sentences about doubtful values."""
+"""Find the model parameters that re-tuning moved beyond their calibration, and describe doubtful values in sentences.
+
+Called by `wording`, `diagnosis_tables` and `diagnosis_report`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
+from analysis.diagnosis.settings import EQUAL_ERROR_RATIO, RETUNING_DOUBTED, RETUNING_NAMED
 from analysis.diagnosis.unit_wording import format_error, format_value
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _MOST_LISTED = 4
-"""Largest number of re-tuned parameters that a sentence lists; the others are counted."""
+"""Largest number of re-tuned parameters that a sentence lists; the others are counted. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +47,8 @@ class MovedParameter:
 
 
 def list_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
-    """All free parameters of the model with their changes. deviations: (parameters,), in standard deviations of the
-    calibration."""
+    """List all free parameters of the model with their changes. deviations: (parameters,), in standard deviations of
+    the calibration; within 1e-6 (rounding) of `Tuning.bound` they are at the bound."""
     return tuple(
         MovedParameter(name, float(change), unit, float(deviation), bool(abs(deviation) >= tuning.bound - 1e-6))
         for name, change, unit, deviation in zip(
@@ -55,8 +58,8 @@ def list_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParame
 
 
 def find_moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
-    """Parameters that moved by `RETUNING_NAMED` standard deviations or more, the largest move first. deviations:
-    (parameters,), in standard deviations of the calibration."""
+    """Find the parameters that moved by `RETUNING_NAMED` standard deviations or more, the largest move first.
+    deviations: (parameters,), in standard deviations of the calibration."""
     moved_parameters = [
         parameter for parameter in list_parameters(tuning, deviations) if abs(parameter.deviations) >= RETUNING_NAMED
     ]
@@ -64,16 +67,16 @@ def find_moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[Moved
 
 
 def describe_retuning(moved_parameters: Sequence[MovedParameter], fitted: bool = False) -> str:
-    """Sentence on the re-tuned parameters; empty where none moved. fitted: the model was fitted to the same recordings
-    first, so that its parameters have no calibration."""
+    """Describe the re-tuned parameters in a sentence; empty where none moved. fitted: whether the model was first
+    fitted to the same recordings, so that its parameters have no calibration."""
     if not moved_parameters:
         return ""
     texts = [
         f"{parameter.name} {parameter.change_text}" if fitted else parameter.text
         for parameter in moved_parameters[:_MOST_LISTED]
     ]
-    unlisted = len(moved_parameters) - _MOST_LISTED
-    sentence = conjoin([*texts, f"{unlisted} more"] if unlisted > 0 else texts)
+    unlisted_count = len(moved_parameters) - _MOST_LISTED
+    sentence = conjoin([*texts, f"{unlisted_count} more"] if unlisted_count > 0 else texts)
     if fitted:
         subject = "these parameters of the first model changed by more than the tolerance of the first fit"
         return f"In the final fit, {subject}: {sentence}."
@@ -81,11 +84,11 @@ def describe_retuning(moved_parameters: Sequence[MovedParameter], fitted: bool =
 
 
 def describe_doubtful_parameters(moved_parameters: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
-    """Sentences on parameters that moved by `RETUNING_DOUBTED` standard deviations or more, so that they may compensate
-    for physics that was not named: one each up to `_MOST_LISTED`, else one with their number; a table lists all.
-    fitted: as in `describe_retuning`; then one sentence on the parameters at their bound."""
-    doubtful = [parameter for parameter in moved_parameters if abs(parameter.deviations) >= RETUNING_DOUBTED]
-    at_bound = [parameter for parameter in doubtful if parameter.at_bound]
+    """Describe parameters that moved by `RETUNING_DOUBTED` standard deviations or more, so that they may compensate for
+    physics that was not named: a sentence each up to `_MOST_LISTED`, else one with their number; a table lists all.
+    fitted: as in `describe_retuning`; then one sentence on those of them at their bound, if there are any."""
+    doubtful_parameters = [parameter for parameter in moved_parameters if abs(parameter.deviations) >= RETUNING_DOUBTED]
+    at_bound = [parameter for parameter in doubtful_parameters if parameter.at_bound]
     if fitted:
         names = conjoin([parameter.name for parameter in at_bound])
         return (
@@ -93,43 +96,48 @@ def describe_doubtful_parameters(moved_parameters: Sequence[MovedParameter], fit
             if at_bound
             else ()
         )
-    if len(doubtful) > _MOST_LISTED:
+    if len(doubtful_parameters) > _MOST_LISTED:
         return (
-            f"{len(doubtful)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration "
-            f"or more{f', {len(at_bound)} of them to the limit of their allowed range' if at_bound else ''}: either "
-            "the calibration is wrong, or they compensate for physics that was not named.",
+            f"{len(doubtful_parameters)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their "
+            f"calibration or more{f', {len(at_bound)} of them to the limit of their allowed range' if at_bound else ''}"
+            ": either the calibration is wrong, or they compensate for physics that was not named.",
         )
     return tuple(
         f"The {parameter.name} was moved by {abs(parameter.deviations):.2g} standard deviations of its "
         f"calibration{_AT_LIMIT if parameter in at_bound else ''}: either the calibration is wrong, or it compensates "
         "for physics that was not named."
-        for parameter in doubtful
+        for parameter in doubtful_parameters
     )
 
 
 _UNDETERMINED = " The fit has not found a best value for them, or they compensate for physics that was not named."
 _AT_LIMIT = ", to the limit of its allowed range"
+"""Parts of the sentences of `describe_doubtful_parameters`: its end for a fitted model; a parameter at its bound."""
 
 
 def _is_error_raised(errors: Errors) -> bool:
-    """Whether re-tuning raises the held-out error by more than a factor `SAME_TO_READERS`."""
-    return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
+    """Whether re-tuning raises the held-out error by more than a factor `EQUAL_ERROR_RATIO`; False where an error is
+    not known."""
+    return (
+        errors.before is not None and errors.retuned is not None and errors.retuned > EQUAL_ERROR_RATIO * errors.before
+    )
 
 
 def choose_better_model(errors: Errors) -> tuple[str, str]:
-    """Field of `Errors`, and words, of the model with which named effects are compared: the given model where re-tuning
-    raises the held-out error, else the re-tuned model."""
+    """Choose the model with which named effects are compared: the given model where re-tuning raises the held-out
+    error, else the re-tuned model. Returns its field in `Errors`, and words for it."""
     return ("before", "as given") if _is_error_raised(errors) else ("retuned", "re-tuned without it")
 
 
 def choose_better_error(errors: Errors) -> tuple[str, float | None]:
-    """Words and held-out error of the given model where re-tuning raises that error, else of the re-tuned model."""
+    """Choose the given model where re-tuning raises the held-out error, else the re-tuned model. Returns words for it,
+    and its held-out error."""
     return ("as given", errors.before) if _is_error_raised(errors) else ("re-tuned", errors.retuned)
 
 
 def describe_raised_error(errors: Errors) -> str:
-    """Sentence that re-tuning raises the held-out error; empty where it does not. errors: on held-out data, relative to
-    the signal."""
+    """Describe in a sentence that re-tuning raises the held-out error; empty where it does not. errors: on held-out
+    data, relative to the signal."""
     if not _is_error_raised(errors) or errors.before is None or errors.retuned is None:
         return ""
     return (

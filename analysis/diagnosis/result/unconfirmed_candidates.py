@@ -13,17 +13,17 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.named_effects import extract_law, find_axis_letter, make_labels, report_parameters
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.search.verdict import Unconfirmed
+from analysis.diagnosis.search.verdict import UnconfirmedEffect
 from equalizer.effects.placing import find_place
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 
 def list_unconfirmed_candidates(
-    unconfirmed: Sequence[Unconfirmed], black_box: BlackBox | None, recording: Recording, model: MechanicalModel
+    unconfirmed: Sequence[UnconfirmedEffect], black_box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
     """List the unconfirmed effects as candidates of the document: of each hypothesis, the claim with index
-    `Unconfirmed.claim` (a negative one counts from the end).
+    `UnconfirmedEffect.claim` (a negative one counts from the end).
 
     black_box: the fitted model without physics, for comparison; None where there is none. `share_of_black_box` of a
     candidate is its gain relative to that of the black box or, where candidates gain more, to their largest gain. Both

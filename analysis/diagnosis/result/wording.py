@@ -1,4 +1,4 @@
-"""Sentences that state a diagnosis, the same in the report, in the terminal and on the screen.
+"""Write the sentences of a diagnosis, the same in the report, in the terminal and on the screen.
 
 `write_summary_lines` returns all of them in order, the verdict first; errors are relative to the signal, on held-out
 data. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis` and `make_real_answer`.
@@ -49,21 +49,21 @@ _AT_NOISE_LEVEL = (
 """Remark on a diagnosis without a remaining mismatch that is not `explained`."""
 
 
-def format_effect_title(effect: NamedEffect, single: bool = False) -> str:
+def format_effect_title(effect: NamedEffect, is_single_axis: bool = False) -> str:
     """Format noun and place of an effect: "dry friction on the x drive"; the noun alone for a fault of the whole
-    device. single: whether the device has one axis, which is then not named."""
+    device. is_single_axis: whether the device has one axis, which is then not named."""
     if effect.effect in WHOLE_DEVICE_FAULTS and effect.axis is None:
         return get_noun(effect.effect)
-    return f"{format_class_noun(effect)} {format_place(effect.place, effect.axis, single)}"
+    return f"{format_class_noun(effect)} {format_place(effect.place, effect.axis, is_single_axis)}"
 
 
-def describe_effect(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
-    """Describe an effect with its parameters in a sentence. signature: what it causes in the data, from the
-    catalogue."""
+def describe_effect(effect: NamedEffect, signature: str = "", is_single_axis: bool = False) -> str:
+    """Describe an effect with its parameters in a sentence. signature: what it causes in the data, from the catalogue;
+    a discovered law is written before it."""
     if effect.law is not None:
         signature = "; ".join(filter(None, (format_law(effect.law), signature)))
     title_and_parameters = ", ".join(
-        filter(None, (format_effect_title(effect, single), format_parameters(effect.effect, effect.parameters)))
+        filter(None, (format_effect_title(effect, is_single_axis), format_parameters(effect.effect, effect.parameters)))
     )
     return f"{capitalise(title_and_parameters)}: {signature}." if signature else f"{capitalise(title_and_parameters)}."
 
@@ -74,9 +74,9 @@ def describe_verdict(
     """Describe the verdict, with which every output begins, with named effects and held-out errors; where nothing is
     named, with the best candidate. moved_parameters: re-tuned by a standard deviation or more, for the verdict
     "parameters". device: None = several axes and no statement on the noise."""
-    single = device is not None and device.single
+    is_single_axis = device is not None and device.is_single_axis
     errors = diagnosis.fit.test
-    effect_titles = conjoin([format_effect_title(effect, single) for effect in diagnosis.effects])
+    effect_titles = conjoin([format_effect_title(effect, is_single_axis) for effect in diagnosis.effects])
     noise_method = "" if device is None else device.noise
     if diagnosis.verdict == "no_mismatch":
         return f"The model agrees with the device: {describe_error('as given', errors.before, errors, noise_method)}."
@@ -108,7 +108,7 @@ def write_answer(findings: Findings) -> str:
     diagnosis, device = findings.diagnosis, extract_device(findings)
     if findings.explanation.statistic is not None:
         return format_impact_answer(
-            diagnosis, conjoin([format_effect_title(effect, device.single) for effect in diagnosis.effects])
+            diagnosis, conjoin([format_effect_title(effect, device.is_single_axis) for effect in diagnosis.effects])
         )
     return describe_verdict(diagnosis, find_final_moves(findings) if diagnosis.verdict == "parameters" else (), device)
 
@@ -165,8 +165,10 @@ def describe_remainder(diagnosis: Diagnosis, device: DeviceWording | None = None
     significant_rows = select_significant(diagnosis.remainder)
     if not significant_rows:
         return "No significant mismatch remains."
-    unlisted = len(significant_rows) - _MAX_LISTED_PLACES
-    unlisted_text = f"; and {unlisted} smaller {'place' if unlisted == 1 else 'places'}" if unlisted > 0 else ""
+    unlisted_count = len(significant_rows) - _MAX_LISTED_PLACES
+    unlisted_text = (
+        f"; and {unlisted_count} smaller {'place' if unlisted_count == 1 else 'places'}" if unlisted_count > 0 else ""
+    )
     return (
         f"Still unexplained: {'; '.join(describe_place(row, device) for row in significant_rows[:_MAX_LISTED_PLACES])}"
         f"{unlisted_text}."
@@ -182,8 +184,8 @@ def select_significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
 def describe_place(mismatch: Mismatch, device: DeviceWording | None = None) -> str:
     """Describe where a mismatch occurs and its share: "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the
     mismatch (p < 0.0001)"."""
-    low, high = mismatch.band_hz
-    band_text = f" at {low:g} to {high:g} Hz" if device is None or device.system.time == "s" else ""
+    low_hz, high_hz = mismatch.band_hz
+    band_text = f" at {low_hz:g} to {high_hz:g} Hz" if device is None or device.system.time == "s" else ""
     level_text = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
     state_text = f", {mismatch.state}" if mismatch.state else ""
     input_text = f", driven by {mismatch.input}{level_text}" if mismatch.input else ""
@@ -200,8 +202,8 @@ def describe_next_experiment(diagnosis: Diagnosis) -> str:
         return (
             "No further recording was found that would distinguish what these data do not." if has_equivalents else ""
         )
-    named_noun, *rivals = (get_noun(name) for name in experiment.splits) if experiment.splits else ("",)
-    benefit = f"would distinguish {named_noun} from {conjoin(rivals)}" if rivals else "would help"
+    named_noun, *rival_nouns = (get_noun(name) for name in experiment.splits) if experiment.splits else ("",)
+    benefit = f"would distinguish {named_noun} from {conjoin(rival_nouns)}" if rival_nouns else "would help"
     subject = "The recordings" if "; then " in experiment.command else "The recording"
     return f"{subject} that {benefit}: {experiment.command}. {capitalise(end_sentence(experiment.why))}"
 
@@ -220,19 +222,22 @@ def describe_gain(effect: NamedEffect) -> str:
     gain = effect.held_out_gain
     if gain is None or gain.ci95 is None:
         return ""
-    low, high = (format_share(max(end, 0.0)) for end in gain.ci95)
+    low, high = (format_share(max(gain_limit, 0.0)) for gain_limit in gain.ci95)
     return f" On held-out data it explains {format_share(max(gain.value, 0.0))} of the error's power ({low} to {high})."
 
 
 def write_summary_lines(findings: Findings) -> tuple[str, ...]:
     """Write the lines of the diagnosis: verdict, effects, mismatch, next experiment, doubts and remarks; none is
     empty."""
-    diagnosis, single = findings.diagnosis, findings.given.inputs == 1
+    diagnosis, is_single_axis = findings.diagnosis, findings.given.inputs == 1
     moved_parameters = find_final_moves(findings)
     lines = [write_answer(findings)]
     signatures = collect_signature_texts(findings)
     for effect in diagnosis.effects:
-        lines += [describe_effect(effect, signatures.get(effect.effect, ""), single), describe_equivalents(effect)]
+        lines += [
+            describe_effect(effect, signatures.get(effect.effect, ""), is_single_axis),
+            describe_equivalents(effect),
+        ]
     if diagnosis.verdict in ("explained", "partly_explained"):
         lines.append(describe_confirmation(diagnosis.fit.fit, diagnosis.fit.test))
     if diagnosis.verdict not in ("no_mismatch", "parameters"):

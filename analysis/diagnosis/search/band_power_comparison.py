@@ -1,4 +1,4 @@
-"""Compares hypotheses by band power, for chaotic responses whose waveform cannot be predicted (play with impacts).
+"""Compare hypotheses by band power, for chaotic responses whose waveform cannot be predicted (play with impacts).
 
 A misfit is the rms logarithm of the ratio of measured and simulated amplitudes, divided by its chance variation: the
 same quantity between two simulations of one hypothesis, whose coordinates differ by 1e-9 (`perturb`). Impacts make
@@ -16,13 +16,13 @@ from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import IMPACTS_AS_GOOD, IMPACTS_ERROR, IMPACTS_LEAST_SPREAD, IMPACTS_SHARE
+from analysis.diagnosis.settings import IMPACTS_ERROR, IMPACTS_LEAST_SPREAD, IMPACTS_RIVAL_RATIO, IMPACTS_SHARE
 from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandPowerComparison:
-    """Compares candidates by band power on all samples, held-out ones included."""
+    """Comparison of candidates by band power on all samples, held-out ones included."""
 
     context: SearchContext
     power: BandPower
@@ -42,8 +42,8 @@ class BandPowerComparison:
         )
 
     def _divide_by_chance(self, misfit: FloatArray) -> FloatArray:
-        """(c,): misfit over the chance variation. A NaN, of a channel without a band above the noise, becomes 1, unless
-        all channels are NaN: then all stay NaN."""
+        """Divide a misfit (c,) by the chance variation. A NaN, of a channel without a band above the noise, becomes 1,
+        unless all channels are NaN: then all stay NaN."""
         return misfit if np.isnan(misfit).all() else np.where(np.isnan(misfit), 1.0, misfit / self.chance_variation)
 
 
@@ -70,9 +70,9 @@ def is_convincing(explanation: FittedCandidate, retuned_candidate: FittedCandida
     `IMPACTS_ERROR` times the chance variation, both on the samples to choose by and on those to test. A set in which
     the explanation has no finite misfit is skipped; False if both are skipped."""
     misfit_pairs = [
-        (getattr(retuned_candidate.score, part), getattr(explanation.score, part))
-        for part in ("choose", "test")
-        if np.isfinite(getattr(explanation.score, part)).any()
+        (getattr(retuned_candidate.score, role), getattr(explanation.score, role))
+        for role in ("choose", "test")
+        if np.isfinite(getattr(explanation.score, role)).any()
     ]
     return bool(misfit_pairs) and all(
         _compute_rms_over_channels(named_misfit) <= (1 - IMPACTS_SHARE) * _compute_rms_over_channels(retuned_misfit)
@@ -82,13 +82,13 @@ def is_convincing(explanation: FittedCandidate, retuned_candidate: FittedCandida
 
 
 def is_as_good(rival: FittedCandidate, named_candidate: FittedCandidate) -> bool:
-    """Whether a rival's misfit is at most `IMPACTS_AS_GOOD` times that of the named hypothesis, on the samples to
+    """Whether a rival's misfit is at most `IMPACTS_RIVAL_RATIO` times that of the named hypothesis, on the samples to
     choose by and on those to test. A set in which the rival has no finite misfit is skipped; True if both are."""
     misfit_pairs = [
-        (getattr(candidate.score, part) for candidate in (rival, named_candidate)) for part in ("choose", "test")
+        (getattr(candidate.score, role) for candidate in (rival, named_candidate)) for role in ("choose", "test")
     ]
     return all(
-        _compute_rms_over_channels(rival_misfit) <= IMPACTS_AS_GOOD * _compute_rms_over_channels(named_misfit)
+        _compute_rms_over_channels(rival_misfit) <= IMPACTS_RIVAL_RATIO * _compute_rms_over_channels(named_misfit)
         for rival_misfit, named_misfit in misfit_pairs
         if np.isfinite(rival_misfit).any()
     )
@@ -103,5 +103,5 @@ def compute_worst_misfit(candidate: FittedCandidate) -> float:
     """Compute the larger of the misfits on the samples to choose by and on the held-out samples, each the root mean
     square over channels, in units of the chance variation; a set without a finite misfit is skipped, and 0 is
     returned if both are."""
-    parts = (candidate.score.choose, candidate.score.test)
-    return max((_compute_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)
+    misfits = (candidate.score.choose, candidate.score.test)
+    return max((_compute_rms_over_channels(misfit) for misfit in misfits if np.isfinite(misfit).any()), default=0.0)

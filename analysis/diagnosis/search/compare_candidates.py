@@ -30,12 +30,12 @@ from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_re
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import (
     MOST_REFINED,
-    NO_SECOND_START,
-    REACHES_NOISE,
+    NEAR_NOISE_ERROR,
+    REFINING_GAIN_SHARE,
     RICHER_LAW_SQUARES,
-    SAME_START,
-    SHARED_MOTION,
-    WORTH_REFINING,
+    SAME_FIT_COST_SHARE,
+    SECOND_START_ERROR,
+    SHARED_SENSITIVITY_SHARE,
 )
 
 REFINING_STEPS, FULL_FIT_STEPS = 4, 2
@@ -51,8 +51,8 @@ of a parameter, in standard deviations, above which the sensitivity is renewed. 
 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
     """Refine the best fits, and sort all candidates by their error. base: fit without the new effect. fits: first fits,
-    the best first (`fit_first`); may be empty. If `base` contains a force that depends on the motion, they have been
-    continued on all samples already, and only `_polish` is applied to the best."""
+    the best first (`fit_first`); may be empty. If `base` contains a force that depends on the motion, the fits have
+    been continued on all samples already, and only the best is refined, by `_polish`."""
     promising = _select_promising(base, fits)
     is_continued = has_motion_forces(base.hypothesis)
     first_refined: list[tuple[Fitted, Sensitivity]] = []
@@ -65,31 +65,31 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
         if is_continued:
             return fitted
         is_similar = first_refined and _is_time_invariant(fitted) == _is_time_invariant(refined[0])
-        is_similar = is_similar and _compute_prediction_difference(context, fitted, refined[0]) < SHARED_MOTION * (
-            base.cost - refined[0].cost
-        )
+        is_similar = is_similar and _compute_prediction_difference(
+            context, fitted, refined[0]
+        ) < SHARED_SENSITIVITY_SHARE * (base.cost - refined[0].cost)
         return refine_with_sensitivity(context, fitted, first_refined[0][1] if is_similar else None)[0]
 
     further_fits = [
         fitted
-        for position, fitted in enumerate(promising[1:MOST_REFINED], 1)
-        if not any(_is_same_start(context, fitted, compared) for compared in promising[:position])
+        for rank, fitted in enumerate(promising[1:MOST_REFINED], 1)
+        if not any(_is_same_start(context, fitted, rival) for rival in promising[:rank])
     ]
-    if refined and context.score_fit(refined[0]).score.worst_channel <= NO_SECOND_START:
+    if refined and context.score_fit(refined[0]).score.worst_channel <= SECOND_START_ERROR:
         further_fits = [
-            fitted for fitted in further_fits if context.score_fit(fitted).score.worst_channel <= REACHES_NOISE
+            fitted for fitted in further_fits if context.score_fit(fitted).score.worst_channel <= NEAR_NOISE_ERROR
         ]
-    remaining = [
-        fitted for fitted in fits[1 if promising else 0 :] if not any(fitted is compared for compared in further_fits)
+    unrefined = [
+        fitted for fitted in fits[1 if promising else 0 :] if not any(fitted is rival for rival in further_fits)
     ]
-    special_cases = [special for special in remaining if any(_contains(general, special) for general in refined[:1])][
+    special_cases = [special for special in unrefined if any(_contains(general, special) for general in refined[:1])][
         :1
     ]
     refined += context.guard.wrap(context.map_, FITTING)(refit, [*further_fits, *special_cases])  # type: ignore[arg-type]
     refined = _polish(context, sorted(refined, key=lambda fitted: context.score_fit(fitted).score.mean_log_error))
     fitted_candidates = [
         context.score_fit(fitted)
-        for fitted in [*refined, *(other for other in remaining if other not in special_cases)]
+        for fitted in [*refined, *(skipped for skipped in unrefined if skipped not in special_cases)]
     ]
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
 
@@ -102,10 +102,10 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     measure, tuning = context.measure, context.tuning
     if not any(has_motion_forces(fitted.hypothesis) for fitted in fits):
         return fits
-    if _compute_worst_error(context, fits[0]) <= NO_SECOND_START and any(
-        _compute_worst_error(context, fitted) > REACHES_NOISE for fitted in fits
+    if _compute_worst_error(context, fits[0]) <= SECOND_START_ERROR and any(
+        _compute_worst_error(context, fitted) > NEAR_NOISE_ERROR for fitted in fits
     ):
-        close_fits = [fitted for fitted in fits if _compute_worst_error(context, fitted) <= REACHES_NOISE]
+        close_fits = [fitted for fitted in fits if _compute_worst_error(context, fitted) <= NEAR_NOISE_ERROR]
         return sorted(
             [*_polish(context, close_fits), *(fitted for fitted in fits if fitted not in close_fits)],
             key=lambda fitted: fitted.cost,
@@ -136,33 +136,33 @@ def _is_time_invariant(fitted: Fitted) -> bool:
     return not any(placed_effect.effect.of_time for placed_effect in fitted.hypothesis.list_placed_effects())
 
 
-def _is_same_start(context: SearchContext, fitted: Fitted, other_fit: Fitted) -> bool:
+def _is_same_start(context: SearchContext, fitted: Fitted, compared_fit: Fitted) -> bool:
     """Whether two starts of the same hypothesis have converged to the same fit."""
     return (
-        fitted.hypothesis.key == other_fit.hypothesis.key
-        and _compute_prediction_difference(context, fitted, other_fit) < SAME_START * fitted.cost
+        fitted.hypothesis.key == compared_fit.hypothesis.key
+        and _compute_prediction_difference(context, fitted, compared_fit) < SAME_FIT_COST_SHARE * fitted.cost
     )
 
 
-def _compute_prediction_difference(context: SearchContext, fitted: Fitted, other_fit: Fitted) -> float:
+def _compute_prediction_difference(context: SearchContext, fitted: Fitted, compared_fit: Fitted) -> float:
     """Compute the mean square difference of two fits' predictions on the samples to fit, in units of the noise
-    variance."""
+    variance; infinite or NaN where a simulation diverged."""
     difference = stack_fit_residuals(context.measure, fitted.residuals) - stack_fit_residuals(
-        context.measure, other_fit.residuals
+        context.measure, compared_fit.residuals
     )
     with np.errstate(over="ignore", invalid="ignore"):
         return float(difference @ difference) / max(len(difference), 1)
 
 
 def _select_promising(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """Select the fits whose reduction of the cost of `base` is at least `WORTH_REFINING` of that by the best fit; none
-    where that is not positive. fits: the best first."""
+    """Select the fits whose reduction of the cost of `base` is at least `REFINING_GAIN_SHARE` of that by the best fit;
+    none where that is not positive. fits: the best first."""
     gains = [base.cost - fitted.cost for fitted in fits]
-    return [fitted for fitted, gain in zip(fits, gains, strict=True) if gain >= WORTH_REFINING * gains[0] > 0]
+    return [fitted for fitted, gain in zip(fits, gains, strict=True) if gain >= REFINING_GAIN_SHARE * gains[0] > 0]
 
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
-    """Continue a fit until it converges or the rounds are used up."""
+    """Continue a fit until it converges, or the limits of rounds (`MAX_RENEWALS`, `POLISHING_ROUNDS`) are reached."""
     return _polish(context, [refine_with_sensitivity(context, fitted)[0]])[0]
 
 
@@ -196,14 +196,14 @@ def refine_with_sensitivity(
 def _fit_full_record(context: SearchContext, start: Fitted, jacobian: Sensitivity) -> Fitted:
     """Fit to all samples, started from the fit to one period of each segment: repeat fits of `FULL_FIT_STEPS` steps, at
     most `MAX_RENEWALS`, until the cost converges; above the noise, periods may differ."""
-    best = start
+    best_fit = start
     for _ in range(MAX_RENEWALS):
-        next_fit = fit(context.measure, context.tuning, best, jacobian, FULL_FIT_STEPS, context.map_)
-        has_converged = next_fit.cost > best.cost * (1 - _compute_gain_limit(next_fit))
-        best = next_fit
+        next_fit = fit(context.measure, context.tuning, best_fit, jacobian, FULL_FIT_STEPS, context.map_)
+        has_converged = next_fit.cost > best_fit.cost * (1 - _compute_gain_limit(next_fit))
+        best_fit = next_fit
         if has_converged:
             break
-    return best
+    return best_fit
 
 
 def _compute_gain_limit(fitted: Fitted) -> float:
@@ -220,73 +220,74 @@ def _refine_from_both_starts(
     ended in another minimum. There is no second start if `jacobian` is given: it was tried for the hypothesis of that
     sensitivity, whose predicted motion is nearly the same."""
     is_jacobian_shared = jacobian is not None
-    # With 1 as the reduction before, `_refine_from` may renew a shared sensitivity instead of ending after one fit.
-    first_fit, jacobian = _refine_from(context, fitted, jacobian, 1.0)
+    # With 1 as the previous gain, `_refine_until_converged` may renew a shared sensitivity instead of ending after one
+    # fit.
+    first_fit, jacobian = _refine_until_converged(context, fitted, jacobian, 1.0)
     first_fit, jacobian = _refine_similar(context, first_fit, jacobian)
-    if is_jacobian_shared or context.score_fit(first_fit).score.worst_channel <= NO_SECOND_START:
+    if is_jacobian_shared or context.score_fit(first_fit).score.worst_channel <= SECOND_START_ERROR:
         return first_fit, jacobian
-    calibrated = evaluate_fit(
+    calibrated_start = evaluate_fit(
         context.measure, context.tuning, np.zeros_like(first_fit.deviations), first_fit.hypothesis
     )
-    second_fit, second_jacobian = _refine_from(context, calibrated, jacobian)
+    second_fit, second_jacobian = _refine_until_converged(context, calibrated_start, jacobian)
     return (second_fit, second_jacobian) if second_fit.cost < first_fit.cost else (first_fit, jacobian)
 
 
 def _refine_similar(context: SearchContext, fitted: Fitted, jacobian: Sensitivity) -> tuple[Fitted, Sensitivity]:
     """Find the best fit among similar hypotheses (`generate_near_equivalents`), or the plainest of them if it is about
     as good (`choose_plainest`), and the sensitivity of the best."""
-    best = fitted, jacobian
+    best_refined = fitted, jacobian
     for variant in generate_near_equivalents(fitted.hypothesis):
-        refined_variant = _refine_from(
+        refined_variant = _refine_until_converged(
             context, evaluate_fit(context.measure, context.tuning, fitted.deviations, variant), jacobian
         )
-        best = refined_variant if refined_variant[0].cost < best[0].cost else best
-    return choose_plainest(context, best[0]), best[1]
+        best_refined = refined_variant if refined_variant[0].cost < best_refined[0].cost else best_refined
+    return choose_plainest(context, best_refined[0]), best_refined[1]
 
 
 def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
     """Choose the fit, or a similar form of its laws (`generate_near_equivalents`, in its order) whose sum of squares
     exceeds that of the form chosen so far by less than `RICHER_LAW_SQUARES` noise variances."""
-    best = fitted
+    plainest = fitted
     for variant in generate_near_equivalents(fitted.hypothesis):
-        variant_fit = evaluate_fit(context.measure, context.tuning, best.deviations, variant)
+        variant_fit = evaluate_fit(context.measure, context.tuning, plainest.deviations, variant)
         sample_count = len(stack_fit_residuals(context.measure, variant_fit.residuals))
-        best = variant_fit if variant_fit.cost < best.cost + RICHER_LAW_SQUARES / sample_count else best
-    return best
+        plainest = variant_fit if variant_fit.cost < plainest.cost + RICHER_LAW_SQUARES / sample_count else plainest
+    return plainest
 
 
-def _refine_from(
+def _refine_until_converged(
     context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None, previous_gain: float = np.inf
 ) -> tuple[Fitted, Sensitivity]:
     """Continue a fit, with renewed sensitivities, until the cost converges or `MAX_RENEWALS` is reached. jacobian:
     sensitivity at another point of the same hypothesis, or of one with nearly the same predicted motion; None = not
     computed yet. previous_gain: relative reduction of the cost by the previous fit; infinite = unknown."""
-    best = fitted
+    best_fit = fitted
     is_complete = jacobian is not None
     previous_gain = previous_gain if is_complete else np.inf
-    current_jacobian = jacobian or compute_sensitivity(context, best.deviations, best.hypothesis)
+    current_jacobian = jacobian or compute_sensitivity(context, best_fit.deviations, best_fit.hypothesis)
     for _ in range(MAX_RENEWALS):
-        next_fit = fit(context.measure, context.tuning, best, current_jacobian, REFINING_STEPS, context.map_)
-        gain = 1 - next_fit.cost / best.cost if best.cost > 0 else 0.0
-        best, expected_gain, previous_gain = next_fit, predict_decrease(gain, previous_gain), gain
-        has_converged = (expected_gain if is_complete else gain) < _compute_gain_limit(best)
+        next_fit = fit(context.measure, context.tuning, best_fit, current_jacobian, REFINING_STEPS, context.map_)
+        gain = 1 - next_fit.cost / best_fit.cost if best_fit.cost > 0 else 0.0
+        best_fit, expected_gain, previous_gain = next_fit, predict_decrease(gain, previous_gain), gain
+        has_converged = (expected_gain if is_complete else gain) < _compute_gain_limit(best_fit)
         if (is_complete and has_converged) or (
-            context.score_fit(best).score.worst_channel <= NO_SECOND_START and has_converged
+            context.score_fit(best_fit).score.worst_channel <= SECOND_START_ERROR and has_converged
         ):
             break
         if (
             not is_complete
-            or np.abs(best.deviations - current_jacobian.base_deviations).max(initial=0.0) > RENEWAL_MOVE
+            or np.abs(best_fit.deviations - current_jacobian.base_deviations).max(initial=0.0) > RENEWAL_MOVE
         ):
-            current_jacobian = compute_sensitivity(context, best.deviations, best.hypothesis, with_forces=True)
+            current_jacobian = compute_sensitivity(context, best_fit.deviations, best_fit.hypothesis, with_forces=True)
             is_complete = True
-    return best, current_jacobian
+    return best_fit, current_jacobian
 
 
-def _contains(general: Fitted, special: Fitted) -> bool:
+def _contains(general_fit: Fitted, special_fit: Fitted) -> bool:
     """Whether the last effect of `general` contains that of `special` as a special case, at sites that include those of
     `special`: for a fair comparison both must then be refined."""
-    general_claim, special_claim = general.hypothesis.claims[-1], special.hypothesis.claims[-1]
+    general_claim, special_claim = general_fit.hypothesis.claims[-1], special_fit.hypothesis.claims[-1]
     return special_claim.effect.name in general_claim.effect.simpler and set(special_claim.sites) <= set(
         general_claim.sites
     )

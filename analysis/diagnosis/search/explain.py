@@ -6,7 +6,8 @@ Fits are compared by the log error power, a log-likelihood in which each channel
 
     L = mean over channels of ln(rms error to fit * rms error to choose)        0 for noise alone
 
-1. The model's own parameters are re-tuned. If no channel is above the noise then, the search ends.
+1. The model's own parameters are re-tuned. If no channel is above the noise then, the search ends (exceptions in
+   `is_worth_searching`).
 2. Each effect of the catalogue estimates starting values from the missing force (`starting_hypotheses`).
 3. The gain in J of each hypothesis is predicted by one simulation, linearised at its start, the model's parameters
    free (`screening`); where the drive repeats, on one period of each segment (`short_recordings`).
@@ -42,8 +43,8 @@ from analysis.diagnosis.settings import (
     ADDED_SHARE,
     HELD_OUT_SURPRISE,
     MOST_EFFECTS,
+    NEAR_NOISE_ERROR,
     NOISE_ALONE,
-    REACHES_NOISE,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
@@ -51,9 +52,10 @@ from equalizer.signals.signal import FloatArray
 
 LOOK_AHEAD_CANDIDATES = 2
 """Candidates to which a second effect is added on trial, where none alone is worth adding; each takes a round.
-Heuristic."""
+Chosen."""
 MOST_REFITTED_RIVALS = 3
-"""Rivals of a step that are fitted again where a search continues on more samples; each takes a second or more."""
+"""Rivals of a step that are fitted again where a search continues on more samples. Chosen: each takes a second or
+more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +87,7 @@ class Explanation:
     """The compared statistic; None where samples were compared, in units of their noise."""
     ended_early: bool = False
     """Whether the time limit was reached before the search was done."""
-    barred: str = ""
+    excluded_name: str = ""
     """Name of an excluded effect (`SearchContext.excluded`), where only its refinements explain as much; else empty."""
     undetermined: tuple[str, ...] = ()
     """Effects that were found and removed, because the recordings do not determine their parameters."""
@@ -114,10 +116,10 @@ def explain(
     time_left: TimeBudget = grant_time,
     previous_steps: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
-    """Re-tunes the model and adds effects one by one. time_left: called before each piece of the search; when it
-    returns False, the search ends with what it has found. previous_steps: those of a search on fewer samples, each with
-    its rivals; one effect is added to these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before
-    these are fitted again."""
+    """Re-tune the model and add effects one by one. progress: called with a text and the completed fraction. time_left:
+    called before each round and each simulation; when it returns False, the search ends with the effects added so far.
+    previous_steps: those of a search on fewer samples, each with its rivals; one effect is added to these, up to
+    `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before these are fitted again."""
     explanation = start_explanation(
         replace(context, map_=limit_map(context.map_, time_left)) if previous_steps else context,
         progress,
@@ -130,14 +132,16 @@ def explain(
 def start_explanation(
     context: SearchContext, progress: Progress, previous_steps: Sequence[Sequence[FittedCandidate]] = ()
 ) -> Explanation:
-    """The model as given and re-tuned, with the effects that need no search (`_known_rounds`)."""
+    """Fit the model as given and re-tuned, with the effects that need no search (`_fit_known_rounds`)."""
     given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     progress("re-tuning the model within its tolerances", 0.02)
     base = context.score_fit(refine(context, given_fit))
-    rounds = _known_rounds(context, base, previous_steps)
+    rounds = _fit_known_rounds(context, base, previous_steps)
     steps = tuple(round_candidates[0] for round_candidates in rounds)
-    ends = (context.with_test_score(context.score_fit(given_fit)), context.with_test_score(base))
-    return Explanation(*ends, context.with_test_score(steps[-1]) if steps else ends[1], tuple(rounds), steps)
+    given_and_retuned = (context.with_test_score(context.score_fit(given_fit)), context.with_test_score(base))
+    return Explanation(
+        *given_and_retuned, context.with_test_score(steps[-1]) if steps else given_and_retuned[1], tuple(rounds), steps
+    )
 
 
 def add_effects(
@@ -148,26 +152,26 @@ def add_effects(
     time_left: TimeBudget = grant_time,
     max_effects: int = MOST_EFFECTS,
 ) -> Explanation:
-    """The explanation with further effects, up to `max_effects` in total. A last round of `selected` in which no
-    effect was added is not computed again: a second effect is looked for together with its best candidate."""
+    """Add further effects to an explanation, up to `max_effects` in total. A last round of `selected` in which no
+    effect was added is not computed again: a second effect is sought together with its best candidates."""
     rounds, steps = list(selected.rounds), list(selected.steps)
     base = steps[-1] if steps else context.score_fit(_reevaluate(context, selected.retuned))
     limited, excluded, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", selected.ended_early
-    may_extend = not context.certain and not selected.barred and not ended_early
+    may_extend = not context.certain and not selected.excluded_name and not ended_early
     while may_extend and len(steps) < max_effects and is_worth_searching(context, selected, base):
         step = Step(f"looking for the {_ORDINALS[len(steps)]} effect", 0.1 + 0.3 * len(steps), progress)
         try:
-            resumed = len(rounds) > len(steps)
-            if resumed:
+            is_resumed = len(rounds) > len(steps)
+            if is_resumed:
                 candidates = allowed = rounds[-1]
             else:
                 candidates = find_next_effect(limited, catalogue, base.fitted, step)
                 allowed = tuple(candidate for candidate in candidates if candidate.newest not in context.excluded)
                 rounds.append(allowed)
-            look_ahead = (
-                allowed[:1] == candidates[:1] and len(rounds) < max_effects and not (resumed and context.excluded)
+            can_add_pair = (
+                allowed[:1] == candidates[:1] and len(rounds) < max_effects and not (is_resumed and context.excluded)
             )
-            pair_rounds = _look_ahead(limited, catalogue, base, allowed, step) if look_ahead else ()
+            pair_rounds = _find_effect_pair(limited, catalogue, base, allowed, step) if can_add_pair else ()
         except OutOfTimeError:
             ended_early = True
             break
@@ -178,21 +182,22 @@ def add_effects(
         steps += [round_candidates[0] for round_candidates in pair_rounds or (allowed,)]
         base = steps[-1]
     final = selected.after if len(steps) == len(selected.steps) else context.with_test_score(base)
-    excluded = excluded or selected.barred
+    excluded = excluded or selected.excluded_name
     return replace(
-        selected, after=final, rounds=tuple(rounds), steps=tuple(steps), ended_early=ended_early, barred=excluded
+        selected, after=final, rounds=tuple(rounds), steps=tuple(steps), ended_early=ended_early, excluded_name=excluded
     )
 
 
-def _reevaluate(context: SearchContext, scored: FittedCandidate) -> Fitted:
-    """The candidate's model simulated again on the samples to fit and to choose by; the candidate was scored on all."""
-    return evaluate_fit(context.measure, context.tuning, scored.fitted.deviations, scored.fitted.hypothesis)
+def _reevaluate(context: SearchContext, candidate: FittedCandidate) -> Fitted:
+    """Simulate the candidate's model again on the samples to fit and to choose by; the candidate was scored on all."""
+    return evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
 
 
 def is_worth_searching(context: SearchContext, explanation: Explanation, base: FittedCandidate) -> bool:
-    """Whether `base`, the last step of `explanation`, leaves enough error to look for one more effect. No third effect
-    is looked for where two fit as well as right laws fit a real device, because it would only absorb their small
-    errors; except with opened held-out samples, which are few and may show an effect that the others do not."""
+    """Whether `base`, the last step of `explanation`, leaves enough error to search for one more effect. No third
+    effect is sought where two fit as well as right laws fit a real device, because it would only absorb their small
+    errors; except with clean recordings, and with opened held-out samples, which are few and may show an effect that
+    the others do not."""
     if base.fitted.hypothesis.claims:
         has_noise_limit = context.references is None and not context.has_opened_samples
         if has_noise_limit and len(base.fitted.hypothesis.claims) > 1 and has_small_error(explanation.retuned, base):
@@ -202,37 +207,42 @@ def is_worth_searching(context: SearchContext, explanation: Explanation, base: F
     return has_held_out_mismatch or context.references is not None or base.score.worst_channel > NOISE_ALONE
 
 
-def _look_ahead(
+def _find_effect_pair(
     context: SearchContext,
     catalogue: Sequence[Effect],
     base: FittedCandidate,
     candidates: tuple[FittedCandidate, ...],
     step: "Step",
 ) -> tuple[tuple[FittedCandidate, ...], ...]:
-    """Two rounds: an effect that alone is not worth adding, and a second effect, where both together remove more than
-    twice `ADDED_SHARE` of the excess error. Empty where the best of `candidates` is worth adding, or no such pair
-    is found."""
-    if not candidates or is_worthwhile(base, candidates[0]) or base.score.worst_channel <= REACHES_NOISE:
+    """Find two effects of which none alone is worth adding, but which together remove more than twice `ADDED_SHARE` of
+    the excess error. Returns their two rounds; empty where the best of `candidates` is worth adding, the error is near
+    the noise (`NEAR_NOISE_ERROR`), an effect is excluded, or no such pair is found."""
+    if not candidates or is_worthwhile(base, candidates[0]) or base.score.worst_channel <= NEAR_NOISE_ERROR:
         return ()
     best_by_name = {candidate.newest: candidate for candidate in reversed(candidates)}
-    for leading in [candidate for candidate in candidates if best_by_name[candidate.newest] is candidate][
+    for first_candidate in [candidate for candidate in candidates if best_by_name[candidate.newest] is candidate][
         :LOOK_AHEAD_CANDIDATES
     ]:
-        if base.score.mean_log_error - leading.score.mean_log_error <= ADDED_GAIN:
+        if base.score.mean_log_error - first_candidate.score.mean_log_error <= ADDED_GAIN:
             break
-        second_candidates = find_next_effect(context, catalogue, leading.fitted, step)
+        second_candidates = find_next_effect(context, catalogue, first_candidate.fitted, step)
         gain = base.score.mean_log_error - second_candidates[0].score.mean_log_error if second_candidates else 0.0
-        is_enough = gain > 2 * ADDED_SHARE * compute_excess(base) and is_worthwhile(leading, second_candidates[0])
-        if is_enough and not any(candidate.newest in context.excluded for candidate in second_candidates):
-            return (leading, *(rival for rival in candidates if rival is not leading)), second_candidates
+        is_gain_sufficient = gain > 2 * ADDED_SHARE * compute_excess(base) and is_worthwhile(
+            first_candidate, second_candidates[0]
+        )
+        if is_gain_sufficient and not any(candidate.newest in context.excluded for candidate in second_candidates):
+            return (
+                first_candidate,
+                *(rival for rival in candidates if rival is not first_candidate),
+            ), second_candidates
     return ()
 
 
-def _known_rounds(
+def _fit_known_rounds(
     context: SearchContext, base: FittedCandidate, previous_steps: Sequence[Sequence[FittedCandidate]]
 ) -> list[tuple[FittedCandidate, ...]]:
-    """Rounds that need no search: the certain hypotheses, and the steps of a search on fewer samples with the rivals
-    that were inseparable from them, all refitted."""
+    """Fit the rounds that need no search: the certain hypotheses, and the steps of a search on fewer samples with the
+    rivals that were inseparable from them."""
     rounds: list[tuple[FittedCandidate, ...]] = []
     for hypothesis in context.certain:
         base = _add_certain(context, base, hypothesis)
@@ -244,12 +254,12 @@ def _known_rounds(
 
 
 def _refit(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
-    """The candidate fitted again to the context's samples, from its own parameters."""
+    """Fit the candidate again to the context's samples, starting from its parameters."""
     return context.score_fit(refine(context, _reevaluate(context, candidate)))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
-    """The fit with a certain hypothesis added, even where that does not lower the error."""
+    """Add a certain hypothesis to a fit, even where that does not lower the error, and refine it."""
     start = evaluate_fit(
         context.measure, context.tuning, base.fitted.deviations, combine_hypotheses(base.fitted.hypothesis, hypothesis)
     )
@@ -257,10 +267,11 @@ def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypo
 
 
 def retune_alone(context: SearchContext) -> Fitted:
-    """The model re-tuned, without any added effect."""
+    """Re-tune the model, without any added effect."""
     return refine(
         context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     )
 
 
 _ORDINALS = ("first", "second", "third")
+"""Ordinal numbers of the effects in progress texts, up to `MOST_EFFECTS`."""

@@ -1,4 +1,4 @@
-"""Crash isolation of the diagnosis: an effect or a task that raises an exception is left out, and the report says so.
+"""Isolate crashes of the diagnosis: an effect or a task that raises an exception is left out, and the report says so.
 
 Used by the search over effects, the analyses after it, and the figures. A guard is disabled by default, and exceptions
 then propagate: tests, benchmarks and banks of simulated devices must see every crash.
@@ -17,6 +17,7 @@ from analysis.wording import capitalise, conjoin
 from equalizer.effects.effect import Effect
 
 Result = TypeVar("Result")
+"""Type of the result of a guarded function."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class WorkPart:
     """As in `Crash`; so is `step`."""
     step: str
     work: Callable[[], Any]
-    """Computes the result of the task."""
+    """Function that computes the result of the task."""
     substitute: Any
     """The result of the task if `work` crashes."""
 
@@ -54,20 +55,20 @@ class Guard:
     """Crashes caught so far."""
 
     def wrap(self, map_: Mapper, step: str) -> Mapper:
-        """A map over effects, hypotheses or fits that records crashes and leaves out the results of the items that
-        crashed; `map_` itself while the guard is disabled. step: as in `Crash`."""
+        """Return a map over effects, hypotheses or fits that records crashes and leaves out the results of the items
+        that crashed; `map_` itself while the guard is disabled. step: as in `Crash`."""
         if not self.enabled:
             return map_
 
         def guarded_map(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
             @wraps(function)
             def guard_item(item: object) -> tuple[object, ...] | Crash:
-                return _run_guarded(_find_effect_name(item), step, lambda: function(item))
+                return _run_guarded(_find_subject(item), step, lambda: function(item))
 
-            results: list[tuple[object, ...] | Crash] = list(map_(guard_item, items))  # type: ignore[arg-type]
+            outcomes: list[tuple[object, ...] | Crash] = list(map_(guard_item, items))  # type: ignore[arg-type]
             # Crashes are recorded here and not in `guard_item`, which may run in another process.
-            self.crashes.extend(outcome for outcome in results if isinstance(outcome, Crash))
-            return [result for outcome in results if not isinstance(outcome, Crash) for result in outcome]
+            self.crashes.extend(outcome for outcome in outcomes if isinstance(outcome, Crash))
+            return [result for outcome in outcomes if not isinstance(outcome, Crash) for result in outcome]
 
         return guarded_map
 
@@ -79,8 +80,8 @@ class Guard:
         substitute: Result,
         propagated: tuple[type[Exception], ...] = (),
     ) -> Result:
-        """The result of `work`, or `substitute` if it crashes. subject, step: as in `Crash`. propagated: exceptions
-        that are not caught, because they are messages to the user."""
+        """Run `work`, and return its result, or `substitute` if it crashes. subject, step: as in `Crash`. propagated:
+        exceptions that are not caught, because they are messages to the user."""
         outcome = _run_guarded(subject, step, work, propagated) if self.enabled else (work(),)
         if isinstance(outcome, Crash):
             self.crashes.append(outcome)
@@ -88,17 +89,17 @@ class Guard:
         return outcome[0]
 
     def run_parts(self, map_: Mapper, parts: Sequence[WorkPart]) -> list[Any]:
-        """The results of independent tasks, in their order; `WorkPart.substitute` for each that crashed. map_: runs
-        them, possibly in other processes."""
+        """Run independent tasks, and return their results in order; `WorkPart.substitute` for each that crashed. map_:
+        runs them, possibly in other processes."""
 
         def try_part(part: WorkPart) -> tuple[Any] | Crash:
             return _run_guarded(part.subject, part.step, part.work) if self.enabled else (part.work(),)
 
-        results: list[tuple[Any] | Crash] = list(map_(try_part, parts))  # type: ignore[arg-type]
-        self.crashes.extend(outcome for outcome in results if isinstance(outcome, Crash))
+        outcomes: list[tuple[Any] | Crash] = list(map_(try_part, parts))  # type: ignore[arg-type]
+        self.crashes.extend(outcome for outcome in outcomes if isinstance(outcome, Crash))
         return [
             part.substitute if isinstance(outcome, Crash) else outcome[0]
-            for part, outcome in zip(parts, results, strict=True)
+            for part, outcome in zip(parts, outcomes, strict=True)
         ]
 
     @property
@@ -113,7 +114,8 @@ class Guard:
 def _run_guarded(
     subject: str, step: str, work: Callable[[], Result], propagated: tuple[type[Exception], ...] = ()
 ) -> tuple[Result] | Crash:
-    """Run `work`; its result in a tuple, or the crash. Raises OutOfTimeError, and the exceptions of `propagated`."""
+    """Run `work`; returns its result in a tuple, or the crash. Raises OutOfTimeError, and the exceptions of
+    `propagated`."""
     try:
         return (work(),)
     except OutOfTimeError:
@@ -125,17 +127,22 @@ def _run_guarded(
 
 
 def _describe_crashes(subject: str, crashes: Iterable[Crash]) -> str:
-    """The sentence for the user on all crashes of this subject."""
+    """Write the sentence for the user on all crashes of a subject. The name of an effect follows its noun in brackets
+    where it does not already appear in it."""
     steps_and_errors = list(dict.fromkeys((crash.step, crash.message) for crash in crashes if crash.subject == subject))
-    noun = get_noun(subject)
-    name = noun if subject in noun or noun == subject.replace("_", " ") else f"{noun} ({subject})"
+    subject_noun = get_noun(subject)
+    name = (
+        subject_noun
+        if subject in subject_noun or subject_noun == subject.replace("_", " ")
+        else f"{subject_noun} ({subject})"
+    )
     steps = conjoin([f"{step} ({message})" for step, message in steps_and_errors])
     return f"{capitalise(name)} was left out because of a program error at {steps}: the result was obtained without it."
 
 
-def _find_effect_name(item: object) -> str:
-    """Name of an effect, or of the latest effect of a hypothesis or a fit; where there is none, a phrase for the
-    message."""
+def _find_subject(item: object) -> str:
+    """Find the name of an effect, or of the latest effect of a hypothesis or a fit; without one, return a phrase for
+    the message."""
     if isinstance(item, Effect):
         return item.name
     hypothesis = item if isinstance(item, Hypothesis) else getattr(item, "hypothesis", None)

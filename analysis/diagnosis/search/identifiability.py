@@ -1,10 +1,11 @@
-"""Identifiability: an effect is named only where the interval of one of its parameters excludes zero.
+"""Remove effects that the data do not identify: an effect is named only if the interval of a parameter excludes zero.
 
 Linearised intervals are computed first. Where an effect has one such parameter, and its interval contains zero by a
 small margin, the likelihood profile decides: with correlated parameters or a nonlinear law the linearised interval is
 too wide. The deviance between the fits without and with an effect needs no derivative. Summed over stretches longer
 than the errors' correlation time, its mean over its standard deviation is half of the parameter over its standard
-error, for any variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
+error, for any variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance). Called
+by `search`, `impacts`, `discovery.add_laws`, `confirm.confirm_laws`, `result.assemble_findings` and `diagnose`.
 """
 
 from collections.abc import Iterator
@@ -39,18 +40,18 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 _ZERO_TOLERANCE = 1e-9
-"""Relative distance of a parameter from its null value (no effect) below which it counts as that value."""
+"""Relative distance of a parameter from its null value (no effect) up to which it counts as that value. Chosen."""
 
 
 def compute_parameter_errors(context: SearchContext, explanation: Explanation) -> FloatArray:
-    """(parameters,): standard errors of the final hypothesis's point."""
+    """Compute (parameters,): standard errors of the final hypothesis's point."""
     if explanation.statistic is not None:
         return explanation.statistic.errors
     return compute_final_errors(context, explanation)[len(context.tuning.names) :]
 
 
 def compute_final_errors(context: SearchContext, explanation: Explanation) -> FloatArray:
-    """(t + parameters,): standard errors of the final fit, of the model's own deviations first."""
+    """Compute (t + parameters,): standard errors of the final fit, of the model's t deviations first."""
     last_candidate = explanation.steps[-1] if explanation.steps else explanation.retuned
     if explanation.errors is not None and explanation.errors[0] is last_candidate.fitted:
         return explanation.errors[1]
@@ -58,9 +59,9 @@ def compute_final_errors(context: SearchContext, explanation: Explanation) -> Fl
 
 
 def compute_interval_errors(context: SearchContext, explanation: Explanation, noise_errors: FloatArray) -> FloatArray:
-    """(t + parameters,): standard errors for the stated intervals. noise_errors: from `compute_final_errors`.
-    The jackknife error over segments is added in power, up to a multiple of the noise's, because with few segments a
-    jackknife has heavy tails. With a single segment, the factor `INTERVAL_FACTOR` is used in its place."""
+    """Compute (t + parameters,): standard errors for the stated intervals. noise_errors: from `compute_final_errors`.
+    The jackknife error over segments is added in power, up to `MOST_BETWEEN_SEGMENTS` times the noise's, because with
+    few segments a jackknife has heavy tails. With a single segment, the factor `INTERVAL_FACTOR` is used instead."""
     last_fit = (explanation.steps[-1] if explanation.steps else explanation.retuned).fitted
     if explanation.jackknife_errors is not None and explanation.jackknife_errors[0] is last_fit:
         jackknife_errors = explanation.jackknife_errors[1]
@@ -72,7 +73,8 @@ def compute_interval_errors(context: SearchContext, explanation: Explanation, no
 
 
 def finish_explanation(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
-    """The explanation with its final fit at the minimum, and with its standard errors."""
+    """Continue the final fit of an explanation, with at least one step, to its minimum, and add standard errors there;
+    unchanged where it has them."""
     last_candidate = explanation.steps[-1]
     if explanation.jackknife_errors is not None and explanation.jackknife_errors[0] is last_candidate.fitted:
         return explanation
@@ -111,23 +113,25 @@ def finish_explanation(context: SearchContext, explanation: Explanation, time_le
 
 
 def _finish_fit(context: SearchContext, fitted: Fitted, time_left: TimeBudget) -> tuple[Fitted, Sensitivity]:
+    """Continue a fit to its minimum; returns it, or the plainest form of its laws, with its sensitivity."""
+
     def compute_jacobian(iterate: Fitted) -> Sensitivity:
         return _compute_sensitivity(context, iterate)
 
-    finished, jacobian = finish_fit(context.measure, context.tuning, fitted, compute_jacobian, time_left)
+    finished_fit, jacobian = finish_fit(context.measure, context.tuning, fitted, compute_jacobian, time_left)
     # The last steps may deviate slightly from the plain form of a law whose parameters are redundant.
-    plainest = choose_plainest(context, finished)
-    return (finished, jacobian) if plainest is finished else (plainest, compute_jacobian(plainest))
+    plainest_fit = choose_plainest(context, finished_fit)
+    return (finished_fit, jacobian) if plainest_fit is finished_fit else (plainest_fit, compute_jacobian(plainest_fit))
 
 
 def _evaluate_with_sensitivity(context: SearchContext, last_fit: Fitted) -> tuple[Fitted, Sensitivity]:
-    """The fit on the samples to fit and to choose by, with the sensitivity to all its parameters."""
+    """Evaluate a fit on the samples to fit and to choose by, with the sensitivity to all its parameters."""
     fitted = evaluate_fit(context.measure, context.tuning, last_fit.deviations, last_fit.hypothesis)
     return fitted, _compute_sensitivity(context, fitted)
 
 
 def _compute_sensitivity(context: SearchContext, fitted: Fitted) -> Sensitivity:
-    """Sensitivity to all parameters of a fit, on one period of each segment where the drive repeats."""
+    """Compute the sensitivity to all parameters of a fit, on one period of each segment where the drive repeats."""
     short_form = shorten_recordings(context, fitted)
     fit_context = context if short_form is None else short_form.context
     jacobian = compute_full_sensitivity(
@@ -137,8 +141,8 @@ def _compute_sensitivity(context: SearchContext, fitted: Fitted) -> Sensitivity:
 
 
 def keep_identifiable(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
-    """The explanation without effects whose parameters are not identifiable, or another that is as good and
-    identifiable; unchanged where all parameters are identifiable."""
+    """Remove effects whose parameters are not identifiable, the last first; a single one is replaced by an equal rival
+    that is identifiable, if there is one. Where all are identifiable, only the fit is continued to its minimum."""
     if not explanation.steps:
         return explanation
     explanation = _apply_profile_errors(context, explanation, time_left)
@@ -149,12 +153,12 @@ def keep_identifiable(context: SearchContext, explanation: Explanation, time_lef
         return explanation
     removed_index = undetermined_indices[-1]
     name = explanation.after.fitted.hypothesis.claims[removed_index].effect.name
-    undetermined = (*explanation.undetermined, name)
+    undetermined_names = (*explanation.undetermined, name)
     if len(explanation.steps) == 1 or (removed_index < len(explanation.steps) - 1 and not time_left()):
         explanation = (
             _find_replacement(context, explanation, time_left) if len(explanation.steps) == 1 else None
         ) or _remove_effects(explanation)
-        return replace(explanation, undetermined=undetermined)
+        return replace(explanation, undetermined=undetermined_names)
     reduced = remove_effect(context, explanation, removed_index)
     rounds = tuple(
         tuple(
@@ -164,22 +168,22 @@ def keep_identifiable(context: SearchContext, explanation: Explanation, time_lef
         )
         for fitted_candidates in reduced.rounds
     )
-    return keep_identifiable(context, replace(reduced, rounds=rounds, undetermined=undetermined), time_left)
+    return keep_identifiable(context, replace(reduced, rounds=rounds, undetermined=undetermined_names), time_left)
 
 
 def _find_replacement(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation | None:
-    """Another single effect that is as good and identifiable; None without any."""
-    best = explanation.rounds[0][0]
-    rivals = tuple(candidate for candidate in explanation.rounds[0] if candidate.newest != best.newest)
-    equally_good = {candidate.newest: candidate for candidate in reversed(rivals) if is_equal_rival(best, candidate)}
-    for rival in sorted(equally_good.values(), key=lambda candidate: candidate.score.mean_log_error)[
+    """Find an equally good and identifiable single effect among `REPLACEMENTS_TRIED` rivals; None without any."""
+    named = explanation.rounds[0][0]
+    rivals = tuple(candidate for candidate in explanation.rounds[0] if candidate.newest != named.newest)
+    equal_rivals = {candidate.newest: candidate for candidate in reversed(rivals) if is_equal_rival(named, candidate)}
+    for rival in sorted(equal_rivals.values(), key=lambda candidate: candidate.score.mean_log_error)[
         :REPLACEMENTS_TRIED
     ]:
-        remaining = tuple(candidate for candidate in rivals if candidate is not rival)
+        other_rivals = tuple(candidate for candidate in rivals if candidate is not rival)
         replacement = replace(
             explanation,
             after=context.with_test_score(rival),
-            rounds=((rival, *remaining),),
+            rounds=((rival, *other_rivals),),
             steps=(rival,),
             errors=None,
         )
@@ -190,43 +194,45 @@ def _find_replacement(context: SearchContext, explanation: Explanation, time_lef
 
 
 def _remove_effects(explanation: Explanation) -> Explanation:
+    """Remove all effects, so that the re-tuned model is the result."""
     return replace(explanation, after=explanation.retuned, steps=())
 
 
 def _apply_profile_errors(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
-    """The explanation with its final fit at the minimum and the standard errors there. Where the linearised interval of
-    an effect's only number includes no effect but its profile does not, the error is the profile's. The profile of an
-    effect before the last refits those after it, which is left out where no time is left."""
+    """Continue the final fit to its minimum, and add the standard errors there. Where the linearised interval of an
+    effect's only parameter includes the null value, but its profile does not, the error is the profile's. The profile
+    of an effect before the last refits those after it, and is omitted where no time is left."""
     if explanation.statistic is None:
         explanation = finish_explanation(context, explanation, time_left)
     errors = compute_final_errors(context, explanation).copy()
-    offset = len(context.tuning.names)
-    for effect_index, parameters in enumerate(_iterate_null_parameters(explanation, errors[offset:])):
+    tuned_count = len(context.tuning.names)
+    for effect_index, parameters in enumerate(_iterate_null_parameters(explanation, errors[tuned_count:])):
         needs_refit = effect_index < len(explanation.steps) - 1
         if explanation.statistic is not None or len(parameters) != 1 or (needs_refit and not time_left()):
             continue
-        parameter, index, coordinate, error = parameters[0]
+        parameter, parameter_index, coordinate, error = parameters[0]
         half_width, distance = _compute_interval_and_distance(parameter, coordinate, error)
         if not distance < half_width <= UNDETERMINED_REACH * distance:
             continue
         profile_distance = compute_null_distance(context, explanation, effect_index, time_left)
         if profile_distance > 1:
-            share = distance / (profile_distance * half_width)
+            ratio = distance / (profile_distance * half_width)
             is_log_scale = parameter.parameter.scale == "log"
-            errors[offset + index] = np.log1p(share * np.expm1(error)) if is_log_scale else share * error
+            errors[tuned_count + parameter_index] = np.log1p(ratio * np.expm1(error)) if is_log_scale else ratio * error
     return replace(explanation, errors=(explanation.steps[-1].fitted, errors))
 
 
 def _iterate_null_parameters(
     explanation: Explanation, errors: FloatArray
 ) -> Iterator[list[tuple[FreeParameter, int, float, float]]]:
-    """Per effect, its parameters that have a null value (no effect), with index, coordinate and standard error."""
+    """Iterate over the effects: the parameters of each that have a finite null value (no effect), with index,
+    coordinate and standard error."""
     hypothesis, first_entry = explanation.after.fitted.hypothesis, 0
     entries = list(
         zip(hypothesis.parameters, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True)
     )
     for claim in hypothesis.claims:
-        free_count = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
+        free_count = claim.group_count * sum(not parameter.fixed for parameter in claim.effect.parameters)
         finite_entries = [
             entry
             for entry in entries[first_entry : first_entry + free_count]
@@ -237,38 +243,40 @@ def _iterate_null_parameters(
 
 
 def find_undetermined(context: SearchContext, explanation: Explanation) -> Iterator[bool]:
-    """Per effect, whether it is undetermined: the intervals of all its parameters with a null value include that."""
+    """Iterate over the effects: whether each is undetermined, because the intervals of all its parameters with a null
+    value include that value; False without such parameters."""
     for parameters in _iterate_null_parameters(explanation, compute_parameter_errors(context, explanation)):
         yield bool(parameters) and all(
-            _is_undetermined(free, coordinate, error) for free, _, coordinate, error in parameters
+            _is_undetermined(parameter, coordinate, error) for parameter, _, coordinate, error in parameters
         )
 
 
-def _is_undetermined(free: FreeParameter, coordinate: float, error: float) -> bool:
+def _is_undetermined(parameter: FreeParameter, coordinate: float, error: float) -> bool:
     """Whether the parameter's interval contains the value that means no effect. error: standard error of its
     coordinate."""
-    half_width, distance = _compute_interval_and_distance(free, coordinate, error)
-    value, null_value = free.to_value(coordinate), free.parameter.none or 0.0
+    half_width, distance = _compute_interval_and_distance(parameter, coordinate, error)
+    value, null_value = parameter.to_value(coordinate), parameter.parameter.none or 0.0
     return distance <= _ZERO_TOLERANCE * max(abs(value), abs(null_value)) or not half_width <= distance
 
 
-def _compute_interval_and_distance(free: FreeParameter, coordinate: float, error: float) -> tuple[float, float]:
-    """Half width of the parameter's interval, and the distance of its value from no effect."""
-    value, null_value = free.to_value(coordinate), free.parameter.none or 0.0
-    return 1.96 * INTERVAL_FACTOR * abs(free.to_value(coordinate + error) - value), abs(value - null_value)
+def _compute_interval_and_distance(parameter: FreeParameter, coordinate: float, error: float) -> tuple[float, float]:
+    """Compute the half width of the parameter's 95 % interval (1.96 standard errors, times `INTERVAL_FACTOR`), and the
+    distance of its value from its null value."""
+    value, null_value = parameter.to_value(coordinate), parameter.parameter.none or 0.0
+    return 1.96 * INTERVAL_FACTOR * abs(parameter.to_value(coordinate + error) - value), abs(value - null_value)
 
 
 def compute_null_distance(
-    context: SearchContext, explanation: Explanation, effect: int, time_left: TimeBudget = grant_time
+    context: SearchContext, explanation: Explanation, index: int, time_left: TimeBudget = grant_time
 ) -> float:
-    """Distance of an effect's only parameter from no effect, in half widths of its profile interval; above 1, the
-    interval excludes no effect. effect: its index."""
+    """Compute the distance of an effect's only parameter from its null value, in half widths of its profile interval;
+    above 1, the interval excludes the null value. index: of the effect."""
     last_fit = explanation.steps[-1].fitted
     reduced = (
-        explanation.retuned if len(explanation.steps) == 1 else remove_effect(context, explanation, effect).steps[-1]
+        explanation.retuned if len(explanation.steps) == 1 else remove_effect(context, explanation, index).steps[-1]
     )
-    # The re-tuned model, and at times the last step, is kept as it is on all samples. Both fits end at their minimum:
-    # else the difference is not all the effect's.
+    # The re-tuned model, and sometimes the last step, were evaluated on all samples. Both fits must be at their
+    # minimum: else the difference is not that of the effect alone.
     start = evaluate_fit(context.measure, context.tuning, reduced.fitted.deviations, reduced.fitted.hypothesis)
     fit_without = _finish_fit(context, start, time_left)[0]
     fit_with = evaluate_fit(context.measure, context.tuning, last_fit.deviations, last_fit.hypothesis)
@@ -282,10 +290,10 @@ def compute_null_distance(
 
 
 def _sum_stretch_squares(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
-    """(stretches,): sums of squares of the residuals on the fit samples."""
-    sums: list[float] = []
+    """Sum the squared residuals on the samples to fit over stretches of `STRETCH_S`, (stretches,)."""
+    square_sums: list[float] = []
     for record, residual in zip(measure.records, fitted.residuals, strict=True):
-        square = np.sum(residual[record.fit] ** 2, axis=1)
-        width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
-        sums += [float(square[start : start + width].sum()) for start in range(0, len(square), width)]
-    return np.array(sums)
+        squares = np.sum(residual[record.fit] ** 2, axis=1)
+        length = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
+        square_sums += [float(squares[start : start + length].sum()) for start in range(0, len(squares), length)]
+    return np.array(square_sums)

@@ -1,4 +1,4 @@
-"""Explanation of an irregular response by play (backlash) with impacts, compared by the power in frequency bands.
+"""Explain an irregular response by play (backlash) with impacts, compared by the power in frequency bands.
 
 Two simulations of a drive with play diverge within a few impacts, however small their initial difference (Ott, Chaos in
 Dynamical Systems, chapter 4). Waveforms can therefore not be compared. Band powers are compared instead (`band_power`),
@@ -52,15 +52,15 @@ from analysis.diagnosis.search.second_effect_with_play import (
     search_second_effects,
 )
 from analysis.diagnosis.search.time_budget import grant_time
-from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, PEAKED_KURTOSIS, VARIES_ERROR
+from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, IRREGULAR_ERROR, PEAKED_KURTOSIS
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 
 GAP_FACTORS = np.geomspace(0.02, 5.0, 13)
 """Starting values of the gap, relative to the estimated gap. Chosen by hand."""
-FIRST_FIT_ROUNDS = 5
-"""Gauss-Newton steps of the first fit, in which the model's parameters are fixed."""
+PLAY_FIT_STEPS = 5
+"""Gauss-Newton steps of the first fit of play, in which the model's parameters are fixed. Chosen."""
 
 
 def explain_impacts(
@@ -70,36 +70,37 @@ def explain_impacts(
     catalogue: Sequence[Effect],
     time_left: TimeBudget = grant_time,
 ) -> Explanation | None:
-    """The explanation by play, alone or with a second effect. None where the response is regular, where play does not
-    explain it, where the time ends before that is known, or where the error measure is no free simulation.
+    """Explain the response by play, alone or with a second effect. None where the response is regular, where play does
+    not explain it, where the time ends before that is known, where play is not in the catalogue, or where the error
+    measure is no free simulation.
 
     explanation: result of the search by waveforms. floors: noise of each recording. time_left: called before each
     refinement, and between its linearisations.
     """
-    effects = {effect.name: effect for effect in catalogue}
-    if PLAY not in effects or not isinstance(context.full_measure, FreeSimulation):
+    effects_by_name = {effect.name: effect for effect in catalogue}
+    if PLAY not in effects_by_name or not isinstance(context.full_measure, FreeSimulation):
         return None
     if not is_irregular(context, explanation, floors):
         return None
     given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     evidence = gather_evidence(context.measure, context.tuning, given_fit)[0]
     problem = BandPowerProblem(BandPower(context.measure), context.tuning, context.map_)
-    play_claims = [Claim(effects[PLAY], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
+    play_claims = [Claim(effects_by_name[PLAY], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
     axis_fits = sorted((_fit_claim(problem, evidence, claim) for claim in play_claims), key=lambda fit: fit.cost)
     if axis_fits[0].cost >= evaluate_hypothesis(problem, given_fit.deviations, NO_EFFECTS).cost:
         return None
-    chance_weighted = weight_by_chance_variation(problem, axis_fits[0])
+    weighted_problem = weight_by_chance_variation(problem, axis_fits[0])
     retuned_deviations = explanation.retuned.fitted.deviations
-    if evaluate_hypothesis(chance_weighted, retuned_deviations, NO_EFFECTS).cost <= SUFFICIENT_COST:
+    if evaluate_hypothesis(weighted_problem, retuned_deviations, NO_EFFECTS).cost <= SUFFICIENT_COST:
         return None  # the band powers of the model without play differ from the recorded ones by chance alone
     if not time_left():
         return None
-    play_fit = refine_band_power(chance_weighted, axis_fits[0], time_left)
-    rivals = list(axis_fits[1:])
-    if RIVAL_EFFECT in effects:
-        rival_claim = Claim(effects[RIVAL_EFFECT], "one", play_fit.hypothesis.claims[0].sites)
-        rivals.append(_fit_claim(problem, evidence, rival_claim))
-    rival_hypotheses = [rival.hypothesis for rival in rivals if rival.hypothesis.claims and np.isfinite(rival.cost)]
+    play_fit = refine_band_power(weighted_problem, axis_fits[0], time_left)
+    rival_fits = list(axis_fits[1:])
+    if RIVAL_EFFECT in effects_by_name:
+        rival_claim = Claim(effects_by_name[RIVAL_EFFECT], "one", play_fit.hypothesis.claims[0].sites)
+        rival_fits.append(_fit_claim(problem, evidence, rival_claim))
+    rival_hypotheses = [rival.hypothesis for rival in rival_fits if rival.hypothesis.claims and np.isfinite(rival.cost)]
     play_comparison = make_band_power_comparison(context, play_fit)
     play_candidate = play_comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
     is_explained = compute_worst_misfit(play_candidate) <= EXPLAINED_BY_CHANCE
@@ -119,13 +120,13 @@ def _find_confirmed_explanation(
     rival_hypotheses: Sequence[Hypothesis],
     play_comparison: BandPowerComparison,
 ) -> Explanation | None:
-    """The first explanation that the recordings confirm: by play with a second effect, the best fit first, last by play
-    alone. Confirmed: `_judge_play` accepts it, all its parameters are determined, and `_needs_gap` holds, because play
-    without a gap causes no irregular response. fits, rival_hypotheses: as for `_judge_play`. play_comparison: with the
-    chance variation of play alone."""
-    play_fit, pairs = fits
-    for pair_index in range(len(pairs) + 1):
-        pair_fits = pairs[pair_index:]
+    """Find the first explanation that the recordings confirm: by play with a second effect, the best fit first, then by
+    play alone; None without any. An explanation is confirmed if `_judge_play` accepts it, all its parameters are
+    determined, and `_needs_gap` is True, because play without a gap causes no irregular response. fits,
+    rival_hypotheses: as for `_judge_play`. play_comparison: with the chance variation of play alone."""
+    play_fit, all_pair_fits = fits
+    for pair_index in range(len(all_pair_fits) + 1):
+        pair_fits = all_pair_fits[pair_index:]
         best_fit = (*pair_fits, play_fit)[0]
         comparison = make_band_power_comparison(context, best_fit) if pair_fits else play_comparison
         play_explanation = _judge_play(comparison, explanation, problem, (play_fit, pair_fits), rival_hypotheses)
@@ -138,13 +139,16 @@ def _find_confirmed_explanation(
 
 def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_fit: BandPowerFit) -> bool:
     """Whether a gap of zero is ruled out: with the gap fixed at its least value and all other parameters fitted again,
-    the misfit is much larger (profile likelihood; `is_convincing`)."""
+    the misfit is much larger (profile likelihood; `is_convincing`). False where that fit diverges."""
     claim, placed_effect = best_fit.hypothesis.claims[0], best_fit.hypothesis.list_placed_effects()[0]
-    parameters = claim.effect.parameters
+    effect_parameters = claim.effect.parameters
     gapless_effect = replace(
-        claim.effect, parameters=tuple(replace(p, fixed=p.fixed or p.name == "gap") for p in parameters)
+        claim.effect,
+        parameters=tuple(
+            replace(parameter, fixed=parameter.fixed or parameter.name == "gap") for parameter in effect_parameters
+        ),
     )
-    smallest_gap = next(p.lower for p in parameters if p.name == "gap")
+    smallest_gap = next(parameter.lower for parameter in effect_parameters if parameter.name == "gap")
     hypothesis = combine_hypotheses(
         make_claim_hypothesis(replace(claim, effect=gapless_effect), [{**placed_effect.values, "gap": smallest_gap}]),
         remove_claim(best_fit.hypothesis, 0),
@@ -163,9 +167,9 @@ def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_
 
 
 def _fit_claim(problem: BandPowerProblem, evidence: Evidence, claim: Claim) -> BandPowerFit:
-    """The best fit of a claim, with the model's parameters fixed, evaluated on all segments. It is fitted on the
-    segments that excite its axis, from the best of several starting gaps (`GAP_FACTORS`). Without starting values: the
-    model without effects."""
+    """Fit a claim with the model's parameters fixed, and evaluate it on all segments. It is fitted on the segments that
+    excite its axis, from the best of several starting gaps (`GAP_FACTORS`). Without starting values, the model without
+    effects is returned."""
     measure = problem.power.measure
     assert isinstance(measure, FreeSimulation)
     segment_problem = BandPowerProblem(
@@ -180,7 +184,7 @@ def _fit_claim(problem: BandPowerProblem, evidence: Evidence, claim: Claim) -> B
 
     trial_fits: list[BandPowerFit] = list(segment_problem.map_(evaluate, start_values))  # type: ignore[arg-type]
     best_fit = (
-        fit_band_power(segment_problem, min(trial_fits, key=lambda trial: trial.cost), FIRST_FIT_ROUNDS)
+        fit_band_power(segment_problem, min(trial_fits, key=lambda trial: trial.cost), PLAY_FIT_STEPS)
         if trial_fits
         else None
     )
@@ -194,10 +198,10 @@ def _judge_play(
     fits: tuple[BandPowerFit, Sequence[BandPowerFit]],
     rival_hypotheses: Sequence[Hypothesis],
 ) -> Explanation | None:
-    """The explanation by play, and by a second effect if there is one. None where the re-tuned model, another effect or
-    a rival of play is about as good, or a second effect does not improve on play alone. comparison: with the chance
-    variation of the best fit. fits: of play alone, and with a second effect, the best first. rival_hypotheses: play on
-    other axes, and the effect `RIVAL_EFFECT`."""
+    """Judge play, with a second effect if there is one, and return the explanation. None where the re-tuned model,
+    another effect or a rival of play is about as good, or a second effect does not improve on play alone.
+    comparison: with the chance variation of the best fit. fits: of play alone, and with a second effect, the best
+    first. rival_hypotheses: play on other axes, and the effect `RIVAL_EFFECT`."""
     play_fit, pair_fits = fits
     best_fit = (*pair_fits, play_fit)[0]
     play_candidate = comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
@@ -208,7 +212,7 @@ def _judge_play(
     linear_candidates = [comparison.score_candidate(deviations, NO_EFFECTS) for deviations in deviation_sets]
     given_candidate = linear_candidates[0]
     retuned_candidate = min(linear_candidates, key=lambda candidate: candidate.score.mean_log_error)
-    rivals = [comparison.score_candidate(no_deviations, rival) for rival in rival_hypotheses]
+    rival_candidates = [comparison.score_candidate(no_deviations, rival) for rival in rival_hypotheses]
     waveform_candidates = [
         comparison.score_candidate(candidate.fitted.deviations, candidate.fitted.hypothesis)
         for candidate in (*(explanation.rounds[0] if explanation.rounds else ()), *explanation.steps[1:])
@@ -218,24 +222,25 @@ def _judge_play(
     is_simpler_as_good = any(is_as_good(candidate, best_candidate) for candidate in simpler_candidates)
     if is_simpler_as_good or not is_convincing(best_candidate, retuned_candidate):
         return None
-    for rival in (scored for scored in rivals if is_as_good(scored, play_candidate)):
+    for rival in (scored for scored in rival_candidates if is_as_good(scored, play_candidate)):
         if not pair_fits:
             return None
         second_effect = remove_claim(best_fit.hypothesis, 0)
         start = evaluate_hypothesis(problem, no_deviations, combine_hypotheses(rival.fitted.hypothesis, second_effect))
-        rival_pair = fit_band_power(problem, start, FIRST_FIT_ROUNDS)
+        rival_pair = fit_band_power(problem, start, PLAY_FIT_STEPS)
         if is_as_good(comparison.score_candidate(rival_pair.deviations, rival_pair.hypothesis), best_candidate):
             return None
-    rivals = sorted([*rivals, *waveform_candidates], key=lambda rival: rival.score.mean_log_error)
+    rival_candidates = sorted([*rival_candidates, *waveform_candidates], key=lambda rival: rival.score.mean_log_error)
     statistic = Statistic(comparison.chance_variation, best_fit.errors)
-    rounds = ((play_candidate, *rivals), *((pair_candidates,) if pair_candidates else ()))
+    rounds = ((play_candidate, *rival_candidates), *((pair_candidates,) if pair_candidates else ()))
     steps = (play_candidate, *pair_candidates[:1])
     return Explanation(given_candidate, retuned_candidate, best_candidate, rounds, steps, statistic)
 
 
 def is_irregular(context: SearchContext, explanation: Explanation, floors: Sequence[NoiseFloor]) -> bool:
     """Whether a response is irregular, as with play that rattles: the periods of a segment vary by more than
-    `VARIES_ERROR` times the noise or, without repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`."""
+    `IRREGULAR_ERROR` times the noise or, without repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`;
+    False without samples to fit."""
     if any(floor.method == "repeats" for floor in floors):
         return any(
             _is_variation_large(channel) for floor in floors for channel in (floor.response, floor.position) if channel
@@ -250,5 +255,5 @@ def is_irregular(context: SearchContext, explanation: Explanation, floors: Seque
 
 
 def _is_variation_large(noise: ChannelNoise) -> bool:
-    """Whether the variance between the periods of a segment exceeds (VARIES_ERROR rms)² in a channel."""
-    return any(bool(np.any(segment.variance > (VARIES_ERROR * noise.rms) ** 2)) for segment in noise.segments)
+    """Whether the variance between the periods of a segment exceeds (IRREGULAR_ERROR rms)² in a channel."""
+    return any(bool(np.any(segment.variance > (IRREGULAR_ERROR * noise.rms) ** 2)) for segment in noise.segments)

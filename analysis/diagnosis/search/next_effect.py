@@ -1,8 +1,7 @@
-"""One step of forward selection: which effect of the catalogue lowers the error most when added to those selected so
-far.
+"""Find the effect of the catalogue that lowers the error most when added to the selected ones (forward selection).
 
 Candidates are screened by linearisation, fitted by output error and compared: steps 2 to 5 of the theory of operation
-in `explain`.
+in `explain`. Called by `explain` and `revise_selection`.
 """
 
 from collections.abc import Sequence
@@ -40,18 +39,20 @@ class Step:
 
     label: str
     start_share: float
-    """Share of the whole work that precedes this step, 0 to 1."""
+    """Share of the search's work that precedes this step, 0 to 1."""
     progress: Progress
 
-    def report(self, share: float) -> None:
-        """Report progress. share: of this step, 0 to 1; the step is 0.3 of the whole work."""
-        self.progress(self.label, self.start_share + 0.3 * share)
+    def report(self, step_fraction: float) -> None:
+        """Report progress. step_fraction: completed fraction of this step, 0 to 1; a step counts as 0.3 of the search,
+        which has at most three."""
+        self.progress(self.label, self.start_share + 0.3 * step_fraction)
 
 
 def find_next_effect(
     context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step
 ) -> tuple[FittedCandidate, ...]:
-    """The fitted candidates for one more effect beside those of `base`, the preferred one first (`parsimony`)."""
+    """Find candidates for one more effect in addition to those of `base`, fitted, the preferred one first
+    (`parsimony`)."""
     step.report(0.0)
     evidence = gather_evidence(context.measure, context.tuning, base)[0]
     fits = find_first_fits(context, catalogue, base, evidence, step)
@@ -67,35 +68,35 @@ def find_first_fits(
     step: Step,
     sites: tuple[int, ...] = (),
 ) -> list[Fitted]:
-    """First fits of one more effect beside those of `base`, the best first. sites: places at which it must act; empty
-    where it may act at any."""
-    observable = [effect for effect in catalogue if context.measure.can_observe(effect)]
+    """Find first fits of one more effect in addition to those of `base`, the best first. sites: places at which it must
+    act; empty where it may act at any."""
+    observable_effects = [effect for effect in catalogue if context.measure.can_observe(effect)]
 
-    def suggest(effects: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
-        suggested = _suggest_hypotheses(context, base.hypothesis, effects, evidence)
-        return [hypothesis for hypothesis in suggested if not sites or hypothesis.claims[0].sites == sites]
+    def suggest_at_sites(effects: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
+        hypotheses = _suggest_hypotheses(context, base.hypothesis, effects, evidence)
+        return [hypothesis for hypothesis in hypotheses if not sites or hypothesis.claims[0].sites == sites]
 
     short_form = shorten_recordings(context, base)
     if short_form is None:
-        suggested = suggest(observable, evidence)
+        hypotheses = suggest_at_sites(observable_effects, evidence)
         jacobian = compute_sensitivity(context, base.deviations, base.hypothesis, with_forces=True)
         step.report(0.2)
         guarded_map = context.guard.wrap(context.map_, SCREENING)
-        screened = screen(context.measure, context.tuning, base, jacobian, suggested, guarded_map)
-        return list(fit_first(context, base, jacobian, screened))
-    time_invariant = suggest(
-        [effect for effect in observable if not effect.of_time], short_form.restrict_evidence(evidence)
+        screened_hypotheses = screen(context.measure, context.tuning, base, jacobian, hypotheses, guarded_map)
+        return list(fit_first(context, base, jacobian, screened_hypotheses))
+    time_invariant_hypotheses = suggest_at_sites(
+        [effect for effect in observable_effects if not effect.of_time], short_form.restrict_evidence(evidence)
     )
-    time_varying = suggest([effect for effect in observable if effect.of_time], evidence)
+    time_varying_hypotheses = suggest_at_sites([effect for effect in observable_effects if effect.of_time], evidence)
     step.report(0.2)
-    return fit_on_short_recordings(context, short_form, base, time_invariant, time_varying)
+    return fit_on_short_recordings(context, short_form, base, time_invariant_hypotheses, time_varying_hypotheses)
 
 
 def compare_plausible_fits(
     context: SearchContext, base: Fitted, fits: Sequence[Fitted], evidence: Evidence
 ) -> tuple[FittedCandidate, ...]:
-    """The candidates of these first fits, the preferred one first, without those that predict nothing beyond `base` and
-    those with a parameter outside the range of the data (such as a limit above the largest command)."""
+    """Compare the candidates of these first fits, the preferred one first, without those that predict nothing beyond
+    `base` and those with a parameter outside the range of the data (such as a limit above the largest command)."""
     return move_preferred_first(
         [
             candidate
@@ -109,9 +110,9 @@ def compare_plausible_fits(
 def _suggest_hypotheses(
     context: SearchContext, base_hypothesis: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
 ) -> list[Hypothesis]:
-    """The hypotheses to try beside those of `base_hypothesis`: each effect with its starting values, and drifts of the
-    clock by trial where there are reference recordings."""
-    suggested = [
+    """Suggest hypotheses in addition to `base_hypothesis`: each effect with its starting values, unless it excludes one
+    of the base, and clock drift by grid search where there are reference recordings."""
+    hypotheses = [
         hypothesis
         for hypothesis in list_candidates(catalogue, evidence, context.guard.wrap(context.map_, STARTING))
         if not any(are_exclusive(base_claim, hypothesis.claims[0]) for base_claim in base_hypothesis.claims)
@@ -119,5 +120,5 @@ def _suggest_hypotheses(
     if context.references is not None and not any(
         base_claim.effect.name == CLOCK_DRIFT for base_claim in base_hypothesis.claims
     ):
-        suggested += context.guard.run(CLOCK_DRIFT, STARTING, lambda: search_clock_drift(catalogue, evidence), ())
-    return suggested
+        hypotheses += context.guard.run(CLOCK_DRIFT, STARTING, lambda: search_clock_drift(catalogue, evidence), ())
+    return hypotheses

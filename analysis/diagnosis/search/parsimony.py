@@ -1,10 +1,10 @@
 """Model selection: whether an effect is worth adding, and which of two candidates is preferred (parsimony).
 
 Candidates are compared by the mean log error power over channels (`FitScore.mean_log_error`, 0 = noise alone). Its
-excess above the accuracy of the noise estimate, `NOISE_KNOWN_TO`, is the part that remains unexplained. Where the
+excess above the accuracy of the noise estimate, `NOISE_ACCURACY`, is the part that remains unexplained. Where the
 errors of two candidates do not differ by more than chance, the one with the lower information criterion is preferred,
-and a special case before the more general law, unless the latter has a clearly smaller error. Called by modules of
-`search`, `discovery`, `confirm`, `result` and `next_experiment`.
+and a special case before the more general law, unless the latter's error is smaller by a margin (`REFINED_SHARE`).
+Called by modules of `search`, `discovery`, `confirm`, `result` and `next_experiment`.
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ from analysis.diagnosis.settings import (
     CONVINCING_ERROR,
     CONVINCING_SHARE,
     EXPLAINED_ERROR,
-    LAW_BEATS,
+    LAW_REPLACES_RATIO,
+    NOISE_ACCURACY,
     NOISE_ALONE,
-    NOISE_KNOWN_TO,
     REFINED_FRICTION_SHARE,
     REFINED_GAIN,
     REFINED_MOST_GAIN,
@@ -40,7 +40,7 @@ DRY_FRICTION = frozenset(
         "position_dependent_friction",
     }
 )
-"""Names of the effects whose force opposes the motion and hardly depends on its speed."""
+"""Names of the effects whose force opposes the motion and depends little on its speed."""
 
 FAMILIES: tuple[frozenset[str], ...] = (
     DRY_FRICTION,
@@ -66,8 +66,8 @@ def are_exclusive(existing: Claim, added: Claim) -> bool:
 def list_relatives(name: str, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
     """List the effects that may replace the named one, itself included: its family, and the laws of which it is a
     special case."""
-    families = {name}.union(*(family for family in FAMILIES if name in family))
-    return tuple(effect for effect in catalogue if effect.name in families or name in effect.simpler)
+    relative_names = {name}.union(*(family for family in FAMILIES if name in family))
+    return tuple(effect for effect in catalogue if effect.name in relative_names or name in effect.simpler)
 
 
 def move_preferred_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
@@ -83,8 +83,8 @@ def move_preferred_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[
 
 
 def _is_simpler(simpler: FittedCandidate, reference: FittedCandidate) -> bool:
-    """Whether a candidate is a special case of the reference, or no refinement of it with a lower information
-    criterion."""
+    """Whether a candidate is a special case of the reference, or has a lower information criterion and is no refinement
+    of it."""
     return is_refined_candidate(reference, simpler) or (
         _compute_information_criterion(simpler) < _compute_information_criterion(reference)
         and not is_refined_candidate(simpler, reference)
@@ -92,9 +92,9 @@ def _is_simpler(simpler: FittedCandidate, reference: FittedCandidate) -> bool:
 
 
 def _compute_information_criterion(candidate: FittedCandidate) -> float:
-    """2 k + |d|²: Akaike's penalty (1974) for the k parameters of the effects, and the squared deviations d of the
-    re-tuned parameters from the calibration, in prior standard deviations. Without the likelihood term, because only
-    candidates with equal errors are compared by it."""
+    """Compute 2 k + |d|²: Akaike's penalty (1974) for the k parameters of the effects, and the squared deviations d of
+    the re-tuned parameters from the calibration, in prior standard deviations. The likelihood term is omitted, because
+    only candidates with equal errors are compared by it."""
     deviations = candidate.fitted.deviations
     return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
 
@@ -111,12 +111,13 @@ def is_equal_rival(named_candidate: FittedCandidate, rival: FittedCandidate) -> 
 
 
 def compute_excess(candidate: FittedCandidate) -> float:
-    """Mean log error power above the noise and its uncertainty, at least 0."""
-    return max(candidate.score.mean_log_error - NOISE_KNOWN_TO, 0.0)
+    """Compute the mean log error power above the noise and its uncertainty, at least 0."""
+    return max(candidate.score.mean_log_error - NOISE_ACCURACY, 0.0)
 
 
 def compute_mismatch_share(base: FittedCandidate, completed: FittedCandidate) -> float:
-    """Share of the base's excess (`compute_excess`) that the completed candidate removes, 0 to 1; 0 without excess."""
+    """Compute the share of the base's excess (`compute_excess`) that the completed candidate removes, 0 to 1; 0 without
+    excess."""
     base_excess = compute_excess(base)
     return min(max(1 - compute_excess(completed) / base_excess, 0.0), 1.0) if base_excess > 0 else 0.0
 
@@ -132,8 +133,9 @@ def has_small_error(retuned: FittedCandidate, candidate: FittedCandidate) -> boo
 
 
 def are_inseparable(best: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether the rival's error exceeds that of the best candidate by no more than chance, or by no more than both gain
-    on clean recordings, where neither effect is present."""
+    """Whether the rival's error exceeds that of the best candidate by no more than chance (`AS_GOOD_GAIN`,
+    `AS_GOOD_SHARE`), or by no more than the smaller of their gains on clean recordings, where neither effect is
+    present."""
     difference = rival.score.mean_log_error - best.score.mean_log_error
     return difference <= max(AS_GOOD_GAIN, AS_GOOD_SHARE * compute_excess(best), min(rival.clean_gain, best.clean_gain))
 
@@ -152,13 +154,18 @@ def is_worthwhile(base: FittedCandidate, extended: FittedCandidate) -> bool:
 def _is_special_case(special_candidate: FittedCandidate, general_candidate: FittedCandidate) -> bool:
     """Whether the last effect of one candidate is a special case of the other's last effect, at a subset of its
     sites."""
-    special, general = special_candidate.fitted.hypothesis.claims[-1], general_candidate.fitted.hypothesis.claims[-1]
-    return special.effect.name in general.effect.simpler and set(special.sites) <= set(general.sites)
+    special_claim, general_claim = (
+        special_candidate.fitted.hypothesis.claims[-1],
+        general_candidate.fitted.hypothesis.claims[-1],
+    )
+    return special_claim.effect.name in general_claim.effect.simpler and set(special_claim.sites) <= set(
+        general_claim.sites
+    )
 
 
 def _is_preferable(simpler: FittedCandidate, refined: FittedCandidate) -> bool:
-    """Whether the simpler candidate is preferred: its special case, over which the refined one gains too little, or
-    else inseparable from it."""
+    """Whether the simpler candidate is preferred: where it is a special case of the refined one, whether that gains too
+    little; else whether both are inseparable."""
     if not _is_special_case(simpler, refined):
         return are_inseparable(refined, simpler)
     gain = simpler.score.mean_log_error - refined.score.mean_log_error
@@ -167,12 +174,12 @@ def _is_preferable(simpler: FittedCandidate, refined: FittedCandidate) -> bool:
 
 
 def has_far_smaller_error(law_candidate: FittedCandidate, effect_candidate: FittedCandidate) -> bool:
-    """Whether a law outside the catalogue replaces a named effect: its excess error is at most the share `LAW_BEATS` of
-    the effect's, and its mean log rms error on the held-out samples, if there are any, is lower by more than
-    `NOISE_KNOWN_TO`. The second condition rejects a law that is the effect's formula in another form."""
-    candidate_error, rival_error = (
-        float(np.mean(np.log(fitted.score.test))) for fitted in (law_candidate, effect_candidate)
+    """Whether a law outside the catalogue replaces a named effect: its excess error is at most the share
+    `LAW_REPLACES_RATIO` of the effect's, and its mean log rms error on the held-out samples, if there are any, is lower
+    by more than `NOISE_ACCURACY`. The second condition rejects a law that is the effect's formula in another form."""
+    law_error, effect_error = (
+        float(np.mean(np.log(candidate.score.test))) for candidate in (law_candidate, effect_candidate)
     )
-    if np.isfinite(candidate_error) and candidate_error >= rival_error - NOISE_KNOWN_TO:
+    if np.isfinite(law_error) and law_error >= effect_error - NOISE_ACCURACY:
         return False
-    return compute_excess(law_candidate) <= LAW_BEATS * compute_excess(effect_candidate)
+    return compute_excess(law_candidate) <= LAW_REPLACES_RATIO * compute_excess(effect_candidate)

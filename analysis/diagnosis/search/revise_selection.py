@@ -26,7 +26,7 @@ from analysis.diagnosis.search.next_effect import (
 from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile, list_relatives, move_preferred_first
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
-from analysis.diagnosis.search.verdict import as_good_as_noise, compute_step_shares, is_worth_naming
+from analysis.diagnosis.search.verdict import compute_step_shares, is_near_noise, is_worth_naming
 from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
@@ -95,7 +95,7 @@ def drop_unnecessary_effects(context: SearchContext, explanation: Explanation, t
     """Drop the first of at least two effects without which the others fit as well; of more than two, repeat. A later
     effect may have made it superfluous, and the last may only have led the others out of a local minimum. Of more than
     two effects without reference recordings, else drop the one without which the others leave the smallest error, if
-    that is as small as the noise (`as_good_as_noise`): no law is exact, and a third effect may only fit the remaining
+    that is as small as the noise (`is_near_noise`): no law is exact, and a third effect may only fit the remaining
     error. Unchanged where every effect is needed, or no time is left."""
     sufficient_explanations, last_index = [], len(explanation.steps) - 1
     for effect_index in range(len(explanation.steps) if time_left() else 0):
@@ -108,7 +108,7 @@ def drop_unnecessary_effects(context: SearchContext, explanation: Explanation, t
             if not is_worthwhile(reduced.steps[-1], explanation.steps[-1]):
                 return reduced if last_index < 2 else drop_unnecessary_effects(context, reduced, time_left)
             sufficient_explanations += (
-                [reduced] if last_index > 1 and context.references is None and as_good_as_noise(reduced) else []
+                [reduced] if last_index > 1 and context.references is None and is_near_noise(reduced) else []
             )
         if not time_left():
             break
@@ -131,7 +131,7 @@ def drop_unconfirmed_effects(context: SearchContext, explanation: Explanation) -
 def drop_negligible_effects(context: SearchContext, explanation: Explanation) -> Explanation:
     """Drop last effects, but not the first, that remove less than `LAST_EFFECT_SHARE` of the mismatch, while the error
     is above the noise and the others are still worth naming."""
-    while len(explanation.steps) > 1 and not as_good_as_noise(explanation):
+    while len(explanation.steps) > 1 and not is_near_noise(explanation):
         if compute_step_shares(explanation.retuned, explanation.steps)[-1] >= LAST_EFFECT_SHARE:
             break
         reduced = remove_effect(context, explanation, len(explanation.steps) - 1)
@@ -226,7 +226,7 @@ def _move_first_to_end(context: SearchContext, candidate: FittedCandidate) -> Fi
 def _may_exchange(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> bool:
     """Whether there are two or more effects that may be changed, the error is above `EXPLAINED_ERROR`, and time is
     left."""
-    is_fixed = context.certain or context.references is not None or explanation.ended_early or explanation.barred
+    is_fixed = context.certain or context.references is not None or explanation.ended_early or explanation.excluded_name
     is_improvable = len(explanation.steps) > 1 and explanation.after.score.worst_channel > EXPLAINED_ERROR
     return not is_fixed and is_improvable and time_left()
 

@@ -56,12 +56,12 @@ from analysis.diagnosis.search.verdict import (
     TEST_PARTS_USED,
     Judgement,
     SearchResult,
-    as_good_as_noise,
-    confirms_addition,
-    is_plainer,
+    has_confirmed_addition,
+    is_near_noise,
+    is_simpler,
+    is_wider_bound_needed,
     judge,
     list_remarks,
-    may_move_further,
 )
 from analysis.diagnosis.settings import EXPLAINED_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -133,13 +133,13 @@ def repeat_with_wider_bound(
 ) -> SearchResult:
     """Repeat the search with a wider bound of the model's own parameters (step 6), where the result leaves a mismatch
     or needs three effects, and a parameter is at its bound. Returns `result` unless the repeated search explains more
-    or with fewer effects (`is_plainer`). context: of the search that gave `result`."""
-    if not catalogue or not may_move_further(result) or not time_left():
+    or with fewer effects (`is_simpler`). context: of the search that gave `result`."""
+    if not catalogue or not is_wider_bound_needed(result) or not time_left():
         return result
     progress("searching again, with a model that may move further", 0.1)
     wider_context = replace(context, tuning=context.tuning.with_wider_bound())
     repeated = search_effects(wider_context, catalogue, progress, time_left)
-    if not is_plainer(repeated, result):
+    if not is_simpler(repeated, result):
         is_timed_out = repeated.found.ended_early and OUT_OF_TIME not in result.remarks
         return replace(result, remarks=(*result.remarks, OUT_OF_TIME)) if is_timed_out else result
     unconfirmed = (*result.unconfirmed, *repeated.unconfirmed)
@@ -151,8 +151,8 @@ def _choose_early_or_full(early: SearchResult, full: SearchResult) -> SearchResu
     law, where the full search names nothing, or where time ran out and its effects leave a far larger error."""
     is_timed_out = full.found.ended_early
     if not early.judgement.named:
-        lost = early.unconfirmed if is_timed_out or not full.unconfirmed else ()
-        return replace(full, unconfirmed=(*lost, *full.unconfirmed))
+        candidates = early.unconfirmed if is_timed_out or not full.unconfirmed else ()
+        return replace(full, unconfirmed=(*candidates, *full.unconfirmed))
     if full.judgement.named and not (is_timed_out and has_far_smaller_error(early.found.after, full.found.after)):
         return full
     return replace(early, remarks=(OUT_OF_TIME, *early.remarks)) if is_timed_out else early
@@ -178,8 +178,8 @@ def _search_third_effect(
     judgement = _judge_with_prediction(context, final)
     earlier = SearchResult(context, final, judgement, list_remarks(final))
     # Effects that fit their samples are kept even if unconfirmed: another may show in the held-out samples alone.
-    fit = final.after if judgement.named or (final.steps and as_good_as_noise(final)) else final.retuned
-    if final.ended_early or final.barred or not has_held_out_mismatch(fit.score.test, fit):
+    fit = final.after if judgement.named or (final.steps and is_near_noise(final)) else final.retuned
+    if final.ended_early or final.excluded_name or not has_held_out_mismatch(fit.score.test, fit):
         return at_end(earlier)
     try:
         repeated, adds_effects = _search_with_opened(earlier, fit, catalogue, progress, time_left)
@@ -228,10 +228,10 @@ def _repeat_with_opened(
     """Repeat the search with a part of the held-out samples opened (step 4); fit: shows the mismatch. Returns also the
     number of parts into which each stretch was cut; 0 = all but the loudest segments were opened, where both groups
     show the mismatch. least_parts: least number of parts; above 2, all stretches are cut."""
-    milder = earlier.context.open_quieter_segments(fit) if least_parts == HALVES else None
-    context, parts = earlier.context.open_alternate_parts(fit, least_parts) if milder is None else (milder, 0)
-    continues = fit is earlier.found.after and as_good_as_noise(earlier.found)
-    previous_steps = earlier.found.rounds[: len(earlier.found.steps)] if continues else ()
+    quieter = earlier.context.open_quieter_segments(fit) if least_parts == HALVES else None
+    context, parts = earlier.context.open_alternate_parts(fit, least_parts) if quieter is None else (quieter, 0)
+    is_continued = fit is earlier.found.after and is_near_noise(earlier.found)
+    previous_steps = earlier.found.rounds[: len(earlier.found.steps)] if is_continued else ()
     final = explain(context, catalogue, progress, time_left, previous_steps)
     final = _exchange_and_prune(context, final, catalogue, progress, time_left)
     remark = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
@@ -249,11 +249,11 @@ def _search_with_opened(
     has_no_new_site = _list_effect_sites(repeated.found.after) <= _list_effect_sites(earlier.found.after)
     if parts != FINER_PARTS[-1] and has_no_new_site and time_left():
         try:
-            finest, parts = _repeat_with_opened(earlier, fit, catalogue, progress, time_left, FINER_PARTS[-1])
+            finest_result, parts = _repeat_with_opened(earlier, fit, catalogue, progress, time_left, FINER_PARTS[-1])
         except OutOfTimeError:
             return replace(repeated, remarks=(*repeated.remarks, OUT_OF_TIME)), False
-        if _adds_confirmed(earlier, finest, parts):
-            return finest, True
+        if _adds_confirmed(earlier, finest_result, parts):
+            return finest_result, True
     return repeated, False
 
 
@@ -265,7 +265,7 @@ def _adds_confirmed(earlier: SearchResult, repeated: SearchResult, parts: int) -
     if parts > HALVES and np.nanmax(explanation.after.score.test, initial=0.0) > EXPLAINED_ERROR:
         return False
     earlier_sites, new_sites = _list_effect_sites(earlier_fit), _list_effect_sites(explanation.after)
-    replaces = as_good_as_noise(explanation) and earlier_sites & new_sites
+    replaces = is_near_noise(explanation) and earlier_sites & new_sites
     if not repeated.judgement.named or not new_sites - earlier_sites or not (earlier_sites <= new_sites or replaces):
         return False
     if not earlier.judgement.named:
@@ -274,7 +274,7 @@ def _adds_confirmed(earlier: SearchResult, repeated: SearchResult, parts: int) -
     context, fitted = repeated.context, earlier_fit.fitted
     start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
     refitted = context.with_test_score(context.score_fit(refine(context, start)))
-    return confirms_addition(refitted, explanation.after)
+    return has_confirmed_addition(refitted, explanation.after)
 
 
 def _list_effect_sites(candidate: FittedCandidate) -> set[tuple[str, int]]:

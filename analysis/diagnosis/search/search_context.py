@@ -1,9 +1,9 @@
 """Shared state of all fits of a search for missing effects, and the first fits of the screened hypotheses.
 
 Samples have three roles: to fit parameters, to choose between hypotheses, and held out to test. A `SearchContext`
-holds the error measure on the first two and on all samples; copies of it open (use to fit and to choose by) a part of
-the held-out samples where these alone show a mismatch. Created by `search_by_simulation`, passed to the modules of
-this package and to those that test and report its result.
+contains the error measure on the first two and on all samples; its methods return copies in which a part of the
+held-out samples is opened (used to fit and to choose by), where these alone show a mismatch. Created by
+`search_by_simulation`, passed to the modules of this package and to those that test and report its result.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,13 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import (
+    FITTING_GAIN_SHARE,
     HELD_OUT_ALONE_ERROR,
     LEAST_FITTED,
-    LEAST_PART,
+    LEAST_PART_SAMPLES,
     LOUDER_RATIO,
     MOST_FITTED,
     NOISE_ALONE,
-    WORTH_FITTING,
 )
 from analysis.diagnosis.types import Mapper, Mask
 from equalizer.effects.effect import AxisForce, JointForce
@@ -82,8 +82,8 @@ class SearchContext:
     map_: Mapper
     """`map`, or a parallel one."""
     excluded: frozenset[str] = frozenset()
-    """Effects that are not to be named. Those that others refine are simulated nevertheless, as rivals of their
-    refinements."""
+    """Names of effects that are not to be named. Those that others refine are simulated nevertheless, as rivals of
+    their refinements."""
     references: ReferenceRecordings | None = None
     """Clean recordings; None: there are none. The gain of a candidate on them is counted against it."""
     certain: tuple[Hypothesis, ...] = ()
@@ -100,11 +100,13 @@ class SearchContext:
     ) -> "tuple[SearchContext, int]":
         """Return a copy of the context in which every other part of each held-out stretch is opened, and the number of
         parts per stretch: the first number, from least_parts on, with which opened and held-out parts both show the
-        mismatch (two parts do not in a sweep, for example), else least_parts. Parts are at least `LEAST_PART` samples
-        of the longest stretch. mismatch_fit: see `open_quieter_segments`."""
+        mismatch (two parts do not in a sweep, for example), else least_parts. Parts are at least `LEAST_PART_SAMPLES`
+        samples of the longest stretch. mismatch_fit: see `open_quieter_segments`."""
         longest_samples = max(record.compute_longest_test_stretch() for record in self.full_measure.records)
         part_counts = [part_count for part_count in (HALVES, *FINER_PARTS) if part_count >= least_parts]
-        for part_count in (part_count for part_count in part_counts if longest_samples >= part_count * LEAST_PART):
+        for part_count in (
+            part_count for part_count in part_counts if longest_samples >= part_count * LEAST_PART_SAMPLES
+        ):
             opened_masks = [record.mask_alternate_parts(part_count) for record in self.full_measure.records]
             if self._has_mismatch_in_both(opened_masks, mismatch_fit):
                 return self._open_samples(opened_masks), part_count
@@ -128,11 +130,11 @@ class SearchContext:
         """Whether opened samples and those that stay held out both have a mismatch that the other samples do not."""
         # Only the worst channel counts: others may show a small remaining error of a fitted effect, such as friction.
         records, worst_channel = self.full_measure.records, int(np.argmax(np.nan_to_num(mismatch_fit.score.test)))
-        sealed_masks = [record.test & ~mask for record, mask in zip(records, opened_masks, strict=True)]
+        held_out_masks = [record.test & ~mask for record, mask in zip(records, opened_masks, strict=True)]
         noise_units = self.full_measure.unit / self.full_measure.noise
         errors_by_mask = [
             (compute_residual_rms(records, mismatch_fit.fitted.residuals, sample_mask) * noise_units)[[worst_channel]]
-            for sample_mask in (opened_masks, sealed_masks)
+            for sample_mask in (opened_masks, held_out_masks)
         ]
         return all(has_held_out_mismatch(channel_errors, mismatch_fit) for channel_errors in errors_by_mask)
 
@@ -145,7 +147,7 @@ class SearchContext:
         full_measure = self.full_measure.with_records(tuple(records))
         return replace(self, measure=full_measure.shorten(), full_measure=full_measure, has_opened_samples=True)
 
-    def fit_to_all(self) -> "SearchContext":
+    def with_choosing_samples_fitted(self) -> "SearchContext":
         """Return a copy of the context that also fits to the samples to choose by, for laws that a force balance has
         already selected."""
         measure, full_measure = (
@@ -206,12 +208,12 @@ def compute_sensitivity(
     """Compute the sensitivity of the prediction to the parameters of the model itself at deviations (t,). Effects that
     are motion-dependent forces are omitted, because simulations are fast without them and small forces hardly change
     it; with_forces recomputes it with them for the parameters of `find_sensitive_parameters`."""
-    reduced = hypothesis
+    forceless_hypothesis = hypothesis
     for claim_index in reversed(range(len(hypothesis.claims))):
         if isinstance(hypothesis.claims[claim_index].effect.action, (AxisForce, JointForce)):
-            reduced = remove_claim(reduced, claim_index)
-    base_jacobian = build_jacobian(context.measure, context.tuning, deviations, reduced, context.map_)
-    if not with_forces or reduced is hypothesis:
+            forceless_hypothesis = remove_claim(forceless_hypothesis, claim_index)
+    base_jacobian = build_jacobian(context.measure, context.tuning, deviations, forceless_hypothesis, context.map_)
+    if not with_forces or forceless_hypothesis is hypothesis:
         return base_jacobian
     parameters = find_sensitive_parameters(context.measure, context.tuning, base_jacobian, hypothesis)
     return build_jacobian(
@@ -220,12 +222,12 @@ def compute_sensitivity(
 
 
 def _select_worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
-    """Select the hypotheses with at least `WORTH_FITTING` of the largest predicted gain; from `LEAST_FITTED` (fewer if
-    there are fewer) to `MOST_FITTED` of them."""
-    interleaved = _interleave_starts(screened)
-    best_gain = max((base.cost - candidate.cost for candidate in interleaved), default=0.0)
-    selected = [candidate for candidate in interleaved if base.cost - candidate.cost >= WORTH_FITTING * best_gain]
-    return (selected if len(selected) >= LEAST_FITTED else interleaved[:LEAST_FITTED])[:MOST_FITTED]
+    """Select the hypotheses with at least `FITTING_GAIN_SHARE` of the largest predicted gain; from `LEAST_FITTED`
+    (fewer if there are fewer) to `MOST_FITTED` of them."""
+    ordered = _interleave_starts(screened)
+    best_gain = max((base.cost - candidate.cost for candidate in ordered), default=0.0)
+    promising = [candidate for candidate in ordered if base.cost - candidate.cost >= FITTING_GAIN_SHARE * best_gain]
+    return (promising if len(promising) >= LEAST_FITTED else ordered[:LEAST_FITTED])[:MOST_FITTED]
 
 
 def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
@@ -266,8 +268,8 @@ def find_sensitive_parameters(
 
 
 def _compute_channel_norms(measure: ErrorMeasure, columns: FloatArray, output_count: int) -> FloatArray:
-    """(t, p): Euclidean norm, over the samples to fit, of each parameter's sensitivity per response channel; p =
-    output_count. columns: (t, samples), over all records; further channels (positions) are skipped."""
+    """Compute (t, p): Euclidean norm, over the samples to fit, of each parameter's sensitivity per response channel; p
+    = output_count. columns: (t, samples), over all records; further channels (positions) are skipped."""
     square_sums, first_index = np.zeros((len(columns), output_count)), 0
     for record in measure.records:
         sample_count, channel_count = int(record.fit.sum()), record.measured.shape[1]

@@ -31,8 +31,9 @@ FIRST_STRENGTH_FACTOR, SMALLER_STRENGTH_FACTORS, LARGER_STRENGTH_FACTORS = 0.55,
 falls. They reach further down (1.5 decades) than up (0.5), because impacts mostly make an estimate too large.
 Chosen."""
 MAX_FIRST_FITS, FIRST_FIT_STEPS, MAX_REFINED_FITS = 6, 3, 3
-"""Most effects, of different names, that are fitted as a second effect with play; steps of that first fit, in which the
-model's parameters are fixed; and most fits that are refined, which takes ten times as long. Chosen."""
+"""Largest number of effects, of different names, that are fitted as a second effect with play; steps of that first fit,
+in which the model's parameters are fixed; and largest number of fits that are refined, which takes ten times as long.
+Chosen."""
 CHANCE_COST = 1.0
 """Expected cost of the true hypothesis: chance variation alone, by the definition of the weights."""
 SUFFICIENT_COST = 1.2
@@ -141,14 +142,14 @@ def _refine_fits(
         if not time_left():
             return sorted(fits, key=lambda fit: fit[0]), False
         effect_name = start.hypothesis.claims[-1].effect.name
-        fitted = context.guard.run(effect_name, FITTING, partial(_refine, problem, start, time_left), start)
+        fitted = context.guard.run(effect_name, FITTING, partial(_refine_weighted, problem, start, time_left), start)
         fits.append((evaluate_hypothesis(weighted_problem, fitted.deviations, fitted.hypothesis).cost, fitted))
         if fits[-1][0] <= SUFFICIENT_COST:
             break
     return sorted(fits, key=lambda fit: fit[0]), True
 
 
-def _refine(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
+def _refine_weighted(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
     """Refine a fit under the weights of its own chance variation."""
     return refine_band_power(weight_by_chance_variation(problem, start), start, time_left)
 
@@ -189,9 +190,9 @@ def _search_strength(problem: BandPowerProblem, play_fit: BandPowerFit, second_e
     if main_parameter is None or main_parameter.fixed or main_parameter.none != 0:
         return best_fit
     weaker_fit = evaluate_with_play(_scale_strength(second_effect, FIRST_STRENGTH_FACTOR))
-    factors = SMALLER_STRENGTH_FACTORS if weaker_fit.cost < best_fit.cost else LARGER_STRENGTH_FACTORS
+    further_factors = SMALLER_STRENGTH_FACTORS if weaker_fit.cost < best_fit.cost else LARGER_STRENGTH_FACTORS
     best_fit = min(best_fit, weaker_fit, key=_get_cost)
-    for factor in factors:
+    for factor in further_factors:
         scaled_fit = evaluate_with_play(_scale_strength(second_effect, factor))
         if scaled_fit.cost >= best_fit.cost:
             break
@@ -202,10 +203,10 @@ def _search_strength(problem: BandPowerProblem, play_fit: BandPowerFit, second_e
 def _scale_strength(hypothesis: Hypothesis, factor: float) -> Hypothesis:
     """Multiply the main (first) parameter of a hypothesis of one effect by the factor, at all its sites."""
     (claim,) = hypothesis.claims
-    main_name = claim.effect.parameters[0].name
+    main_parameter = claim.effect.parameters[0].name
     values = [placed_effect.values for placed_effect in hypothesis.list_placed_effects()]
     return make_claim_hypothesis(
-        claim, [{**site_values, main_name: factor * site_values[main_name]} for site_values in values]
+        claim, [{**site_values, main_parameter: factor * site_values[main_parameter]} for site_values in values]
     )
 
 
@@ -218,5 +219,5 @@ def _select_best_per_effect(starts: Sequence[BandPowerFit]) -> list[BandPowerFit
 
 
 def _get_cost(fit: BandPowerFit) -> float:
-    """Get the cost, a sorting key."""
+    """Get the cost, as a sorting key."""
     return fit.cost

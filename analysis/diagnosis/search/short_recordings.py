@@ -29,7 +29,7 @@ from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import find_settled_periods
 from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
 from analysis.diagnosis.search.search_context import FITTING, SCREENING, SearchContext, compute_sensitivity, fit_first
-from analysis.diagnosis.settings import RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE, WORTH_FITTING
+from analysis.diagnosis.settings import FITTING_GAIN_SHARE, RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.effects.simulation.bodies import Restarts
@@ -39,7 +39,6 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 Indices = npt.NDArray[np.int64]
-
 COARSE_STEP_FACTOR = 2
 """Factor on the simulation step for ranking. Chosen: the integration error is far below that of linearised gains."""
 
@@ -51,8 +50,7 @@ def coarsen_steps(measure: ErrorMeasure) -> ErrorMeasure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _KeptSamples:
-    """Indices of the kept samples of one record, those of them to fit, and the fitted sample that each sample
-    repeats."""
+    """Kept samples of one record, those of them to fit, and the fitted sample that each sample repeats."""
 
     kept: Indices
     """(k,): indices of the simulated samples: those to fit, and the run-in around them."""
@@ -74,7 +72,7 @@ class ShortRecordings:
     """(samples to fit of the long measure,): for each, the kept sample to fit of which it is a repeat."""
     fit_index: Indices
     """(kept samples to fit,): their indices among the samples to fit of the long measure."""
-    full: ErrorMeasure
+    long_measure: ErrorMeasure
     """The long measure: error measure of the complete recordings."""
 
     def has_same_errors(self, base_fit: Fitted) -> bool:
@@ -82,7 +80,9 @@ class ShortRecordings:
         all samples by at most `RUN_IN_ERROR` times the cost, in mean square. base_fit: on all samples."""
         measure, tuning = self.context.measure, self.context.tuning
         short_fit = evaluate_fit(measure, tuning, base_fit.deviations, base_fit.hypothesis)
-        errors = stack_fit_residuals(self.full, base_fit.residuals).reshape(len(self.fitted_sample), -1)[self.fit_index]
+        errors = stack_fit_residuals(self.long_measure, base_fit.residuals).reshape(len(self.fitted_sample), -1)[
+            self.fit_index
+        ]
         with np.errstate(over="ignore", invalid="ignore"):  # a diverged simulation overflows
             difference = stack_fit_residuals(measure, short_fit.residuals) - errors.ravel()
             return float(np.mean(difference**2)) <= RUN_IN_ERROR * base_fit.cost
@@ -208,11 +208,11 @@ def _select_last_periods(record: Observed) -> tuple[Mask, Indices]:
     fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording):
         segment = slice(periods.segment.start, periods.segment.stop)
-        last = slice(periods.starts[-1], periods.starts[-1] + periods.length)
-        if periods.settled and fit[segment].any() and last.stop <= len(fit) and record.fit[last].all():
+        last_period = slice(periods.starts[-1], periods.starts[-1] + periods.length)
+        if periods.settled and fit[segment].any() and last_period.stop <= len(fit) and record.fit[last_period].all():
             fit[segment] = False
-            fit[last] = True
-            repeat_of[segment] = last.start + (repeat_of[segment] - last.start) % periods.length
+            fit[last_period] = True
+            repeat_of[segment] = last_period.start + (repeat_of[segment] - last_period.start) % periods.length
     return fit, repeat_of
 
 
@@ -293,8 +293,8 @@ def fit_on_short_recordings(
 def _keep_promising(
     reference: tuple[Fitted, Sequence[Fitted]], coarse_base: Fitted, screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """Keep hypotheses whose predicted relative reduction of the cost is at least `WORTH_FITTING` times the largest of
-    the reference; relative, because its costs refer to other samples and steps. reference: base fit, and fits."""
+    """Keep hypotheses whose predicted relative reduction of the cost is at least `FITTING_GAIN_SHARE` times the largest
+    of the reference; relative, because its costs refer to other samples and steps. reference: base fit, and fits."""
     base, fits = reference
     best = max((1 - trial.cost / base.cost for trial in fits), default=0.0)
-    return [trial for trial in screened if 1 - trial.cost / coarse_base.cost >= max(WORTH_FITTING * best, 0.0)]
+    return [trial for trial in screened if 1 - trial.cost / coarse_base.cost >= max(FITTING_GAIN_SHARE * best, 0.0)]

@@ -1,8 +1,8 @@
-"""Candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from the data.
+"""List candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from data.
 
-Each effect's estimator (`Effect.starts`) reads its starting values off the missing force, the motion and the residuals
-of the base fit (`Evidence`); clock drift is also found by grid search. Hypotheses beyond the recorded range are left
-out.
+Each effect's estimator (`Effect.starts`) computes its starting values from the missing force, the motion and the
+residuals of the base fit (`Evidence`); clock drift is also found by grid search. Hypotheses beyond the recorded range
+are left out. Called by `next_effect`, `second_effect_with_play`, `reference_recordings` and `discovery.add_laws`.
 """
 
 from collections.abc import Sequence
@@ -21,6 +21,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 CLOCK_DRIFT = "clock_drift"
+"""Catalogue name of the effect that is also found by grid search."""
 RANGE_LIMITS: dict[str, dict[str, Literal["travel", "command"]]] = {
     "cogging": {"pitch": "travel"},
     "force_deadband": {"width": "command"},
@@ -30,8 +31,8 @@ RANGE_LIMITS: dict[str, dict[str, Literal["travel", "command"]]] = {
 
 
 def list_candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = map) -> tuple[Hypothesis, ...]:
-    """Hypotheses of single effects, in the catalogue's order; an effect whose estimator finds no starting value is left
-    out."""
+    """List hypotheses of single effects, in the catalogue's order, at most `STARTS_PER_CLAIM` per effect and site; an
+    effect whose estimator finds no starting value is left out."""
 
     def list_effect_hypotheses(effect: Effect) -> list[Hypothesis]:
         is_sensor_effect = find_place(effect) == "sensor"
@@ -49,10 +50,10 @@ def list_candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mappe
             hypotheses += _make_common_hypotheses(effect, tuple(sites), evidence)
         return hypotheses
 
-    by_effect: list[list[Hypothesis]] = list(map_(list_effect_hypotheses, catalogue))  # type: ignore[arg-type]
+    hypotheses_by_effect: list[list[Hypothesis]] = list(map_(list_effect_hypotheses, catalogue))  # type: ignore[arg-type]
     return tuple(
         hypothesis
-        for hypotheses in by_effect
+        for hypotheses in hypotheses_by_effect
         for hypothesis in hypotheses
         if is_newest_within_data(hypothesis, evidence)
     )
@@ -64,23 +65,29 @@ def is_newest_within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
     return is_within_data(hypothesis, len(hypothesis.claims) - 1, evidence)
 
 
-def is_within_data(hypothesis: Hypothesis, claim_index: int, evidence: Evidence, pitches: float = 1.0) -> bool:
-    """`is_newest_within_data` for the claim with this index. pitches: number of pitches of a ripple that the travel
-    must cover."""
-    limits, used = RANGE_LIMITS.get(hypothesis.claims[claim_index].effect.name, {}), evidence.used > 0
+def is_within_data(hypothesis: Hypothesis, claim_index: int, evidence: Evidence, least_pitches: float = 1.0) -> bool:
+    """Whether the parameters of the claim with this index lie within the recorded range (`is_newest_within_data`).
+    least_pitches: number of pitches of a ripple that the travel must cover."""
+    limits, is_used = RANGE_LIMITS.get(hypothesis.claims[claim_index].effect.name, {}), evidence.used > 0
     for placed_effect in hypothesis.list_effects_of(claim_index):
         for name, range_name in limits.items():
-            signal = (evidence.axis_position if range_name == "travel" else evidence.command)[used][
+            signal = (evidence.axis_position if range_name == "travel" else evidence.command)[is_used][
                 :, list(placed_effect.sites)
             ]
-            size = np.ptp(signal, axis=0) / pitches if range_name == "travel" else np.abs(signal).max(axis=0)
-            if np.isfinite(size).all() and placed_effect.values[name] > float(size.max(initial=0.0)) > 0:
+            recorded_sizes = (
+                np.ptp(signal, axis=0) / least_pitches if range_name == "travel" else np.abs(signal).max(axis=0)
+            )
+            if (
+                np.isfinite(recorded_sizes).all()
+                and placed_effect.values[name] > float(recorded_sizes.max(initial=0.0)) > 0
+            ):
                 return False
     return True
 
 
 def _make_common_hypotheses(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:
-    """Hypotheses of the effect at all sites with the same parameters; empty where the effect does not allow that."""
+    """Make hypotheses of the effect at all sites with the same parameters; empty where the effect does not allow
+    that."""
     starts = effect.starts(evidence, ALL_SITES)[:STARTS_PER_CLAIM] if "all" in effect.sites else ()
     return [make_claim_hypothesis(Claim(effect, "all", sites), [values]) for values in starts]
 
@@ -88,8 +95,8 @@ def _make_common_hypotheses(effect: Effect, sites: tuple[int, ...], evidence: Ev
 def _make_separate_hypotheses(
     effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values, ...]]
 ) -> list[Hypothesis]:
-    """The hypothesis of the effect at all sites, each with its own parameters; empty where the effect does not allow
-    that, or no site has starting values."""
+    """Make the hypothesis of the effect at all sites, each with separate parameters; empty where the effect does not
+    allow that, or no site has starting values."""
     known_starts = [values[0] for values in starts if values]
     if "each" not in effect.sites or not known_starts:
         return []
@@ -98,22 +105,27 @@ def _make_separate_hypotheses(
 
 
 def _weaken_start(effect: Effect, values: Values) -> Values:
-    """Starting values for an axis at which the estimator finds none: those of another axis, the main parameter a tenth
-    of it if the effect vanishes at 0."""
-    main = effect.parameters[0]
-    return {**values, main.name: values[main.name] / 10 if main.none == 0 else values[main.name]}
+    """Make starting values for an axis at which the estimator finds none: those of another axis, with a tenth (chosen)
+    of the main parameter if the effect vanishes at 0."""
+    main_parameter = effect.parameters[0]
+    return {
+        **values,
+        main_parameter.name: values[main_parameter.name] / 10
+        if main_parameter.none == 0
+        else values[main_parameter.name],
+    }
 
 
 def search_clock_drift(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """Hypotheses of clock drift with starting values by grid search, for recordings too short for the effect's own
-    estimator. Empty where that estimator finds some, where clock drift is not in the catalogue, or where no trial fits
-    better than no drift."""
+    """Find starting values of clock drift by grid search, for recordings too short for the effect's estimator; returns
+    two hypotheses, without and with interpolation. Empty where that estimator finds starting values, where clock drift
+    is not in the catalogue, or where no trial fits better than no drift."""
     effect = next((entry for entry in catalogue if entry.name == CLOCK_DRIFT), None)
     if effect is None or effect.starts(evidence, ALL_SITES):
         return ()
     ppm = _find_best_drift(evidence)
-    p = evidence.response.shape[1]
-    claim = Claim(effect, "all" if p > 1 else "one", tuple(range(p)))
+    channel_count = evidence.response.shape[1]
+    claim = Claim(effect, "all" if channel_count > 1 else "one", tuple(range(channel_count)))
     return tuple(
         make_claim_hypothesis(claim, [{"ppm": ppm, "interpolated": interpolated, "with_position": 1.0}])
         for interpolated in (0.0, 1.0)
@@ -122,25 +134,26 @@ def search_clock_drift(catalogue: Sequence[Effect], evidence: Evidence) -> tuple
 
 
 def _find_best_drift(evidence: Evidence) -> float:
-    """The drift in ppm with the least squared error of the shifted prediction on a grid; 0 where none takes more than
-    `CLOCK_LEAST_SHARE` of the error without drift. Step: a fraction of the middle period at the recording's end."""
-    used, noise = evidence.used > 0, evidence.noise
-    n, step = len(used), _compute_median_period(evidence) / CLOCK_TRIALS_PER_PERIOD
-    most_steps = min(int(1e-6 * LARGEST_PPM * n / step), MOST_CLOCK_TRIALS)
-    trials_ppm = 1e6 * step / n * np.arange(-most_steps, most_steps + 1)
+    """Find the drift in ppm with the least squared error of the resampled prediction on a grid; 0 where none removes
+    more than `CLOCK_LEAST_SHARE` of the error without drift. A step of the grid shifts the recording's end by a
+    fraction of the median period (`CLOCK_TRIALS_PER_PERIOD`)."""
+    is_used, noise = evidence.used > 0, evidence.noise
+    sample_count, step_samples = len(is_used), _compute_median_period(evidence) / CLOCK_TRIALS_PER_PERIOD
+    most_steps = min(int(1e-6 * LARGEST_PPM * sample_count / step_samples), MOST_CLOCK_TRIALS)
+    trials_ppm = 1e6 * step_samples / sample_count * np.arange(-most_steps, most_steps + 1)
 
     def compute_misfit(ppm: float) -> float:
-        shifted = resample_response(evidence.predicted, 1 + 1e-6 * ppm, 0.0, 0.0)
-        return float(np.sum((((evidence.response - shifted) / noise) ** 2)[used]))
+        shifted_prediction = resample_response(evidence.predicted, 1 + 1e-6 * ppm, 0.0, 0.0)
+        return float(np.sum((((evidence.response - shifted_prediction) / noise) ** 2)[is_used]))
 
     misfits = [compute_misfit(float(ppm)) for ppm in trials_ppm]
-    best = int(np.argmin(misfits))
-    return float(trials_ppm[best]) if misfits[best] < (1 - CLOCK_LEAST_SHARE) * misfits[most_steps] else 0.0
+    best_index = int(np.argmin(misfits))
+    return float(trials_ppm[best_index]) if misfits[best_index] < (1 - CLOCK_LEAST_SHARE) * misfits[most_steps] else 0.0
 
 
 def _compute_median_period(evidence: Evidence) -> float:
-    """Period, in samples, below and above whose frequency half of the predicted response's power lies; channels are
-    weighted by their noise."""
-    whitened: FloatArray = (evidence.predicted - evidence.predicted.mean(axis=0)) / evidence.noise
-    power = np.cumsum(np.sum(np.abs(np.fft.rfft(whitened, axis=0)) ** 2, axis=1))
-    return len(whitened) / max(int(np.searchsorted(power, power[-1] / 2)), 1)
+    """Compute the period, in samples, below and above whose frequency half of the predicted response's power lies;
+    channels are weighted by the inverse of their noise."""
+    whitened_response: FloatArray = (evidence.predicted - evidence.predicted.mean(axis=0)) / evidence.noise
+    cumulative_power = np.cumsum(np.sum(np.abs(np.fft.rfft(whitened_response, axis=0)) ** 2, axis=1))
+    return len(whitened_response) / max(int(np.searchsorted(cumulative_power, cumulative_power[-1] / 2)), 1)

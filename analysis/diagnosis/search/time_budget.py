@@ -1,6 +1,7 @@
 """Time limits of a search (`TimeBudget`). A search that reaches its limit returns its result so far.
 
-Used by the searches of `analysis.diagnosis.search` and `discovery`.
+Used by the searches of `analysis.diagnosis.search` and `discovery`, by `search_by_simulation` and by
+`diagnosis_settings`; `study.evaluation.real.real_recordings` limits a diagnosis by a `CountedBudget`.
 """
 
 from collections.abc import Callable, Iterable
@@ -37,11 +38,12 @@ class CountedBudget:
 
 
 def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
-    """The map with a time limit; it raises OutOfTimeError before a call that would begin after the limit.
+    """Return the map with a time limit: a list of results, or OutOfTimeError where an item would begin after the limit.
 
-    The calls may run in other processes, which have copies of the budget. The number of their calls of the budget is
-    returned with the results, and a `CountedBudget` is called as often again here, so that each call counts once. A
-    clock is not called again: results of calls that began in time are kept, however late these end.
+    The items may run in other processes, which have copies of the budget. The number of their calls of the budget is
+    returned with the results, and a `CountedBudget` is called as often again in this process, so that each call counts
+    once; where that exceeds its limit, OutOfTimeError is raised too. A clock is not read again: results of items that
+    began in time are kept, however late these end.
     """
     call_counter = [0]
 
@@ -60,12 +62,12 @@ def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
             return function(*arguments), call_counter[0] - calls_before
 
         outcomes: list[tuple[object, int]] = list(map_(call_in_time, *items))  # type: ignore[arg-type]
-        other_calls = sum(call_count for _, call_count in outcomes) - (call_counter[0] - calls_at_start)
+        worker_calls = sum(call_count for _, call_count in outcomes) - (call_counter[0] - calls_at_start)
         if isinstance(time_left, CountedBudget):
-            for _ in range(other_calls):
+            for _ in range(worker_calls):
                 check_time()
         else:
-            call_counter[0] += other_calls
+            call_counter[0] += worker_calls
         return [result for result, _ in outcomes]
 
     return map_in_time

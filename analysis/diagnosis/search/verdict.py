@@ -1,6 +1,7 @@
 """The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it.
 
-Errors are rms errors over rms noise (`FitScore`). The limits are in `settings`, section "The verdict".
+Errors are rms errors over rms noise (`FitScore`). The limits are in `settings`, section "The verdict". Called by
+`search`, `revise_selection` and `search_by_simulation`, and by `confirm` and `discovery` for the laws that they add.
 """
 
 from collections.abc import Sequence
@@ -67,8 +68,8 @@ class Judgement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Unconfirmed:
-    """An effect that was found and is not named."""
+class UnconfirmedEffect:
+    """An effect that was found and is not named, because the held-out samples or another check do not confirm it."""
 
     hypothesis: Hypothesis
     gain: float
@@ -91,13 +92,13 @@ class SearchResult:
     """Sentences for the user."""
     errors: FloatArray | None = None
     """Standard errors of the final fit (`compute_final_errors`), where the search needed them."""
-    unconfirmed: tuple[Unconfirmed, ...] = ()
+    unconfirmed: tuple[UnconfirmedEffect, ...] = ()
     """Effects that were found and are not named, the largest gain first."""
 
 
 def judge(explanation: Explanation) -> Judgement:
-    """The verdict by the errors on the samples to fit and to choose by. Held-out samples can only withdraw names
-    (`_is_confirmed`), or turn "explained" into "partly_explained" or "unexplained"."""
+    """Determine the verdict by the errors on the samples to fit and to choose by. Held-out samples can only withdraw
+    names (`_is_confirmed`), or turn "explained" into "partly_explained" or "unexplained"."""
     if not explanation.after.fitted.hypothesis.claims or not _is_confirmed(explanation):
         if explanation.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
@@ -108,15 +109,16 @@ def judge(explanation: Explanation) -> Judgement:
         return Judgement(
             "explained" if explanation.after.score.worst_channel <= EXPLAINED_BY_CHANCE else "partly_explained", True
         )
-    if as_good_as_noise(explanation) and not np.nanmax(explanation.after.score.test, initial=0.0) > HELD_OUT_ERROR:
+    if is_near_noise(explanation) and not np.nanmax(explanation.after.score.test, initial=0.0) > HELD_OUT_ERROR:
         return Judgement("explained", True)
     return Judgement("partly_explained", True) if is_worth_naming(explanation) else Judgement("unexplained", False)
 
 
 def list_remarks(explanation: Explanation) -> tuple[str, ...]:
-    """Sentences for the user: that time ran out, and which effects were found but are not named."""
+    """List sentences for the user: that time ran out, that only an excluded law explains the mismatch, and which
+    effects were found but are not named, because the recordings do not determine their parameters."""
     time_remark = (OUT_OF_TIME,) if explanation.ended_early else ()
-    excluded_remark = (ONLY_REFINES,) if explanation.barred else ()
+    excluded_remark = (ONLY_REFINES,) if explanation.excluded_name else ()
     undetermined = (
         f"An explanation by {get_noun(name)} is not named: these recordings hardly determine its parameters."
         for name in dict.fromkeys(explanation.undetermined)
@@ -124,7 +126,7 @@ def list_remarks(explanation: Explanation) -> tuple[str, ...]:
     return (*time_remark, *excluded_remark, *undetermined)
 
 
-def as_good_as_noise(explanation: Explanation) -> bool:
+def is_near_noise(explanation: Explanation) -> bool:
     """Whether the error on the samples to fit and to choose by is little more than noise (`has_small_error`)."""
     return has_small_error(explanation.retuned, explanation.after)
 
@@ -138,35 +140,41 @@ def is_worth_naming(explanation: Explanation) -> bool:
 
 
 def _is_confirmed(explanation: Explanation) -> bool:
-    """Whether the explanation lowers the mean logarithm of the held-out errors by at least `CONFIRMED_SHARE` of it;
-    also true where that is at most `HELD_OUT_TOO_SMALL`, or where nothing was held out."""
-    retuned_error, remaining_error = (
+    """Whether the explanation lowers the mean logarithm over channels of the re-tuned model's held-out errors by at
+    least `CONFIRMED_SHARE` of it; also true where it is at most `HELD_OUT_TOO_SMALL`, or where nothing was held out."""
+    retuned_log_error, remaining_log_error = (
         float(np.mean(np.log(candidate.score.test))) for candidate in (explanation.retuned, explanation.after)
     )
-    if not np.isfinite(retuned_error):
+    if not np.isfinite(retuned_log_error):
         return True
-    return retuned_error <= HELD_OUT_TOO_SMALL or retuned_error - remaining_error >= CONFIRMED_SHARE * retuned_error
+    return (
+        retuned_log_error <= HELD_OUT_TOO_SMALL
+        or retuned_log_error - remaining_log_error >= CONFIRMED_SHARE * retuned_log_error
+    )
 
 
-def confirms_addition(base: FittedCandidate, extended: FittedCandidate) -> bool:
+def has_confirmed_addition(base: FittedCandidate, extended: FittedCandidate) -> bool:
     """Whether the held-out samples confirm what `extended` adds to `base`: the logarithm of the worst channel's
-    error, above `HELD_OUT_ALONE_ERROR` without the addition, falls by at least `CONFIRMED_SHARE`."""
-    worst = float(np.max(base.score.test))
-    if not np.isfinite(worst) or worst <= HELD_OUT_ALONE_ERROR:
+    error falls by at least the share `CONFIRMED_SHARE`. False where the error without the addition is at most
+    `HELD_OUT_ALONE_ERROR`, or where nothing was held out."""
+    base_error = float(np.max(base.score.test))
+    if not np.isfinite(base_error) or base_error <= HELD_OUT_ALONE_ERROR:
         return False
-    remaining_error = float(np.max(extended.score.test))
-    return float(np.log(worst) - np.log(remaining_error)) >= CONFIRMED_SHARE * float(np.log(worst))
+    extended_error = float(np.max(extended.score.test))
+    return float(np.log(base_error) - np.log(extended_error)) >= CONFIRMED_SHARE * float(np.log(base_error))
 
 
 def compute_step_shares(base: FittedCandidate, steps: Sequence[FittedCandidate]) -> tuple[float, ...]:
-    """Share of the mismatch of the re-tuned model that each step removed; their sum is at most 1."""
+    """Compute the share of the mismatch of the re-tuned model `base` that each step removed, beyond the steps before; 0
+    for a step that increased the mismatch."""
     cumulative = [0.0, *(compute_mismatch_share(base, step) for step in steps)]
     return tuple(max(upper - lower, 0.0) for lower, upper in pairwise(cumulative))
 
 
-def may_move_further(result: SearchResult) -> bool:
-    """Whether to search with a wider bound: a mismatch remains or three effects were needed, and a parameter of the
-    model is at its bound. Never with certain effects, reference recordings, or band powers."""
+def is_wider_bound_needed(result: SearchResult) -> bool:
+    """Whether to search with a wider bound: a mismatch remains or `MOST_EFFECTS` effects were needed, and a parameter
+    of the model is at its bound. False with certain effects, reference recordings, or where band powers were
+    compared."""
     context, explanation = result.context, result.found
     verdict, fits = result.judgement.verdict, (explanation.retuned, *explanation.steps, explanation.after)
     has_mismatch = verdict in ("unexplained", "partly_explained")
@@ -179,14 +187,15 @@ def may_move_further(result: SearchResult) -> bool:
     )
 
 
-def is_plainer(repeated: SearchResult, result: SearchResult) -> bool:
-    """Whether a search with a wider bound explains the recordings, by effects or by parameters alone, and the first
-    does not or needs more effects; with a physically possible model (`Tuning.is_physical`) inside the wider bound."""
-    explanation, tuning = repeated.found, repeated.context.tuning
+def is_simpler(wider_result: SearchResult, result: SearchResult) -> bool:
+    """Whether the search with a wider bound explains the recordings, by effects or by parameters alone, and the first
+    search does not or needs more effects; False where the model then is physically impossible (`Tuning.is_physical`)
+    or at the wider bound."""
+    explanation, tuning = wider_result.found, wider_result.context.tuning
     if result.judgement.verdict == "explained" and len(explanation.steps) >= len(result.found.steps):
         return False
-    by_effects = repeated.judgement.verdict == "explained"
-    by_parameters = repeated.judgement.verdict == "parameters"
+    by_effects = wider_result.judgement.verdict == "explained"
+    by_parameters = wider_result.judgement.verdict == "parameters"
     by_parameters = by_parameters and not np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE
     if not by_effects and not by_parameters:
         return False

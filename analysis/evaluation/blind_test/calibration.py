@@ -52,6 +52,7 @@ class Calibration:
     high: float | None
     """Upper end of that interval."""
     bins: tuple[Bin, ...]
+    """In the order of rising probability; empty where nothing was named."""
 
 
 def compute_calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE_KINDS) -> Calibration:
@@ -102,7 +103,8 @@ def _average_ties(probabilities: FloatArray, is_right: FloatArray) -> FloatArray
 
 
 def _make_bins(probabilities: FloatArray, is_right: FloatArray) -> list[Bin]:
-    """Make the bins of the reliability curve; the right names of a bin may be a fraction, by ties."""
+    """Make the bins of the reliability curve; the number of right names of a bin may be a fraction, because tied names
+    share their right answers. probabilities, is_right: (n,) each."""
     bins, tied_shares = [], _average_ties(probabilities, is_right)
     for bin_indices in _split_into_bins(probabilities):
         right_count, name_count = float(tied_shares[bin_indices].sum()), len(bin_indices)

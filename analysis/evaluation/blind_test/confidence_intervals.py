@@ -5,7 +5,8 @@ of cases that come in dependent groups, and a median or mean, have a percentile 
 
 References: Wilson, Journal of the American Statistical Association 22 (1927), 209; Efron and Tibshirani, An
 Introduction to the Bootstrap (1993), chapter 13; Davison and Hinkley, Bootstrap Methods and their Application (1997),
-section 3.8 (groups resampled as a whole). Used by `score`, `detection`, `calibration` and `lab_kit`.
+section 3.8 (groups resampled as a whole). Used by the modules of `blind_test` that compute figures, by
+`laws.law_score` and by the reports.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -19,10 +20,11 @@ from equalizer.signals.signal import FloatArray
 
 Item = TypeVar("Item")
 RESAMPLE_COUNT = 2000
-"""Number of resamples of a bootstrap interval."""
+"""Number of resamples of a bootstrap interval. Chosen: 50 resamples lie beyond each end."""
 _QUANTILES = (0.025, 0.975)
+"""Quantiles of the resamples that are the ends of a 95 % interval."""
 _GROUP_SEED, _VALUE_SEED = 21, 20
-"""Fixed seeds: the same cases always give the same interval."""
+"""Seeds of the resamples, fixed so that the same cases always give the same interval; any values serve."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +45,8 @@ class IntervalEstimate:
 
 
 def compute_share(name: str, items: Sequence[Item], is_hit: Callable[[Item], bool]) -> IntervalEstimate:
-    """Compute the share of the items among `items` for which `is_hit` is true, with Wilson's interval; without a value
-    where there are no items."""
+    """Compute the share of the items for which `is_hit` is true, with Wilson's interval; without a value where there
+    are no items."""
     hits, count = sum(is_hit(item) for item in items), len(items)
     if not count:
         return IntervalEstimate(name, None, None, None, 0, 0)
@@ -78,17 +80,17 @@ def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> IntervalEstimate:
     )
 
 
-def compute_statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> IntervalEstimate:
+def compute_statistic(name: str, values: Iterable[float], statistic: Callable[..., FloatArray]) -> IntervalEstimate:
     """Compute a statistic of the finite values, with its bootstrap interval; without a value where none is finite.
 
-    reduce: function of an array (resamples, values) and `axis=1`, such as np.median or np.mean.
+    statistic: function of an array (resamples, values) and `axis=1`, such as np.median or np.mean.
     """
     finite_values = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
     if not len(finite_values):
         return IntervalEstimate(name, None, None, None, 0)
-    value = float(reduce(finite_values[None, :], axis=1)[0])
+    value = float(statistic(finite_values[None, :], axis=1)[0])
     resamples = np.random.default_rng(_VALUE_SEED).integers(
         len(finite_values), size=(RESAMPLE_COUNT, len(finite_values))
     )
-    low, high = np.quantile(reduce(finite_values[resamples], axis=1), _QUANTILES)
+    low, high = np.quantile(statistic(finite_values[resamples], axis=1), _QUANTILES)
     return IntervalEstimate(name, value, float(low), float(high), len(finite_values))

@@ -1,4 +1,5 @@
-"""Detection thresholds of single effects: the strength from which they are named."""
+"""Detection of single effects in a blind test: outcomes and an ideal observer's threshold by the strength of each
+effect, and the rate of right names by the size of the effects. Called by `analysis.figures.blind_test_pictures`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.evaluation.blind_test.confidence_intervals import compute_wilson_interval
-from analysis.evaluation.blind_test.outcome import DETECTABLE, Outcome
+from analysis.evaluation.blind_test.outcome import DETECTABLE_ERROR, Outcome
 
-SIZE_GROUPS = 10
-"""Bins of the detection curve, with equally many cases each. By hand."""
-LEAST_DRAWS = 3
-"""Fewest draws for a line fit. By hand."""
+SIZE_GROUP_COUNT = 10
+"""Largest number of groups of the detection curve, with about equally many cases each. Chosen."""
+LEAST_LINE_DRAWS = 3
+"""Least number of draws for the line fit of `compute_ideal_threshold`. Chosen: one more than a line needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,40 +32,47 @@ class SizeGroup:
     """Detection rate of a group of effects of similar size, with Wilson's 95 % interval."""
 
     median_change: float
-    """Median of its draws: what the effect changes of the readings, in units of the noise."""
+    """Median over its cases of the change of the readings by the effect (`Outcome.adds`), in units of the noise."""
     rate: float
+    """Share of its cases whose effect, and no other, is named."""
     low: float
+    """Lower end of the interval."""
     high: float
+    """Upper end of the interval."""
     count: int
+    """Number of its cases."""
 
 
-def make_detection_strips(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
-    """The draws of each effect, by name. singles: outcomes with a single concealed effect."""
+def collect_effect_draws(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
+    """Collect the draws of each effect, in the order of the effects' names. singles: outcomes with a single concealed
+    effect."""
     names = sorted({single.names[0] for single in singles})
-    strips = []
+    draws_by_effect = []
     for name in names:
         effect_singles = [single for single in singles if single.names[0] == name]
         draws = tuple(sorted((case.strengths[0], classify_outcome(case)) for case in effect_singles))
-        strips.append(EffectDraws(name, draws, compute_ideal_threshold(effect_singles)))
-    return tuple(strips)
+        draws_by_effect.append(EffectDraws(name, draws, compute_ideal_threshold(effect_singles)))
+    return tuple(draws_by_effect)
 
 
 def compute_ideal_threshold(draws: Sequence[Outcome]) -> float | None:
-    """The strength (0 to 1) from which an ideal observer detects an effect, by a line fit: strength is the logarithm of
-    the effect's parameter, and what it adds grows about as a power of that. None with fewer than `LEAST_DRAWS` draws,
-    or where what is added does not grow."""
-    points = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
-    strengths = [strength for strength, _ in points]
-    if len(points) < LEAST_DRAWS or np.ptp(strengths) == 0:
+    """Compute the strength (0 to 1) from which an ideal observer detects an effect
+    (`Outcome.is_seen_by_ideal_observer`) by a line fit to the logarithm of its change of the readings, `Outcome.adds`:
+    strength is the logarithm of the effect's parameter, and the change grows about as a power of that parameter. draws:
+    of one effect. None with fewer than `LEAST_LINE_DRAWS` draws that change the readings, of one strength only, or
+    where the change does not grow."""
+    strength_changes = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
+    strengths = [strength for strength, _ in strength_changes]
+    if len(strength_changes) < LEAST_LINE_DRAWS or np.ptp(strengths) == 0:
         return None
-    slope, intercept = np.polyfit(strengths, [log_change for _, log_change in points], 1)
+    slope, intercept = np.polyfit(strengths, [log_change for _, log_change in strength_changes], 1)
     if slope <= 0:
         return None
-    return float(np.clip((np.log(np.sqrt(DETECTABLE**2 - 1)) - intercept) / slope, 0.0, 1.0))
+    return float(np.clip((np.log(np.sqrt(DETECTABLE_ERROR**2 - 1)) - intercept) / slope, 0.0, 1.0))
 
 
 def classify_outcome(outcome: Outcome) -> str:
-    """Class of an outcome with a concealed effect: "right", "in the set" (returned, but not right), "missed", or
+    """Classify an outcome with a single concealed effect: "right", "in the set" (returned, but not right), "missed", or
     "invisible" (missed where it was not detectable)."""
     if outcome.is_correct:
         return "right"
@@ -74,12 +82,14 @@ def classify_outcome(outcome: Outcome) -> str:
 
 
 def compute_rates_by_size(singles: Sequence[Outcome]) -> tuple[SizeGroup, ...]:
-    """Detection rate in groups of equal count, the smallest effects first."""
-    ordered = sorted(singles, key=lambda single: single.adds)
+    """Compute the detection rate in groups of about equal count, the smallest effects first. singles: at least one
+    outcome."""
+    singles_by_size = sorted(singles, key=lambda single: single.adds)
     groups = []
-    for indices in np.array_split(np.arange(len(ordered)), min(SIZE_GROUPS, len(ordered))):
-        group = [ordered[k] for k in indices]
+    for indices in np.array_split(np.arange(len(singles_by_size)), min(SIZE_GROUP_COUNT, len(singles_by_size))):
+        group = [singles_by_size[k] for k in indices]
         hits = sum(case.is_correct for case in group)
+        # Changes below a thousandth of the noise are raised to it, so that the median fits on a logarithmic axis.
         median_change = float(np.median([max(case.adds, 1e-3) for case in group]))
         groups.append(
             SizeGroup(median_change, hits / len(group), *compute_wilson_interval(hits, len(group)), len(group))

@@ -2,7 +2,7 @@
 
 A diagnosis is ambiguous if it returned several effects although the device has a single one. The comparison shows
 whether the proposed recordings discriminate between effects better than random ones. `study.evaluation.bank.follow_up`
-makes the recordings; `score` computes the figures.
+makes the recordings and the `FollowUp`s; `score` calls `compute_follow_up_figures`.
 """
 
 from collections.abc import Sequence
@@ -43,8 +43,8 @@ class FollowUp:
 
 
 def compute_follow_up_figures(follow_ups: Sequence[FollowUp]) -> tuple[IntervalEstimate, ...]:
-    """Shares of ambiguous diagnoses that the proposed or the random recording resolved: of all, then of those with a
-    proposal."""
+    """Compute the shares of ambiguous diagnoses that the proposed or the random recording resolved: of all, where a
+    missing proposal counts as unresolved, then of those with a proposal."""
     with_proposal = [follow_up for follow_up in follow_ups if follow_up.proposed]
     return (
         compute_share(

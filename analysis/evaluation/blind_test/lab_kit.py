@@ -3,7 +3,8 @@
 A change is right where the diagnosis returns one of the effects that it may show as: a loosened cable is backlash or a
 loose joint, depending on its slack. The control, a change that changes nothing, counts against a diagnosis that names
 anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter; a
-value of a change without a unit is kept in the table and compared with nothing.
+value of a change without a unit is kept in the table and compared with nothing. Called by
+`study.evaluation.kit.lab_kit`, which draws and reads the labels, and `study.evaluation.kit.score_kit`.
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,8 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share
 
-CONTROL_CHANGE, MISSING = "nothing", "missing"
-"""Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""
+CONTROL_CHANGE, NO_DIAGNOSIS = "nothing", "missing"
+"""Name of the change that changes nothing (control); `ScoredLabel.verdict` of a recording without a diagnosis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,22 +64,27 @@ CHANGES: tuple[Change, ...] = (
         "",
     ),
 )
+"""All changes of the kit. The ranges in the instructions are chosen: changes that a lab can make and take back."""
 CHANGES_BY_NAME = {kit_change.name: kit_change for kit_change in CHANGES}
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """One row of the sealed table. `salt` keeps its hash from being guessed."""
+    """One row of the sealed table: the change that was made before a recording."""
 
     recording: str
+    """Name of the recording."""
     change: str
+    """`Change.name`."""
     value: float | None
+    """Value that the lab wrote down, in the unit of the change; None without one."""
     note: str
     salt: str
+    """Random text, which prevents that the row is guessed from the hash of the table."""
 
 
 @dataclass(frozen=True, slots=True)
-class Scored:
+class ScoredLabel:
     """A diagnosis with the change that was made: one row of the scored table."""
 
     recording: str
@@ -86,18 +92,20 @@ class Scored:
     value: float | None
     """In the unit of the change; None where the lab wrote none down."""
     verdict: str
-    """The diagnosis's, or `MISSING`."""
+    """Verdict of the diagnosis, or `NO_DIAGNOSIS`."""
     named: str
     """Effects that the diagnosis names, separated by spaces."""
     returned: str
     """Effects of its returned set (the named ones and their inseparable rivals), separated by spaces."""
     right: bool
+    """Whether the diagnosis is right (`score_label`)."""
     inside: bool | None
-    """Whether the written value lies in the 95 % interval of the effect named; None where no value was written, the
-    change has no unit, or the effect was not named."""
+    """Whether the written value lies in the 95 % interval (ends included) of the first parameter of the change's first
+    effect. None where no value was written, the change has no unit, or that effect was not named or has no interval;
+    False where the diagnosis is missing although a value with a unit was written."""
 
 
-def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
+def score_label(label: Label, diagnosis: Diagnosis) -> ScoredLabel:
     """Score a diagnosis: right where one of the change's effects is in the returned set; for no change, where no effect
     is named."""
     change = CHANGES_BY_NAME[label.change]
@@ -107,7 +115,7 @@ def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
         if change.effects
         else not named_effects
     )
-    return Scored(
+    return ScoredLabel(
         label.recording,
         label.change,
         label.value,
@@ -119,14 +127,16 @@ def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
     )
 
 
-def score_unanswered(label: Label) -> Scored:
+def score_unanswered(label: Label) -> ScoredLabel:
     """Score a missing diagnosis as wrong, with its value in no interval, so that leaving one out raises no rate."""
     has_value = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
-    return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if has_value else None)
+    return ScoredLabel(
+        label.recording, label.change, label.value, NO_DIAGNOSIS, "", "", False, False if has_value else None
+    )
 
 
 def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -> bool | None:
-    """As `Scored.inside`, for the first of the change's effects alone, whose first parameter has the value's unit."""
+    """Return whether the value lies in the interval that `ScoredLabel.inside` names, or None."""
     if value is None or not change.unit:
         return None
     for effect in diagnosis.effects:
@@ -136,10 +146,11 @@ def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -
     return None
 
 
-def compute_kit_figures(rows: Sequence[Scored]) -> tuple[IntervalEstimate, ...]:
-    """Rates with Wilson's 95 % intervals."""
+def compute_kit_figures(rows: Sequence[ScoredLabel]) -> tuple[IntervalEstimate, ...]:
+    """Compute the rates with Wilson's 95 % intervals: changes named right, controls without a name, written values in
+    their interval, and for each change that occurs its rate of right names."""
     changed_rows = [row for row in rows if row.change != CONTROL_CHANGE]
-    kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed_rows)]
+    change_names = [change.name for change in CHANGES if any(row.change == change.name for row in changed_rows)]
     return (
         compute_share("changes named", changed_rows, lambda scored: scored.right),
         compute_share(
@@ -148,13 +159,18 @@ def compute_kit_figures(rows: Sequence[Scored]) -> tuple[IntervalEstimate, ...]:
         compute_share(
             "written numbers inside their interval", _select_with_interval(rows), lambda scored: bool(scored.inside)
         ),
-        *(compute_share(kind, _select_change(rows, kind), lambda scored: scored.right) for kind in kinds),
+        *(
+            compute_share(change_name, _select_change(rows, change_name), lambda scored: scored.right)
+            for change_name in change_names
+        ),
     )
 
 
-def _select_change(rows: Sequence[Scored], change: str) -> list[Scored]:
-    return [row for row in rows if row.change == change]
+def _select_change(rows: Sequence[ScoredLabel], change_name: str) -> list[ScoredLabel]:
+    """Select the rows with this change."""
+    return [row for row in rows if row.change == change_name]
 
 
-def _select_with_interval(rows: Sequence[Scored]) -> list[Scored]:
+def _select_with_interval(rows: Sequence[ScoredLabel]) -> list[ScoredLabel]:
+    """Select the rows whose value was compared with an interval, or counts as outside."""
     return [row for row in rows if row.inside is not None]

@@ -1,7 +1,8 @@
 """Outcome of one blind-test case after its label is revealed: the concealed effects, the diagnosis and its errors.
 
-A bank is a set of simulated recordings with concealed effects. Outcomes are made by `study.evaluation.bank.prove` and
-scored by `score`, `detection` and `calibration`.
+A bank is a set of simulated recordings with concealed effects. Outcomes are made by `study.evaluation.bank.prove`,
+scored by `score` and `calibration`, grouped by strength by `detection`, and described by `wording` and
+`analysis.reports`. `laws.law_outcome` extends `AnsweredCase`.
 """
 
 from collections.abc import Mapping
@@ -10,19 +11,23 @@ from math import hypot
 
 from analysis.diagnosis.document import Diagnosis, NamedEffect
 
-DETECTABLE = 1.25
+DETECTABLE_ERROR = 1.25
 """Ratio of the re-tuned model's rms error to the noise's rms, in the worst channel, on held-out samples, above which an
 effect counts as detectable: the model then leaves an error of sqrt(1.25² - 1) = 0.75 of the noise. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConcealedEffect:
-    """An effect that was concealed in a case, with its place and true parameters (in the effect's units)."""
+    """An effect that was concealed in a case, with its place and true parameters."""
 
     effect: str
+    """Name of the effect."""
     place: str
+    """Place at which it acts, such as "sensor" or "actuator"."""
     axis: str | None
+    """Its axis; None for an effect without one."""
     values: Mapping[str, float]
+    """True parameters by name, in the effect's units."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,9 +35,13 @@ class AnsweredCase:
     """A case of a bank with its diagnosis and the errors of the models."""
 
     number: int
+    """Number of the case in its bank."""
     seed: int
+    """Seed of the case's random draws."""
     kind: str
+    """Kind of case; the subclasses list the kinds."""
     axes: tuple[str, ...]
+    """Axes of the device."""
     adds: float
     """Simulated change of the readings by the concealed effects: its rms over the noise's rms, in the worst channel."""
     diagnosis: Diagnosis | None
@@ -40,21 +49,21 @@ class AnsweredCase:
     channel_errors: Mapping[str, Mapping[str, float]]
     """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
-    """Duration of the diagnosis (s)."""
+    """Processor time of the diagnosis (s); NaN where it was not recorded."""
 
     @property
     def verdict(self) -> str:
-        """The diagnosis' verdict; "failed" where there is no diagnosis."""
+        """Verdict of the diagnosis; "failed" where there is no diagnosis."""
         return "failed" if self.diagnosis is None else self.diagnosis.verdict
 
     @property
     def detectable(self) -> bool:
         """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
-        return self.diagnosis is None or self.compute_worst_error("retuned") > DETECTABLE
+        return self.diagnosis is None or self.compute_worst_error("retuned") > DETECTABLE_ERROR
 
     def compute_worst_error(self, stage: str) -> float:
-        """Rms error on held-out samples over the noise's rms, in the channel where it is largest; NaN where no errors
-        are known. stage: "before", "retuned" or "after"."""
+        """Compute the rms error on held-out samples over the noise's rms, in the channel where it is largest; NaN where
+        no errors are known. stage: "before", "retuned" or "after"."""
         return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
 
 
@@ -90,7 +99,7 @@ class Outcome(AnsweredCase):
     def is_seen_by_ideal_observer(self) -> bool:
         """Whether the effects would be detectable without re-tuning, which hides part of them: from the difference of
         two simulations with and without them, `adds`, and independent noise, added in power."""
-        return hypot(1.0, self.adds) > DETECTABLE
+        return hypot(1.0, self.adds) > DETECTABLE_ERROR
 
     @property
     def is_correct(self) -> bool:

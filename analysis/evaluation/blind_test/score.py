@@ -2,7 +2,7 @@
 
 Detection and naming of single effects and of pairs, false alarms on devices without a missing effect, behaviour where
 the true effect is outside the catalogue (open set), and error and interval coverage of the parameters. Cases count only
-where the mismatch is detectable (`outcome.DETECTABLE`), except where a figure states otherwise. Intervals:
+where the mismatch is detectable (`outcome.DETECTABLE_ERROR`), except where a figure states otherwise. Intervals:
 `confidence_intervals`. Called by `study.evaluation.bank.prove`.
 """
 
@@ -66,7 +66,8 @@ def has_wrong_name(outcome: Outcome) -> bool:
 
 
 def is_on_other_axis(outcome: Outcome) -> bool:
-    """Whether a concealed effect is named at another axis than its own, on a device with several axes."""
+    """Whether a concealed effect is named at another axis than its true one, on a device with several axes; effects
+    without an axis are not compared."""
     if len(outcome.axes) < 2:
         return False
     true_axes = {effect.effect: effect.axis for effect in outcome.concealed}
@@ -77,7 +78,7 @@ def is_on_other_axis(outcome: Outcome) -> bool:
 
 
 BANKS = ("main", "dirty", "engine")
-"""Banks of cases; see `outcome.Outcome.bank`."""
+"""Banks of cases (`Outcome.bank`), in the order of the figures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,10 +132,10 @@ def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEst
     unambiguous = [case for case in detectable_singles if len(case.returned) == 1]
     yield compute_share("right where one name is returned", unambiguous, lambda case: case.is_correct)
     yield compute_share("place", named_cases, lambda case: case.named[0].place == case.concealed[0].place)
-    on_one_axis = [
+    right_on_axes = [
         case for case in named_cases if case.is_correct and case.concealed[0].axis is not None and len(case.axes) > 1
     ]
-    yield compute_share("axis, of two or three", on_one_axis, lambda case: not is_on_other_axis(case))
+    yield compute_share("axis, of two or three", right_on_axes, lambda case: not is_on_other_axis(case))
     singles = _select_kind(outcomes, "single")
     observer_detected = [single for single in singles if single.is_seen_by_ideal_observer]
     yield compute_share("single effects that count as detectable", singles, lambda case: case.detectable)
@@ -200,7 +201,7 @@ def _compute_estimate_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalE
 
 def compute_main_error(concealed: ConcealedEffect, named_effect: NamedEffect) -> float | None:
     """Compute the relative error of the estimate of an effect's main parameter; None where its true value is unknown or
-    0."""
+    0. Raises KeyError where the named effect has no such parameter."""
     name = EFFECTS_BY_NAME[concealed.effect].main.name
     if not concealed.values.get(name):
         return None

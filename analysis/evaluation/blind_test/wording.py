@@ -1,12 +1,13 @@
-"""Texts for reports of a blind test: scores with confidence intervals, concealed effects, and answers."""
+"""Texts for reports of a blind test: scores with confidence intervals, concealed effects, and answers. Called by
+`analysis.reports.blind_test_report`, `study.evaluation.bank.proof_summary` and `bank.laws.write_law_proof`."""
 
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.outcome import Outcome
 
 
 def format_figure(figure: IntervalEstimate) -> str:
-    """A score with its 95 % interval and its number of cases, in per cent where it is a share, such as
-    "95.7 % [90, 98], 110 of 115"; "none drawn" where it has no value."""
+    """Format a figure with its 95 % interval and its number of cases, a share in per cent, such as "95.7 % [90, 98],
+    110 of 115", a statistic in the unit of its values; "none drawn" where it has no value."""
     if figure.value is None or figure.low is None or figure.high is None:
         return "none drawn"
     if figure.hits is None:
@@ -16,8 +17,8 @@ def format_figure(figure: IntervalEstimate) -> str:
 
 
 def describe_concealed(outcome: Outcome) -> str:
-    """The concealed effects with their axes, such as "coulomb_friction of x + end_stop of y"; "nothing" where there are
-    none."""
+    """Describe the concealed effects with their axes, such as "coulomb_friction of x + end_stop of y"; "nothing" where
+    there are none."""
     return (
         " + ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in outcome.concealed)
         or "nothing"
@@ -25,7 +26,7 @@ def describe_concealed(outcome: Outcome) -> str:
 
 
 def describe_answer(outcome: Outcome) -> str:
-    """The verdict, and the named effects with their axes and stated probabilities (0 to 1)."""
+    """Describe the answer: the verdict, then the named effects, if any, with their axes and probabilities (0 to 1)."""
     text = " + ".join(
         f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''} ({effect.probability:.2f})"
         for effect in outcome.named
@@ -34,6 +35,6 @@ def describe_answer(outcome: Outcome) -> str:
 
 
 def describe_strengths(outcome: Outcome) -> str:
-    """The strengths of the concealed effects, from 0 (the weakest that is drawn) to 1 (the strongest), separated by
-    commas; empty where nothing was concealed."""
+    """Describe the strengths of the concealed effects, from 0 (the weakest that is drawn) to 1 (the strongest),
+    separated by commas; empty where nothing was concealed."""
     return ", ".join(f"{value:.2f}" for value in outcome.strengths)

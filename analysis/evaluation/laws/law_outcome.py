@@ -1,6 +1,7 @@
 """Outcome of a single case of a bank of laws: the concealed law, the diagnosis, and the error of the law it found.
 
-An answer is right if its structure is (place, axis, variables, memory) and its function is within `MAX_LAW_ERROR`.
+An answer is right if its structure (place, axis, variables, memory) is that of the concealed law and the relative error
+of its function is at most `MAX_LAW_ERROR`. Made by `study.evaluation.bank.laws.prove_laws`, scored by `law_score`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,8 @@ from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, parse_law
 
 MAX_LAW_ERROR = 0.05
-"""Relative error (`compute_law_error`) up to which a law counts as the concealed function."""
+"""Relative error (`compute_law_error`) up to which a law counts as the concealed function. Chosen; the figures of
+`law_score` and their names state it as 5 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +24,7 @@ class TrueLaw:
     law: str
     """Name of the law."""
     formula: str
+    """The law as a formula, for reports."""
     axes: tuple[str, ...]
     """Letters of the axes at which it acts."""
     acts_on: tuple[str, ...]
@@ -77,7 +80,7 @@ class LawOutcome(AnsweredCase):
 
     @property
     def close(self) -> bool:
-        """Whether the error of `laws` is at most `MAX_LAW_ERROR` in the visited range."""
+        """Whether the error of `laws` is at most `MAX_LAW_ERROR` in the range of motion that the recording visits."""
         return bool(self.laws) and bool(self.errors) and self.errors[0] <= MAX_LAW_ERROR
 
     @property
@@ -96,7 +99,7 @@ class LawOutcome(AnsweredCase):
         return self.truth is None and bool(self.named)
 
     @property
-    def missed(self) -> bool:
+    def is_wrong(self) -> bool:
         """Whether the answer is wrong: the diagnosis failed, named a law where there is none, or explained wrongly; or
         the concealed law is detectable, and no law of its structure and function was returned."""
         if self.diagnosis is None or self.false_law or self.wrongly_explained:
@@ -105,7 +108,7 @@ class LawOutcome(AnsweredCase):
 
 
 def _collect_laws(entries: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
-    """The laws among effects or candidates of the document."""
+    """Parse the laws among the named effects, or among the candidates, of a diagnosis."""
     return tuple(
         parse_law(entry.law.expression, entry.law.acts_on, entry.law.axis) for entry in entries if entry.law is not None
     )

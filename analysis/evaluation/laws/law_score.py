@@ -1,9 +1,8 @@
 """Score of a blind test of law discovery: shares of correct and false answers, each with its 95 % confidence interval.
 
 A bank is a set of simulated recordings, some with a concealed force law; the program must discover the law. Cases count
-for discovery only where the law is detectable (`outcome.DETECTABLE`). False alarms are counted on devices without a
-missing effect, and on decoys: devices with an effect of the catalogue or a linear mode. Called by `prove_laws`.
-"""
+for discovery only where the law is detectable (`outcome.DETECTABLE_ERROR`). False alarms are counted on devices without
+a missing effect, and on decoys: devices with an effect of the catalogue or a linear mode. Called by `prove_laws`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,15 +15,15 @@ from analysis.evaluation.laws.law_outcome import LawOutcome
 
 @dataclass(frozen=True, slots=True)
 class LawScore:
-    """Figures of a bank of laws with their intervals, and the outcomes that count as wrong (`LawOutcome.missed`)."""
+    """Figures of a bank of laws with their intervals, and the outcomes that count as wrong (`LawOutcome.is_wrong`)."""
 
     figures: tuple[IntervalEstimate, ...]
     misses: tuple[LawOutcome, ...]
 
 
 def compute_law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
-    """Score of a bank: shares over the cases with a detectable law, without a missing effect, and with decoys; and the
-    median processor time (s)."""
+    """Compute the score of a bank: shares over the cases with a law, those where it is detectable, those without a
+    missing effect, and decoys; and the median processor time (s) of a diagnosis."""
     law_cases = [case for case in outcomes if case.truth is not None]
     detectable_cases = [case for case in law_cases if case.detectable]
     null_cases = [case for case in outcomes if case.kind == "nothing"]
@@ -48,7 +47,7 @@ def compute_law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
             "median processor seconds, nothing missing", [case.seconds for case in null_cases], np.median
         ),
     )
-    return LawScore(figures, tuple(case for case in outcomes if case.missed))
+    return LawScore(figures, tuple(case for case in outcomes if case.is_wrong))
 
 
 def _is_explained_by_other_effect(outcome: LawOutcome) -> bool:

@@ -1,8 +1,9 @@
 """Document of a reproduction: the content of `reproduction.json`, format `hapteq-reproduction`, version 1.
 
 Each published figure comes with its findings: what the paper reports, the reproduced value, and the rule by which it
-counts as reproduced. Units are part of the names, or of the descriptions, which also appear in the JSON Schema. Written
-by `write_reproduction`, read by `reproduction_report`.
+counts as reproduced. Units are part of the names, or of the descriptions, which also appear in the JSON Schema. Filled
+by the modules of this package, read and written by `study.store.formats.reproduction_file`, shown by
+`analysis.reports.reproduction_report`.
 """
 
 import json
@@ -14,7 +15,9 @@ from pydantic.dataclasses import dataclass
 from equalizer.signals.listed_problems import ListedProblemsError
 
 FORMAT, VERSION = "hapteq-reproduction", 1
+"""Name of the file format, and its version; a change of a field's name or meaning increases the version."""
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""Validation: unknown fields, NaN and infinity are refused."""
 
 
 class ReproductionError(ListedProblemsError):
@@ -146,3 +149,4 @@ def make_reproduction_schema() -> dict[str, Any]:
 
 
 _ADAPTER: TypeAdapter[Reproduction] = TypeAdapter(Reproduction)
+"""Converter between the document and plain values."""

@@ -236,7 +236,7 @@ def _find_held_out_error(held_out_errors: tuple[float, float] | None) -> Finding
 
 def _measure_height_db(playback: PlayedResponse) -> float:
     """Measure the height of the resonance in dB: maximum minus minimum of the gain within `RESONANCE_HZ` (ends
-    included) along an axis; of the axes, the largest."""
+    included) along an axis; of the axes, the largest. Raises ValueError where no line lies within the range."""
     low, high = RESONANCE_HZ
     in_range = (playback.frequency_hz >= low) & (playback.frequency_hz <= high)
     level_db = 20 * np.log10(np.abs(np.einsum("lii->li", playback.response[in_range])))

@@ -2,6 +2,7 @@
 
 Figure 4 shows the transfer functions from every force to every acceleration, figure 1 the frequency bands that follow
 from the onset of coupling and from the limit of direction perception. Frequencies are compared within `TOLERANCE`.
+Called by `study.evaluation.reproduction.write_reproduction`.
 """
 
 from collections.abc import Sequence
@@ -17,11 +18,13 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.resonances import COUPLING, Resonance
 
 TOLERANCE = 0.2
-"""Largest relative difference of two frequencies that count as near each other."""
+"""Largest relative difference of two frequencies that count as near each other. Chosen: the paper states them as
+"about"."""
 SLOPE_HZ = (4.5, 9.0)
-"""Range below the resonance in which the slope along the axes is measured."""
+"""Range (Hz) below the resonance near 11 Hz in which the slope along the axes is measured. Chosen."""
 LARGE_RATIO = 3.0
-"""Ratio of the gain to its median from 15 to 60 Hz, above which a resonance counts as large."""
+"""Ratio of the gain to its median from 15 to 60 Hz, a range between the published resonances, above which a resonance
+counts as large. Chosen."""
 
 _GEOMETRY = (
     "Link lengths, inertias, friction and modes of the omega.3 are not public. The simulated device is of its size; "
@@ -34,7 +37,8 @@ _GEOMETRY = (
 def make_response_findings(
     response: FrequencyResponse, resonances: Sequence[Resonance], onset: CouplingOnset
 ) -> FigureFindings:
-    """Findings on figure 4. response: transfer functions estimated from sweeps over the whole frequency range."""
+    """Make the findings on figure 4. response: transfer functions estimated from sweeps over the whole frequency range.
+    resonances, onset: found in these. Findings that no reliable line allows are left out."""
     findings = (
         _find_low_resonance(resonances),
         _find_large_resonances(response, resonances),
@@ -61,8 +65,8 @@ def make_response_findings(
 
 
 def make_band_findings(bands: Sequence[FrequencyBand], limit_hz: float | None, used_limit_hz: float) -> FigureFindings:
-    """Findings on figure 1. limit_hz: limit of direction perception from the thresholds of figure 2, None where they
-    give none. used_limit_hz: the limit that was drawn."""
+    """Make the findings on figure 1. limit_hz: limit of direction perception from the thresholds of figure 2, None
+    where they give none. used_limit_hz: the limit that was drawn."""
     published = {"low": "up to about 10 Hz", "middle": "about 10 to 35 Hz", "high": "from 35 Hz on"}
     edges_hz = {"low": (None, 10.0), "middle": (10.0, 35.0), "high": (35.0, None)}
     findings = [_find_band_edges(band, published[band.name], edges_hz[band.name]) for band in bands]
@@ -95,16 +99,16 @@ def _is_within_tolerance(value: float, published: float) -> bool:
 
 
 def _find_low_resonance(resonances: Sequence[Resonance]) -> Finding:
-    """Whether there is a resonance near 11 Hz that couples the axes; the most prominent one counts."""
+    """Judge whether there is a resonance near 11 Hz that couples the axes; the most prominent one counts."""
     candidates = [resonance for resonance in resonances if _is_within_tolerance(resonance.frequency_hz, 11.0)]
     strongest = max(candidates, key=lambda candidate: candidate.prominence_db, default=None)
-    couples = strongest is not None and COUPLING in strongest.seen_in
+    is_coupling = strongest is not None and COUPLING in strongest.seen_in
     text = "none was found"
     if strongest is not None:
         interval_text = "{:.2f} to {:.2f} Hz".format(*strongest.frequency_interval_hz)
         text = (
             f"{strongest.frequency_hz:.2f} Hz ({interval_text}), "
-            f"{'couples the axes' if couples else 'without coupling'}"
+            f"{'couples the axes' if is_coupling else 'without coupling'}"
         )
     return Finding(
         what="Lowest resonance",
@@ -112,22 +116,24 @@ def _find_low_resonance(resonances: Sequence[Resonance]) -> Finding:
         here=text,
         value=None if strongest is None else strongest.frequency_hz,
         unit="Hz",
-        as_published=couples,
+        as_published=is_coupling,
         rule=f"within {TOLERANCE:.0%} of 11 Hz, and a peak of what goes off axis",
     )
 
 
 def _find_large_resonances(response: FrequencyResponse, resonances: Sequence[Resonance]) -> Finding:
-    """Whether the first large resonance is near 80 Hz. Gain: largest singular value of the response matrix."""
+    """Judge whether the first large resonance (`LARGE_RATIO`) is near 80 Hz. Gain: largest singular value of the
+    response matrix; none counts as large where the middle range has no reliable line."""
     gain = np.linalg.norm(response.response, ord=2, axis=(1, 2))
     is_middle = (response.frequency_hz >= 15) & (response.frequency_hz <= 60) & response.reliable
-    level = float(np.median(gain[is_middle])) if is_middle.any() else np.inf
+    middle_gain = float(np.median(gain[is_middle])) if is_middle.any() else np.inf
 
     def compute_height(resonance: Resonance) -> float:
+        """Compute the median gain within 2 % of the resonance's frequency (chosen); 0 without a line there."""
         is_at_resonance = np.abs(response.frequency_hz - resonance.frequency_hz) <= 0.02 * resonance.frequency_hz
         return float(np.median(gain[is_at_resonance])) if is_at_resonance.any() else 0.0
 
-    large_resonances = [resonance for resonance in resonances if compute_height(resonance) > LARGE_RATIO * level]
+    large_resonances = [resonance for resonance in resonances if compute_height(resonance) > LARGE_RATIO * middle_gain]
     lowest_hz = min((large_resonance.frequency_hz for large_resonance in large_resonances), default=None)
     return Finding(
         what="Large resonances",
@@ -142,7 +148,7 @@ def _find_large_resonances(response: FrequencyResponse, resonances: Sequence[Res
 
 
 def _find_onset(onset: CouplingOnset) -> Finding:
-    """Whether coupling begins near 10 Hz."""
+    """Judge whether coupling begins near 10 Hz."""
     text = "no coupling was found"
     if onset.frequency_hz is not None:
         interval_text = "" if onset.interval_hz is None else " (95 %: {:.2f} to {:.2f} Hz)".format(*onset.interval_hz)
@@ -159,27 +165,28 @@ def _find_onset(onset: CouplingOnset) -> Finding:
 
 
 def _find_slope(response: FrequencyResponse) -> Finding | None:
-    """Slope in dB per octave of the mean gain along the axes, by a line fit; None with fewer than 3 reliable lines."""
+    """Judge whether the mean gain along the axes rises, by a line fit within `SLOPE_HZ`: by more than 1 dB per octave
+    (chosen). None with fewer than 3 reliable lines."""
     lines = response.select_band(*SLOPE_HZ)
     lines = lines.select_lines(lines.reliable)
     if len(lines) < 3:
         return None
     diagonal_gain = np.abs(np.einsum("lii->li", lines.response)).mean(axis=1)
-    slope = float(np.polyfit(np.log2(lines.frequency_hz), 20 * np.log10(diagonal_gain), 1)[0])
-    low, high = SLOPE_HZ
+    slope_db = float(np.polyfit(np.log2(lines.frequency_hz), 20 * np.log10(diagonal_gain), 1)[0])
+    low_hz, high_hz = SLOPE_HZ
     return Finding(
-        what=f"Slope along the axes, {low:g} to {high:g} Hz",
+        what=f"Slope along the axes, {low_hz:g} to {high_hz:g} Hz",
         published="rises: friction and damping rule below 10 Hz",
-        here=f"{format_signed(slope, 1)} dB per octave (a free mass: 0)",
-        value=slope,
+        here=f"{format_signed(slope_db, 1)} dB per octave (a free mass: 0)",
+        value=slope_db,
         unit="dB",
-        as_published=slope > 1.0,
+        as_published=slope_db > 1.0,
         rule="rises by more than 1 dB per octave",
     )
 
 
 def _find_lowest_line(response: FrequencyResponse) -> Finding | None:
-    """Whether the lowest reliable line is near 3.5 Hz; None without any reliable line."""
+    """Judge whether the lowest reliable line is near 3.5 Hz; None without any reliable line."""
     if not response.reliable.any():
         return None
     lowest_hz = float(response.frequency_hz[response.reliable][0])
@@ -194,11 +201,11 @@ def _find_lowest_line(response: FrequencyResponse) -> Finding | None:
     )
 
 
-def _find_band_edges(band: FrequencyBand, published: str, edges: tuple[float | None, float | None]) -> Finding:
-    """Whether a band's edges are near the published ones. edges: published, in Hz; None = not compared."""
-    low, high = edges
-    as_published = (low is None or _is_within_tolerance(band.low_hz, low)) and (
-        high is None or _is_within_tolerance(band.high_hz, high)
+def _find_band_edges(band: FrequencyBand, published: str, edges_hz: tuple[float | None, float | None]) -> Finding:
+    """Judge whether a band's edges are near the published ones. edges_hz: published, in Hz; None = not compared."""
+    low_hz, high_hz = edges_hz
+    as_published = (low_hz is None or _is_within_tolerance(band.low_hz, low_hz)) and (
+        high_hz is None or _is_within_tolerance(band.high_hz, high_hz)
     )
     return Finding(
         what=f"{band.name.capitalize()} band: {band.method}",
@@ -212,7 +219,7 @@ def _find_band_edges(band: FrequencyBand, published: str, edges: tuple[float | N
 
 
 def _find_direction_limit(limit_hz: float | None) -> Finding:
-    """Whether the limit of direction perception is near 35 Hz."""
+    """Judge whether the limit of direction perception is near 35 Hz; limit_hz: None where none was found."""
     return Finding(
         what="Limit of direction",
         published="35 Hz",

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectra
+from analysis.diagnosis.result.residual_spectrum import compute_held_out_spectra
 from analysis.diagnosis.search.guard import Guard, WorkPart
-from analysis.figures.diagnosis.held_out import held_out_picture
+from analysis.figures.diagnosis.held_out import make_held_out_picture
 from analysis.figures.diagnosis.mismatch_map import make_mismatch_map_picture, rank_driving_inputs
 from analysis.figures.diagnosis.residual_spectra import make_residual_spectra_picture
 from analysis.figures.diagnosis.rivals import make_rivals_pictures
@@ -46,7 +46,7 @@ def list_drawings(findings: Findings) -> list[WorkPart]:
         ("the figure of rivals", lambda: make_rivals_pictures(findings.explanation, findings.axes or ("x", "y", "z"))),
         (
             "the figure of held-out errors",
-            lambda: [held_out_picture(*held_out_data)] if held_out_data[0] or held_out_data[2] else [],
+            lambda: [make_held_out_picture(*held_out_data)] if held_out_data[0] or held_out_data[2] else [],
         ),
         ("the spectrum of the residual", lambda: _make_residual_spectra_pictures(findings)),
     ]
@@ -63,5 +63,5 @@ def _draw_with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool
 
 def _make_residual_spectra_pictures(findings: Findings) -> list[Picture]:
     """Make the picture of the residual spectra; none where no samples were held out."""
-    spectra = compute_remainder_spectra(findings.time_series, findings.floor)
+    spectra = compute_held_out_spectra(findings.time_series, findings.floor)
     return [make_residual_spectra_picture(spectra)] if spectra else []

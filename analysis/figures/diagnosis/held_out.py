@@ -2,7 +2,7 @@
 
 Left: an excerpt of a channel, measured and predicted, with the residuals; it is the excerpt in which the effects change
 the prediction most, in units of the noise. Right: rms error of each channel over all held-out samples, divided by the
-rms of its noise. `diagnosis_pictures` calls `held_out_picture`.
+rms of its noise. Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,7 +27,8 @@ from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note
 from equalizer.signals.signal import FloatArray
 
 _EXCERPT_CYCLES = 5.0
-"""Length of the excerpt, in cycles of the change that the effects make to the prediction."""
+"""Length of the excerpt, in cycles of the change that the effects make to the prediction. Chosen by eye, as all
+constants of this module."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
 """Bounds of the excerpt's length (s)."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
@@ -53,10 +54,10 @@ class Excerpt:
     stop: int
 
 
-def held_out_picture(
+def make_held_out_picture(
     time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float], errors: ChannelErrors
 ) -> Picture:
-    """The figure with title, caption and alternative text. noise_rms: by channel, in the channel's SI unit."""
+    """Make the figure with title, caption and alternative text. noise_rms: by channel, in the channel's SI unit."""
     excerpt = find_excerpt(time_series, noise_rms)
     excerpt_text = ""
     if excerpt is not None:
@@ -77,28 +78,29 @@ def held_out_picture(
 
 
 def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float]) -> Excerpt | None:
-    """The held-out excerpt and channel in which the re-tuned and the completed model's predictions differ most, in
+    """Find the held-out excerpt and channel in which the re-tuned and the completed model's predictions differ most, in
     units of the noise; if these do not differ visibly, those of the given and the completed model. None if neither
     pair differs visibly. noise_rms: by channel, in the channel's SI unit."""
     for stage_name in ("retuned", "before"):
-        best: tuple[float, Excerpt] | None = None
+        most_visible: tuple[float, Excerpt] | None = None
         for series in time_series:
             channel_noise = np.array([noise_rms.get(channel_name, np.nan) for channel_name in series.channels])
             change = np.nan_to_num((getattr(series, stage_name) - series.after) / channel_noise)
             for start, stop in series.tested:
                 candidate = _find_strongest_excerpt(series, change[start:stop], start)
-                if candidate is not None and (best is None or candidate[0] > best[0]):
-                    best = candidate
+                if candidate is not None and (most_visible is None or candidate[0] > most_visible[0]):
+                    most_visible = candidate
         # A change counts as visible if `_compute_visibility` is above a tenth of the noise's variance.
-        if best is not None and best[0] > 0.1:
-            return best[1]
+        if most_visible is not None and most_visible[0] > 0.1:
+            return most_visible[1]
     return None
 
 
 def _find_strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
-    """Visibility (`_compute_visibility`) and excerpt of the part of a held-out stretch in which the change is most
-    visible; None if the change is zero. change: (n, channels), difference of two predictions in units of the noise.
-    start: index of the stretch's first sample in the series. An excerpt has at least 8 samples if the stretch does."""
+    """Find the part of a held-out stretch in which the change is most visible, and its visibility
+    (`_compute_visibility`); None if the stretch is empty or the change is zero. change: (n, channels), difference of
+    two predictions in units of the noise. start: index of the stretch's first sample in the series. An excerpt has at
+    least 8 samples (chosen) if the stretch has as many."""
     if not len(change):
         return None
     channel = int(np.argmax(_compute_visibility(change)))
@@ -108,23 +110,25 @@ def _find_strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) 
         return None
     # Period of a sine with the same rms and the same rms slope: 2 pi rms(x) / rms(dx/dt).
     cycle_s = 2 * np.pi * rms / max(rms_step * series.sample_rate_hz, 1e-12)
-    length = int(np.clip(_EXCERPT_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
-    length = min(max(length, 8), len(signal))
-    offsets = np.unique(np.linspace(0, len(signal) - length, _CANDIDATES_PER_STRETCH).astype(int))
-    strengths = [float(_compute_visibility(signal[offset : offset + length])) for offset in offsets]
-    offset = int(offsets[int(np.argmax(strengths))])
-    return max(strengths), Excerpt(series, channel, start + offset, start + offset + length)
+    length_samples = int(np.clip(_EXCERPT_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
+    length_samples = min(max(length_samples, 8), len(signal))
+    candidate_offsets = np.unique(np.linspace(0, len(signal) - length_samples, _CANDIDATES_PER_STRETCH).astype(int))
+    visibilities = [
+        float(_compute_visibility(signal[offset : offset + length_samples])) for offset in candidate_offsets
+    ]
+    offset = int(candidate_offsets[int(np.argmax(visibilities))])
+    return max(visibilities), Excerpt(series, channel, start + offset, start + offset + length_samples)
 
 
 def _compute_visibility(change: FloatArray) -> FloatArray:
-    """Visibility of a change (n, channels) or (n,), per channel: its variance plus `_OFFSET_WEIGHT` times its squared
-    mean, because a varying change is easier to see in a plot than an offset."""
+    """Compute the visibility of a change (n, channels) or (n,), per channel: its variance plus `_OFFSET_WEIGHT` times
+    its squared mean, because a varying change is easier to see in a plot than an offset."""
     return np.asarray(np.var(change, axis=0) + _OFFSET_WEIGHT * np.mean(change, axis=0) ** 2)
 
 
 def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], errors: ChannelErrors) -> Figure:
-    """Figure of an excerpt, measured and predicted, with the errors of all channels to its right; of the errors alone
-    if `excerpt` is None; of a note if there are no errors either."""
+    """Draw an excerpt, measured and predicted, with the errors of all channels to its right; the errors alone if
+    `excerpt` is None; a note if there are no errors either."""
     channels = list(next(iter(errors.values()), {}))
     if excerpt is None and not channels:
         return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
@@ -205,7 +209,7 @@ def _draw_stage(axes: Axes, stage: StageStyle, values: FloatArray, rows: FloatAr
 
 
 def _describe_errors(errors: ChannelErrors) -> str:
-    """Description for screen readers: the errors of each stage by channel."""
+    """Describe the errors of each stage by channel, for screen readers."""
     sentences = []
     for stage in STAGES:
         if stage.name in errors:

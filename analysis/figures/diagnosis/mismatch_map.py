@@ -74,7 +74,7 @@ def rank_driving_inputs(maps: Maps) -> tuple[str, ...]:
 
 def make_mismatch_map_picture(maps: Maps, input_index: int, unit: str) -> Picture:
     """Make the mismatch map of one driving input. input_index: of the driving input in `rank_driving_inputs`; the
-    first is shown as a bitmap, all others are folded. unit: of the command, empty if unknown."""
+    first map is also written as PNG, all others are folded. unit: of the command, empty if unknown."""
     input_ = rank_driving_inputs(maps)[input_index]
     return Picture(
         name=f"mismatch-map-{input_index + 1}",

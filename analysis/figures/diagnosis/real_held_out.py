@@ -1,7 +1,7 @@
 """Figure of a real recording: a held-out excerpt, measured and predicted, and the held-out errors of all models.
 
 Errors are rms errors relative to the signal, on a logarithmic axis; the noise is the lower limit of any model. Called
-by `write_real_results`; `real_report` shows the same errors as a table.
+by `study.evaluation.real.write_real`; `analysis.reports.real_report` lists the same errors in its table.
 """
 
 import numpy as np

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from analysis.diagnosis.result.residual_spectrum import RemainderSpectrum
+from analysis.diagnosis.result.residual_spectrum import HeldOutSpectrum
 from analysis.diagnosis.unit_wording import typeset_unit
 from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
@@ -26,7 +26,7 @@ _NOISE_HANDLE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise"
 """Legend entry of the noise."""
 
 
-def make_residual_spectra_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
+def make_residual_spectra_picture(spectra: Sequence[HeldOutSpectrum]) -> Picture:
     """Make the picture of the residual spectra, with its caption and its text for screen readers."""
     return Picture(
         name="remainder",
@@ -38,7 +38,7 @@ def make_residual_spectra_picture(spectra: Sequence[RemainderSpectrum]) -> Pictu
     )
 
 
-def draw_residual_spectra(spectra: Sequence[RemainderSpectrum]) -> Figure:
+def draw_residual_spectra(spectra: Sequence[HeldOutSpectrum]) -> Figure:
     """Draw a panel per channel: densities of the signal, of the residuals of the re-tuned and the completed
     model, and of the noise; a note where there are no spectra."""
     if not spectra:
@@ -57,7 +57,7 @@ def draw_residual_spectra(spectra: Sequence[RemainderSpectrum]) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
+def _draw_panel(axes: Axes, spectrum: HeldOutSpectrum) -> None:
     """Draw the densities of one channel on logarithmic axes."""
     style_axes(axes)
     axes.loglog(spectrum.frequency_hz, spectrum.measured, color=GREY, linewidth=0.9)
@@ -75,7 +75,7 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _write_alternative_text(spectrum: RemainderSpectrum) -> str:
+def _write_alternative_text(spectrum: HeldOutSpectrum) -> str:
     """Write the largest ratio of the completed model's residual to the noise, and its frequency, in words."""
     ratio = spectrum.after / spectrum.noise
     if not np.isfinite(ratio).any():

@@ -1,7 +1,7 @@
 """Figures of the signatures of named effects: the data that identify an effect, with its fitted law.
 
 A signature is the residual of the model without the effect (or the missing force) against the variable that the effect
-depends on, such as friction against velocity: means per bin with two standard errors.
+depends on, such as friction against velocity: means per bin with two standard errors. Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Sequence
@@ -60,9 +60,9 @@ def draw_signature(signature: Signature) -> Figure:
     y_label, y_factor = _rescale_label(signature.ordinate_label, np.concatenate([signature.measured, signature.law]))
     is_spectrum = signature.abscissa_label.startswith("frequency")
     axes.errorbar(
-        x_factor * signature.measured_abscissa, y_factor * signature.measured, yerr=2 * y_factor * signature.spread,
-        fmt="o", color=BLACK, markersize=3.8, elinewidth=1.0, capsize=1.8, alpha=0.85, label="missing without it",
-        zorder=3,
+        x_factor * signature.measured_abscissa, y_factor * signature.measured,
+        yerr=2 * y_factor * signature.standard_error, fmt="o", color=BLACK, markersize=3.8, elinewidth=1.0,
+        capsize=1.8, alpha=0.85, label="missing without it", zorder=3,
     )  # fmt: skip
     axes.plot(
         x_factor * signature.law_abscissa,
@@ -81,8 +81,8 @@ def draw_signature(signature: Signature) -> Figure:
     else:
         axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
         if signature.visited_range is not None:
-            axes.set_ylim(_find_visited_limits(signature, y_factor))
-        for range_start, range_end in _find_unvisited_ranges(signature):
+            axes.set_ylim(_compute_visited_limits(signature, y_factor))
+        for range_start, range_end in _list_unvisited_ranges(signature):
             axes.axvspan(x_factor * range_start, x_factor * range_end, color=GREY, alpha=0.15, linewidth=0, zorder=0)
         if signature.measured_abscissa.min() < 0 < signature.measured_abscissa.max():
             axes.axvline(0, color=GREY, linewidth=0.8, zorder=1)
@@ -102,9 +102,10 @@ def _rescale_label(text: str, values: FloatArray) -> tuple[str, float]:
     return f"{capitalise(words)} ({scale.unit})", scale.factor
 
 
-def _find_visited_limits(signature: Signature, unit_factor: float) -> tuple[float, float]:
-    """Limits of the ordinate from dots and law within the recorded range, with a margin of 0.75 of their span on either
-    side: beyond the range, a formula may have a pole. `visited_range` must not be None."""
+def _compute_visited_limits(signature: Signature, unit_factor: float) -> tuple[float, float]:
+    """Compute the limits of the ordinate, in the shown unit, from dots and law within the recorded range, with a margin
+    of 0.75 (chosen) of their span on either side: beyond the range, a formula may have a pole. unit_factor: from SI to
+    the shown unit. signature: with a `visited_range`."""
     assert signature.visited_range is not None
     low, high = signature.visited_range
     law_in_range = signature.law[(signature.law_abscissa >= low) & (signature.law_abscissa <= high)]
@@ -113,8 +114,9 @@ def _find_visited_limits(signature: Signature, unit_factor: float) -> tuple[floa
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def _find_unvisited_ranges(signature: Signature) -> tuple[tuple[float, float], ...]:
-    """Intervals of the abscissa in which the law is drawn but nothing was recorded; empty where these are not known."""
+def _list_unvisited_ranges(signature: Signature) -> tuple[tuple[float, float], ...]:
+    """List the intervals of the abscissa in which the law is drawn but nothing was recorded; empty where the recorded
+    range is not known."""
     if signature.visited_range is None:
         return ()
     low, high = signature.visited_range
@@ -122,8 +124,8 @@ def _find_unvisited_ranges(signature: Signature) -> tuple[tuple[float, float], .
 
 
 def _describe_signature(signature: Signature) -> str:
-    """Description for screen readers: first and last dot, and rms distance of the law from the dots, relative to their
-    rms."""
+    """Describe for screen readers the first and last dot, and the rms distance of the law from the dots, relative to
+    their rms; empty without dots or law."""
     if not len(signature.measured_abscissa) or not len(signature.law_abscissa):
         return ""
     order = np.argsort(signature.law_abscissa)

@@ -1,6 +1,7 @@
 """Line styles and legend labels of the three model predictions, shared by all figures of a diagnosis.
 
-A stage is a state of the model: as given, re-tuned (parameters fitted again), or completed with the effects found.
+A stage is a state of the model: as given, re-tuned (parameters fitted again), or completed with the effects found. Used
+by the modules of `analysis.figures.diagnosis`.
 """
 
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ class StageStyle:
     colour: str
     """Colour of Matplotlib, from `analysis.figures.style`."""
     dash: Dash
+    """Line style, with lengths in units of the line width."""
     width: float
     """Line width in points."""
 
@@ -38,5 +40,7 @@ GIVEN_STAGE = StageStyle("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
 RETUNED_STAGE = StageStyle("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
 COMPLETED_STAGE = StageStyle("after", "with the effects found", BLUE, "-", 1.4)
 STAGES = (GIVEN_STAGE, RETUNED_STAGE, COMPLETED_STAGE)
+"""All stages, in the order of their legend entries. Colours differ for colour-blind readers; dashes and widths are
+chosen by eye."""
 MEASURED_HANDLE = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
 """Legend entry of the measured signal."""

@@ -1,7 +1,8 @@
 """Counts of a study's answers by person, frequency, level and direction: the data of the hierarchical likelihood.
 
 Trials that agree in all four form a cell; with its numbers of right and wrong answers, a cell enters the binomial
-likelihood of the psychometric function once instead of trial by trial.
+likelihood of the psychometric function once instead of trial by trial. `study_analysis` and `power.simulated_study`
+count the answers; the fits of `hierarchy` and the figures use them.
 """
 
 import math
@@ -15,8 +16,8 @@ from equalizer.signals.signal import FloatArray
 from protocols.trial import Phase, Trial
 
 LEVEL_GRID_DB = 1e-6
-"""Levels (dB) that round to the same multiple of this count as equal: it absorbs the rounding of a table, and is far
-below any step of a staircase."""
+"""Levels (dB) that round to the same multiple of this count as equal: the grid absorbs the rounding errors of levels,
+and is far finer than any step of a staircase."""
 
 FEWEST_ANSWERS = 20
 """A person with at least this many answers at a frequency counts among the people there (`Answers.has_enough_answers`).
@@ -31,7 +32,9 @@ class Answers:
     cell."""
 
     subjects: tuple[str, ...]
+    """Codes of the persons."""
     frequencies_hz: tuple[float, ...]
+    """Ascending; some may have no answer."""
     run: NDArray[np.intp]
     """Index of the run: index of the person times the number of frequencies, plus index of the frequency."""
     level_db: FloatArray
@@ -73,8 +76,8 @@ class Answers:
 
 
 def count_answers(trials: Iterable[Trial], frequencies_hz: Iterable[float]) -> Answers | None:
-    """All valid answers (`Trial.is_valid`) of the test phase at these frequencies; no participant is dropped. None
-    without any such answer.
+    """Count all valid answers (`Trial.is_valid`) of the test phase at these frequencies; no participant with such an
+    answer is dropped. None without any such answer.
 
     Answers of an unfinished run count too: where a run stops depends on the answers before, not on the threshold
     itself, so that the stopping rule does not enter the likelihood.
@@ -101,8 +104,8 @@ def count_cells(
     side: FloatArray,
     is_correct: NDArray[np.bool_],
 ) -> Answers:
-    """Count the trials of each cell; run, level_db, side and is_correct have an entry per trial, (trials,), at least
-    one."""
+    """Count the trials of each cell; run, level_db, side and is_correct: (trials,), at least one, as the fields of
+    `Answers`."""
     level_steps = np.round(level_db / LEVEL_GRID_DB).astype(np.int64)
     level_steps -= level_steps.min()
     # One integer key per cell, ordered by run, then level, then side, is quicker to sort than rows of three.

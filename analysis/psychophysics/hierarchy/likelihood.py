@@ -4,7 +4,13 @@ Per cell of answers at one level and direction:
     P(right) = lapse + (1 - 2 lapse) Phi(q(t) - side c),      t = t0 + exp(b) ln(10)/20 (level - theta).
 A person has the latent parameters z = (theta_1 ... theta_k, b, c): a threshold per frequency in dB, the logarithm of
 the slope, and the criterion in units of d'. side is +1 for direction 1 and -1 for direction 2; q and t0 are those of
-`curve`. Answers are binomial. Derivatives are exact, by the chain rule over t, b and c.
+`curve`. Answers are binomial. Derivatives are exact, by the chain rule over t, b and c. Called by `marginal`; made by
+`objective`.
+
+Names of derivatives: slope_per_db = -dt/dtheta = dt/dlevel, tau = t - t0 = dt/db, a = q(t) - side c (the evidence); q1,
+q2: dq/dt and its derivative; p1: dp/da. Of the log-likelihood l: u = dl/dp, u1 = du/dp, lt = dl/dt; ltt, ltb, ltc:
+second derivatives by t, b and c; wtt, wtc: minus their expected values. In `trace_derivatives`, a_t, a_b, a_c and a_tt,
+a_tb, a_bb are derivatives of a by theta, b and c, and v_tt to v_cc the entries of the given inverse.
 """
 
 import math
@@ -43,7 +49,7 @@ class Derivatives:
 
 class TrialLikelihood:
     """Log-likelihood of a study's answers at given latent parameters. The indices of runs and persons are prepared
-    once."""
+    when it is made."""
 
     def __init__(self, answers: Answers, family: Family) -> None:
         self.answers, self.family = answers, family
@@ -53,9 +59,9 @@ class TrialLikelihood:
         self._runs = answers.run[self._starts]
 
     def evaluate(self, latent: FloatArray, lapse: float) -> Derivatives:
-        """Values and derivatives at latent parameters (n, k + 2) and this lapse rate."""
-        side, pace = self.answers.side, np.exp(latent[:, self.frequencies]) * NEPER_PER_DB
-        tau, a, q1, q2 = self._compute_evidence(latent, pace)
+        """Evaluate values and derivatives at latent parameters (n, k + 2) and this lapse rate."""
+        side, slope_per_db = self.answers.side, np.exp(latent[:, self.frequencies]) * NEPER_PER_DB
+        tau, a, q1, q2 = self._compute_evidence(latent, slope_per_db)
         e = _Evidence(a, self.answers.right, self.answers.wrong, lapse)
         u, u1 = e.score, e.score_by_p
         slope, curvature = u * e.p1, u1 * e.p1**2 - u * a * e.p1
@@ -70,26 +76,26 @@ class TrialLikelihood:
             ltt, ltb, ltc, ltb * tau, ltc * tau, curvature,
             wtt, wtt * tau, wtc, wtt * tau**2, wtc * tau, e.weight,
         ])  # fmt: skip
-        p = pace[:, None]
+        slope_column = slope_per_db[:, None]
         return Derivatives(
             value=sums[0].sum(axis=1),
-            first=_assemble_gradient(sums[2:5], p),
-            second=_assemble_hessian(sums[8:14], p),
-            information=_assemble_hessian(sums[14:20], p),
+            first=_assemble_gradient(sums[2:5], slope_column),
+            second=_assemble_hessian(sums[8:14], slope_column),
+            information=_assemble_hessian(sums[14:20], slope_column),
             lapse_derivative=sums[1].sum(axis=1),
-            gradient_lapse_derivative=_assemble_gradient(sums[5:8], p),
+            gradient_lapse_derivative=_assemble_gradient(sums[5:8], slope_column),
         )
 
     def trace_derivatives(self, latent: FloatArray, lapse: float, inverse: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Trace of `inverse` (n, d, d) times the derivative of the information by each latent parameter (n, d), and by
-        the lapse rate (n,)."""
+        """Compute the trace of `inverse` (n, d, d) times the derivative of the information by each latent parameter (n,
+        d), and by the lapse rate (n,)."""
         k, run, person = self.frequencies, self.answers.run, self._person
-        pace = np.exp(latent[:, k]) * NEPER_PER_DB
-        tau, a, q1, q2 = self._compute_evidence(latent, pace)
+        slope_per_db = np.exp(latent[:, k]) * NEPER_PER_DB
+        tau, a, q1, q2 = self._compute_evidence(latent, slope_per_db)
         e = _Evidence(a, self.answers.right, self.answers.wrong, lapse)
-        p, index = pace[person], np.arange(k)
-        a_t, a_b, a_c = -p * q1, tau * q1, -self.answers.side
-        a_tt, a_tb, a_bb = p**2 * q2, -p * (q2 * tau + q1), (q2 * tau + q1) * tau
+        cell_slope, index = slope_per_db[person], np.arange(k)
+        a_t, a_b, a_c = -cell_slope * q1, tau * q1, -self.answers.side
+        a_tt, a_tb, a_bb = cell_slope**2 * q2, -cell_slope * (q2 * tau + q1), (q2 * tau + q1) * tau
         v_tt, v_tb, v_tc = (inverse[:, index, column].ravel()[run] for column in (index, k, k + 1))
         v_bb, v_bc, v_cc = (inverse[:, i, j][person] for i, j in ((k, k), (k, k + 1), (k + 1, k + 1)))
         vt, vb = v_tt * a_t + v_tb * a_b + v_tc * a_c, v_tb * a_t + v_bb * a_b + v_bc * a_c
@@ -105,16 +111,17 @@ class TrialLikelihood:
         return np.concatenate([by_threshold, by_shared[:2].T], axis=1), by_shared[2]
 
     def _compute_evidence(
-        self, latent: FloatArray, pace: FloatArray
+        self, latent: FloatArray, slope_per_db: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Per cell (m,): t - t0, mean of the evidence q - side c, and the first two derivatives of q by t."""
+        """Compute per cell (m,): t - t0, the evidence q - side c, and the first two derivatives of q by t.
+        slope_per_db: (n,)."""
         cells, k = self.answers, self.frequencies
-        tau = pace[self._person] * (cells.level_db - latent[:, :k].ravel()[cells.run])
+        tau = slope_per_db[self._person] * (cells.level_db - latent[:, :k].ravel()[cells.run])
         q, q1, q2 = differentiate_evidence(T_AT_THRESHOLD[self.family] + tau, self.family)
         return tau, q - cells.side * latent[:, k + 1][self._person], q1, q2
 
     def _sum_by_run(self, rows: list[FloatArray]) -> FloatArray:
-        """Sums over the cells of each run: (rows, n, k); 0 where a person has no answer at a frequency."""
+        """Sum rows of (m,) over the cells of each run: (rows, n, k); 0 where a person has no answer at a frequency."""
         totals = np.zeros((len(rows), self.persons * self.frequencies))
         totals[:, self._runs] = np.add.reduceat(np.array(rows), self._starts, axis=1)
         return totals.reshape(len(rows), self.persons, self.frequencies)
@@ -137,21 +144,21 @@ class _Evidence:
         self.weight = (right + wrong) * self.p1**2 / (self.p * self.wrong_p)
 
 
-def _assemble_gradient(sums: FloatArray, pace: FloatArray) -> FloatArray:
-    """Assemble the gradient (n, d) from sums over cells (3, n, k) of derivatives by t, b and c. pace: -dt/dtheta (n,
-    1)."""
-    return np.concatenate([-pace * sums[0], sums[1:].sum(axis=2).T], axis=1)
+def _assemble_gradient(sums: FloatArray, slope_per_db: FloatArray) -> FloatArray:
+    """Assemble the gradient (n, d) from sums over cells (3, n, k) of derivatives by t, b and c. slope_per_db:
+    -dt/dtheta (n, 1)."""
+    return np.concatenate([-slope_per_db * sums[0], sums[1:].sum(axis=2).T], axis=1)
 
 
-def _assemble_hessian(sums: FloatArray, pace: FloatArray) -> FloatArray:
+def _assemble_hessian(sums: FloatArray, slope_per_db: FloatArray) -> FloatArray:
     """Assemble the Hessian (n, d, d) from sums over cells (6, n, k) of second derivatives by tt, tb, tc, bb, bc, cc.
-    pace: as in `_assemble_gradient`."""
+    slope_per_db: as in `_assemble_gradient`."""
     _, n, k = sums.shape
     hessian = np.zeros((n, k + 2, k + 2))
     index = np.arange(k)
-    hessian[:, index, index] = pace**2 * sums[0]
+    hessian[:, index, index] = slope_per_db**2 * sums[0]
     for shared in (0, 1):
-        hessian[:, index, k + shared] = hessian[:, k + shared, index] = -pace * sums[1 + shared]
+        hessian[:, index, k + shared] = hessian[:, k + shared, index] = -slope_per_db * sums[1 + shared]
     bb, bc, cc = sums[3:].sum(axis=2)
     hessian[:, k, k], hessian[:, k + 1, k + 1] = bb, cc
     hessian[:, k, k + 1] = hessian[:, k + 1, k] = bc

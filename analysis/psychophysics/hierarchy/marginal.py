@@ -80,8 +80,8 @@ class MarginalLikelihood:
         )
 
     def evaluate(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Log marginal likelihood of each person (n,), and its gradient (n, k + 6). parameters: (k + 6,), see
-        `ParameterLayout`."""
+        """Evaluate the log marginal likelihood of each person (n,), and its gradient (n, k + 6). parameters: (k + 6,),
+        see `ParameterLayout`."""
         layout, k = self.layout, self.layout.k
         precision, prior_mean = compute_prior_precision(parameters, k), _compute_prior_mean(parameters, k)
         lapse = float(expit(parameters[layout.lapse]))
@@ -117,8 +117,8 @@ class MarginalLikelihood:
         return value, gradient
 
     def find_modes(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mode of each person's latent parameters (n, k + 2), and the answers' expected information there (n, k + 2,
-        k + 2)."""
+        """Find the mode of each person's latent parameters (n, k + 2). Returns it, and the answers' expected
+        information there (n, k + 2, k + 2)."""
         k, lapse = self.layout.k, float(expit(parameters[self.layout.lapse]))
         derivatives = self._maximise_posterior(
             compute_prior_precision(parameters, k), _compute_prior_mean(parameters, k), lapse
@@ -156,14 +156,16 @@ class MarginalLikelihood:
 
 
 def _compute_log_posterior(derivatives: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
-    """(n,): log-likelihood plus log prior, without the prior's constant. deviation: (n, k + 2), from the prior mean."""
+    """Compute log-likelihood plus log prior (n,), without the prior's constant. deviation: (n, k + 2), from the prior
+    mean."""
     log_posterior: FloatArray = derivatives.value - 0.5 * np.einsum("na,ab,nb->n", deviation, precision, deviation)
     return log_posterior
 
 
 def _choose_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
-    """(n, k + 2, k + 2): the observed curvature, or the expected one for persons whose observed curvature is not
-    positive definite (least eigenvalue up to `LEAST_CURVATURE`), so that every Newton step is an ascent direction."""
+    """Choose the curvature (n, k + 2, k + 2): the observed one, or the expected one for persons whose observed
+    curvature is not positive definite (least eigenvalue up to `LEAST_CURVATURE`), so that every Newton step is an
+    ascent direction."""
     lowest = np.linalg.eigvalsh(observed)[:, 0]
     if lowest.min() > LEAST_CURVATURE:
         return observed
@@ -171,13 +173,13 @@ def _choose_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
 
 
 def _compute_prior_mean(parameters: FloatArray, k: int) -> FloatArray:
-    """(k + 2,): prior means of the thresholds (dB), the log-slope and the criterion (0)."""
+    """Compute the prior means (k + 2,) of the thresholds (dB), the log-slope and the criterion (0)."""
     return np.concatenate([parameters[:k], [parameters[k + 2], 0.0]])
 
 
 def compute_prior_precision(parameters: FloatArray, k: int) -> FloatArray:
-    """Prior precision (inverse covariance) of the latent parameters, (k + 2, k + 2). Covariance of the thresholds:
-    variance of persons for all pairs, plus variance of person x frequency on the diagonal."""
+    """Compute the prior precision (k + 2, k + 2), the inverse covariance of the latent parameters. Covariance of the
+    thresholds: variance of persons for all pairs, plus variance of person x frequency on the diagonal."""
     shared_variance, interaction_variance = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     precision = np.zeros((k + 2, k + 2))
     averaging = np.full((k, k), 1.0 / k)
@@ -189,7 +191,8 @@ def compute_prior_precision(parameters: FloatArray, k: int) -> FloatArray:
 
 
 def _differentiate_precision(parameters: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
-    """For each log SD: its index, the derivative of the precision, and that of the log determinant of the precision."""
+    """Differentiate the precision by each log SD. Returns for each its index, the derivative of the precision (k + 2,
+    k + 2), and that of the precision's log determinant."""
     shared_variance, interaction_variance = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     total_variance = interaction_variance + k * shared_variance
     averaging = np.full((k, k), 1.0 / k)

@@ -119,7 +119,8 @@ def maximise(objective: Objective, start: FloatArray, fixed_index: int | None = 
     bounds = objective.bounds
     if fixed_index is not None:
         bounds[fixed_index] = (float(start[fixed_index]), float(start[fixed_index]))
-    # The search by quadrature continues from here, so an error of some hundredths of a standard error is acceptable.
+    # Tolerances and limit are chosen: the search by quadrature continues from the result, so that an error of some
+    # hundredths of a standard error is acceptable.
     options = {"maxiter": 300, "ftol": 1e-7, "gtol": 1e-3, "maxcor": 20}
     start = np.clip(
         start,

@@ -1,7 +1,8 @@
 """Observed shares of right answers by level, and fitted curves, for figures of psychometric functions.
 
 Levels are binned; each bin has the share of right answers with Wilson's 95 % interval. The curve of a person is the
-probability of a right answer of `curve.compute_proportion_correct`, averaged over both directions.
+probability of a right answer of `curve.compute_proportion_correct`, averaged over both directions. Called by
+`analysis.figures.psychometric`.
 """
 
 from dataclasses import dataclass
@@ -54,10 +55,13 @@ class ObservedShare:
     level_db: float
     """Mean over the trials of the bin, re 1 N or re each person's threshold."""
     trials: int
+    """Number of trials in the bin."""
     right: int
+    """Number of right answers."""
     lower: float
+    """Lower end of Wilson's 95 % interval of the share."""
     upper: float
-    """Wilson's 95 % interval of the share."""
+    """Upper end of that interval."""
 
     @property
     def share(self) -> float:
@@ -85,19 +89,21 @@ def compute_group_shares(answers: Answers, fit: FittedCurves, frequency_index: i
 def average_person_curves(
     above_db: FloatArray, answers: Answers, fit: FittedCurves, frequency_index: int
 ) -> FloatArray:
-    """Mean of the persons' curves at one frequency, weighted by their trials there. above_db: re the threshold."""
+    """Average the persons' curves at one frequency, weighted by their trials there. above_db: levels re the threshold,
+    (p,). Raises ZeroDivisionError where the frequency has no answers."""
     at_frequency = answers.run % len(answers.frequencies_hz) == frequency_index
-    trials = np.bincount(
+    trial_counts = np.bincount(
         answers.person[at_frequency], (answers.right + answers.wrong)[at_frequency], minlength=answers.persons
     )
-    mean: FloatArray = np.average(
-        [evaluate_person_curve(above_db, person, fit) for person in fit.persons], axis=0, weights=trials
+    mean_curve: FloatArray = np.average(
+        [evaluate_person_curve(above_db, person, fit) for person in fit.persons], axis=0, weights=trial_counts
     )
-    return mean
+    return mean_curve
 
 
 def evaluate_person_curve(above_db: FloatArray, person: PersonEstimate, fit: FittedCurves) -> FloatArray:
-    """Probability of a right answer, the mean over both directions. above_db: levels re the threshold, any shape."""
+    """Evaluate the probability of a right answer, the mean over both directions. above_db: levels re the threshold, any
+    shape."""
     q = differentiate_evidence(T_AT_THRESHOLD[fit.family] + person.slope * NEPER_PER_DB * above_db, fit.family)[0]
     return (
         compute_proportion_correct(q - person.criterion, fit.lapse)
@@ -106,13 +112,17 @@ def evaluate_person_curve(above_db: FloatArray, person: PersonEstimate, fit: Fit
 
 
 def _bin_shares(answers: Answers, selected: NDArray[np.bool_], level_db: FloatArray) -> tuple[ObservedShare, ...]:
-    """Shares of the chosen cells by bins of `level_db`. selected, level_db: (m,), an entry per cell."""
-    level, correct, trials = level_db[selected], answers.right[selected], (answers.right + answers.wrong)[selected]
-    bins, shares = np.round(level / BIN_DB), []
-    for bin_number in np.unique(bins):
-        in_bin = bins == bin_number
-        answer_count, correct_count = int(trials[in_bin].sum()), int(correct[in_bin].sum())
-        mean_level_db = float(np.average(level[in_bin], weights=trials[in_bin]))
+    """Compute the shares of the selected cells by bins of `level_db`. selected, level_db: (m,), an entry per cell."""
+    selected_level_db, correct_counts, trial_counts = (
+        level_db[selected],
+        answers.right[selected],
+        (answers.right + answers.wrong)[selected],
+    )
+    bin_numbers, shares = np.round(selected_level_db / BIN_DB), []
+    for bin_number in np.unique(bin_numbers):
+        in_bin = bin_numbers == bin_number
+        answer_count, correct_count = int(trial_counts[in_bin].sum()), int(correct_counts[in_bin].sum())
+        mean_level_db = float(np.average(selected_level_db[in_bin], weights=trial_counts[in_bin]))
         shares.append(
             ObservedShare(
                 mean_level_db, answer_count, correct_count, *compute_wilson_interval(correct_count, answer_count)

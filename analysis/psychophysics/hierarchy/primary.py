@@ -56,17 +56,23 @@ class PrimaryAnalysis:
     """Estimates of the hierarchical psychometric model."""
 
     family: Family
+    """Family of the psychometric functions."""
     trials: int
+    """Number of answers of all persons."""
     frequencies_hz: tuple[float, ...]
     """Those with answers, in ascending order."""
     confidence: float
+    """Confidence level of all intervals, 0 to 1."""
     medians: tuple[MedianThreshold, ...]
+    """Median threshold at each frequency."""
     overall: RepeatedMeasures
     """Analysis of variance over the pseudo-thresholds in dB."""
     contrasts: tuple[Contrast, ...]
     """Each frequency against the lowest."""
     limit: DirectionLimit
+    """Frequency at which the median threshold reaches the cap."""
     persons: tuple[PersonEstimate, ...]
+    """Estimates of each person, in the order of `Answers.subjects`."""
     runs: tuple[RunLikelihood, ...]
     """Likelihood of each person's threshold at each frequency, by the answers there alone."""
     person_sd_db: float
@@ -82,6 +88,7 @@ class PrimaryAnalysis:
     lapse: float
     """Lapse rate common to all persons."""
     goodness: GoodnessOfFit
+    """Observed against predicted shares of right answers."""
     converged: bool
     """Whether both fits converged: that of all answers, and that of the analysis of variance where it leaves out
     persons."""
@@ -207,7 +214,7 @@ def _test_frequency_effect(
 
 
 def select_persons(answers: Answers, is_selected: NDArray[np.bool_]) -> Answers:
-    """Answers of a subset of the persons. is_selected: (persons,)."""
+    """Select the answers of a subset of the persons. is_selected: (persons,)."""
     k, is_selected_cell = len(answers.frequencies_hz), is_selected[answers.person]
     subjects = tuple(subject for subject, is_kept in zip(answers.subjects, is_selected, strict=True) if is_kept)
     new_person_index = np.cumsum(is_selected) - 1
@@ -223,7 +230,8 @@ def select_persons(answers: Answers, is_selected: NDArray[np.bool_]) -> Answers:
 
 
 def _make_nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:
-    """Distributions of slope and criterion of each person, from the model of all answers."""
+    """Make the distributions of slope and criterion of each person, with the lapse rate, from the model of all
+    answers."""
     return [
         Nuisance(person.slope, person.criterion, (fit.lapse,), *map(float, errors))
         for person, errors in zip(persons, fit.shared_errors, strict=True)
@@ -231,7 +239,7 @@ def _make_nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> 
 
 
 def drop_unanswered_frequencies(answers: Answers) -> Answers:
-    """The same answers without frequencies that have none, because a mean without data has no estimate."""
+    """Drop the frequencies that have no answer, because a mean without data has no estimate."""
     k = len(answers.frequencies_hz)
     answered_indices, new_frequency_index = np.unique(answers.run % k, return_inverse=True)
     frequencies_hz = tuple(answers.frequencies_hz[frequency_index] for frequency_index in answered_indices)
@@ -241,9 +249,9 @@ def drop_unanswered_frequencies(answers: Answers) -> Answers:
 
 
 def estimate_persons(subjects: Sequence[str], latent: FloatArray, cap_db: float) -> tuple[PersonEstimate, ...]:
-    """Thresholds, slope and criterion of each person. latent: (n, k + 2): thresholds in dB re 1 N, natural logarithm of
-    the slope, and criterion. The primary analysis gives posterior modes of the thresholds, and posterior means of slope
-    and criterion with the thresholds integrated out."""
+    """Convert latent parameters to thresholds, slope and criterion of each person. latent: (n, k + 2): thresholds in dB
+    re 1 N, natural logarithm of the slope, and criterion. The primary analysis gives posterior modes of the thresholds,
+    and posterior means of slope and criterion with the thresholds integrated out."""
     return tuple(
         PersonEstimate(
             subject=subject,

@@ -1,11 +1,15 @@
 """Log marginal likelihood of each person by adaptive Gauss-Hermite quadrature, with gradient and Hessian.
 
-Laplace's method (`marginal`) puts medians some 0.13 dB too low, because the likelihood of a threshold is skewed: its
-integral is not that of the normal density with the expected information. The nodes are those of `nodes`.
+Laplace's method (`marginal`) puts medians some 0.13 dB too low (docs/statistics.md), because the likelihood of a
+threshold is skewed: its integral is not that of the normal density with the expected information. The nodes are those
+of `nodes`. Called by `quadrature_search`.
 
 With L the log density of a person's answers and latent parameters z, and E over the posterior distribution of z:
     gradient = E[dL]  (Fisher's identity),      Hessian = E[d²L] + Cov[dL]  (Louis' identity),
 so that no derivative of the node positions is needed.
+
+Axes of arrays: n persons, q outer nodes (over u, the person's common deviation in dB, the log-slope b and the criterion
+c), k frequencies, r inner nodes (over the threshold at a frequency).
 
 Source: R. A. Fisher, Proc. Camb. Philos. Soc. 22 (1925), 700-725; T. A. Louis, J. R. Stat. Soc. B 44 (1982), 226-233.
 """
@@ -65,11 +69,11 @@ class _PersonAnswers:
         self._runs = frequency_of_entry[self._starts]
 
     def compute_log_likelihoods(self, shared: FloatArray, threshold: FloatArray, lapse: float) -> FloatArray:
-        """(3, q, k, r): log-likelihood of each run, and its first two derivatives by the lapse rate. shared: (q, 3),
-        threshold: (q, k, r)."""
-        pace = np.exp(shared[:, 1, None]) * NEPER_PER_DB
+        """Compute (3, q, k, r): log-likelihood of each run, and its first two derivatives by the lapse rate. shared:
+        (q, 3), nodes of u, b and c; threshold: (q, k, r), nodes in dB."""
+        slope_per_db = np.exp(shared[:, 1, None]) * NEPER_PER_DB
         above_db = self._level_db[:, None, None] - threshold[:, self._frequency_index].swapaxes(0, 1)
-        q = compute_mean_evidence(T_AT_THRESHOLD[self._family] + pace * above_db, self._family)
+        q = compute_mean_evidence(T_AT_THRESHOLD[self._family] + slope_per_db * above_db, self._family)
         attentive_p = ndtr(self._sign * (q[self._level] - self._side * shared[:, 2, None]))
         answer_p = lapse + (1.0 - 2.0 * lapse) * attentive_p
         by_lapse = (1.0 - 2.0 * attentive_p) / answer_p
@@ -87,8 +91,8 @@ class Quadrature:
         self._persons = [_PersonAnswers(answers, person, family) for person in range(answers.persons)]
 
     def compute_log_likelihoods(self, nodes: Nodes, lapse: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Log-likelihood of each run, and its first two derivatives by the logit of the lapse rate, (n, q, k, r)
-        each."""
+        """Compute the log-likelihood of each run, and its first two derivatives by the logit of the lapse rate, (n, q,
+        k, r) each."""
         node_sets = zip(self._persons, nodes.outer_positions, nodes.inner_positions, strict=True)
         by_person = [
             person.compute_log_likelihoods(shared, threshold, lapse) for person, shared, threshold in node_sets
@@ -99,8 +103,8 @@ class Quadrature:
 
 
 def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, counts: NodeCounts) -> Integrals:
-    """Log marginal likelihoods and derivatives at the parameters (size,) of `ParameterLayout`. moments: posterior
-    moments at these parameters, or at parameters close to them. counts: number of nodes."""
+    """Compute log marginal likelihoods and derivatives at the parameters (size,) of `ParameterLayout`. moments:
+    posterior moments at these parameters, or at parameters close to them. counts: number of nodes."""
     k = quadrature.k
     population = PopulationParameters.from_parameters(parameters, k)
     nodes = place_nodes(moments, counts)
@@ -131,7 +135,7 @@ def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, 
 
 
 def _normalise(log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Log-sum-exp over the last axis, and the softmax: each term's share of the sum."""
+    """Compute log-sum-exp over the last axis, and the softmax: each term's share of the sum."""
     maximum = log_terms.max(axis=-1, keepdims=True)
     shares = np.exp(log_terms - maximum)
     total = shares.sum(axis=-1, keepdims=True)
@@ -139,8 +143,8 @@ def _normalise(log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _assemble_gradient(mean: FloatArray, deviations: FloatArray, population: PopulationParameters) -> FloatArray:
-    """(n, q, size): gradient of L at the outer nodes, averaged over the inner nodes. mean: (n, q, k, 3), averages by
-    mean, log SD and lapse rate; deviations: (n, q, 3), of u, b and c in standard deviations."""
+    """Assemble the gradient of L at the outer nodes, (n, q, size), averaged over the inner nodes. mean: (n, q, k, 3),
+    averages by mean, log SD and lapse rate; deviations: (n, q, 3), of u, b and c in standard deviations."""
     layout = ParameterLayout(mean.shape[2])
     gradient = np.empty((*mean.shape[:2], layout.size))
     gradient[..., : layout.k] = mean[..., 0]
@@ -151,8 +155,8 @@ def _assemble_gradient(mean: FloatArray, deviations: FloatArray, population: Pop
 
 
 def _assemble_within_node_covariance(covariance: FloatArray) -> FloatArray:
-    """Covariance of the gradient within outer nodes (size, size), from the covariances (k, 3, 3) by mean, log SD and
-    lapse rate at each frequency: thresholds at different frequencies are independent there."""
+    """Assemble the covariance of the gradient within outer nodes, (size, size), from the covariances (k, 3, 3) by mean,
+    log SD and lapse rate at each frequency: thresholds at different frequencies are independent there."""
     layout = ParameterLayout(len(covariance))
     index, total = np.arange(layout.k), covariance.sum(axis=0)
     hessian = np.zeros((layout.size, layout.size))
@@ -167,8 +171,8 @@ def _assemble_within_node_covariance(covariance: FloatArray) -> FloatArray:
 def _compute_mean_hessian(
     scores: FloatArray, lapse_curvature: float, population: PopulationParameters, persons: int
 ) -> FloatArray:
-    """(size, size): posterior mean of the Hessian of L, summed over persons. It follows from the gradient, because the
-    population densities are normal. lapse_curvature: second derivative by the logit of the lapse rate."""
+    """Compute the posterior mean of the Hessian of L, (size, size), summed over persons. It follows from the gradient,
+    because the population densities are normal. lapse_curvature: second derivative by the logit of the lapse rate."""
     layout, total = ParameterLayout(len(population.means)), scores.sum(axis=0)
     hessian = np.zeros((layout.size, layout.size))
     index = np.arange(layout.k)

@@ -32,9 +32,10 @@ from analysis.psychophysics.hierarchy.curve import (
 from equalizer.signals.signal import FloatArray
 
 GRID_STEP_DB, GRID_MARGIN_DB = 0.1, 30.0
-"""Step of the grid of thresholds (dB), and its reach below the lowest level and above the highest level or the cap."""
+"""Step of the grid of thresholds (dB), and its reach below the lowest level and above the highest level or the cap.
+Chosen: the step is far below the width of an interval."""
 QUADRATURE_NODES = 7
-"""Number of nodes of the Gauss-Hermite quadrature over slopes, and of that over criteria."""
+"""Number of nodes of the Gauss-Hermite quadrature over slopes, and of that over criteria. Chosen."""
 EQUAL_LOG_LIKELIHOOD = 1e-9
 """Difference of log-likelihoods below which they count as equal."""
 
@@ -51,8 +52,9 @@ class Nuisance:
     lapses: tuple[float, ...]
     """Equally probable lapse rates."""
     slope_log_sd: float = 0.0
+    """Standard deviation of a normal distribution of the slope's natural logarithm; 0: the slope is known exactly."""
     criterion_sd: float = 0.0
-    """Standard deviations of normal distributions around the slope's logarithm and the criterion; 0: known exactly."""
+    """Standard deviation of a normal distribution of the criterion; 0: the criterion is known exactly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +130,8 @@ def _compute_likelihood_on_grid(
 
 
 def _make_gauss_hermite_nodes(sd: float) -> list[tuple[float, float]]:
-    """Make positions and weights of Gauss-Hermite quadrature for a normal distribution with mean 0 and this sd."""
+    """Make positions and weights (of sum 1) of Gauss-Hermite quadrature for a normal distribution with mean 0 and this
+    sd; a single node at 0 where it is 0."""
     if sd == 0.0:
         return [(0.0, 1.0)]
     positions, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE_NODES)
@@ -139,13 +142,16 @@ def _find_likelihood_interval(
     grid_db: FloatArray, log_likelihood: FloatArray, cap_db: float, confidence: float
 ) -> tuple[float | None, float | None, float | None, bool]:
     """Find estimate, lower end, upper end (dB), and whether the maximum is at the lower end of the grid
-    (`RunLikelihood`). grid, log_likelihood: (g,)."""
+    (`RunLikelihood`). grid_db, log_likelihood: (g,)."""
     best_db = float(grid_db[log_likelihood.argmax()])
-    is_below, is_above_cap = bool(log_likelihood[0] >= log_likelihood.max() - EQUAL_LOG_LIKELIHOOD), best_db > cap_db
+    is_highest_at_low_end, is_above_cap = (
+        bool(log_likelihood[0] >= log_likelihood.max() - EQUAL_LOG_LIKELIHOOD),
+        best_db > cap_db,
+    )
     interval_indices = np.flatnonzero(log_likelihood >= log_likelihood.max() - chi2.ppf(confidence, 1) / 2)
     lower_db = float(grid_db[interval_indices[0]]) if interval_indices[0] > 0 else None
     upper_db = float(grid_db[interval_indices[-1]]) if interval_indices[-1] < len(grid_db) - 1 else None
-    if is_below:
+    if is_highest_at_low_end:
         return None, None, upper_db, True
     return (None, lower_db, None, False) if is_above_cap else (best_db, lower_db, upper_db, False)
 

@@ -1,7 +1,7 @@
 """Compares adaptive procedures (staircases, Psi) by the error of their threshold estimates, on simulated people.
 
 Each person takes one run under every rule, with the same random numbers (trial 7 has the same draw under every rule),
-so that differences between rules are paired. Called by the command `hapteq power`.
+so that differences between rules are paired. Called by `study.cli.power` (the command `hapteq power`).
 
 Efficiency is measured by the sweat factor (M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787),
 variance of the estimate times number of trials. `RuleResult.error_per_trial_db` is its square root, with the mean
@@ -25,9 +25,9 @@ from protocols.procedure.psi import compute_posterior, estimate_threshold
 from protocols.procedure.staircase import (
     StaircaseState,
     begin_staircase,
+    compute_level_n,
     is_complete,
     is_finished,
-    level_n,
     step,
     to_db,
     to_newton,
@@ -42,13 +42,15 @@ class RuleResult:
     """Error, bias and length of the runs of all simulated people under one rule."""
 
     rule: str
+    """Name of the rule."""
     runs: int
     """Number of runs that ended with a threshold. Errors are over these; NaN without such runs."""
     trials: float
     """Mean number of trials per run, over all runs."""
     bias_db: float
+    """Mean error of one run's estimate, estimated minus true threshold."""
     sd_db: float
-    """Mean and standard deviation of the error of one run's estimate, estimated minus true threshold."""
+    """Standard deviation of that error."""
     error_db: float
     """Root mean square error of one run's estimate."""
     error_per_trial_db: float
@@ -69,7 +71,7 @@ class ComparedPerson(NamedTuple):
 
 
 def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
-    """Rules to compare, by name: the protocol's up-down rule with each interpretation of its change of step
+    """List the rules to compare, by name: the protocol's up-down rule with each interpretation of its change of step
     (`StepChange`), and Psi with 30 and with 60 trials."""
     names = {
         StepChange.AFTER_REVERSAL: "staircase, new step after the reversal",
@@ -91,24 +93,24 @@ def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int,
 
 def _evaluate_rule(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
     """Simulate a run of every person under one rule, and summarise their errors."""
-    errors, trials, highest = [], [], 0.0
+    errors_db, trial_counts, highest_n = [], [], 0.0
     for person_index in range(people):
         true_db, state, run_highest_n = simulate_person(crowd, rule, (seed, _SEED_KEY, person_index))
-        trials.append(state.trials)
-        highest = max(highest, run_highest_n)
+        trial_counts.append(state.trials)
+        highest_n = max(highest_n, run_highest_n)
         if is_complete(rule, state):
-            errors.append(estimate_db(rule, state) - true_db)
-    error_array = np.array(errors) if errors else np.array([math.nan])
-    error = float(np.sqrt((error_array**2).mean()))
+            errors_db.append(estimate_db(rule, state) - true_db)
+    error_array_db = np.array(errors_db) if errors_db else np.array([math.nan])
+    rms_error_db = float(np.sqrt((error_array_db**2).mean()))
     return RuleResult(
         rule=name,
-        runs=len(errors),
-        trials=float(np.mean(trials)),
-        bias_db=float(error_array.mean()),
-        sd_db=float(error_array.std()),
-        error_db=error,
-        error_per_trial_db=error * math.sqrt(float(np.mean(trials))),
-        highest_n=highest,
+        runs=len(errors_db),
+        trials=float(np.mean(trial_counts)),
+        bias_db=float(error_array_db.mean()),
+        sd_db=float(error_array_db.std()),
+        error_db=rms_error_db,
+        error_per_trial_db=rms_error_db * math.sqrt(float(np.mean(trial_counts))),
+        highest_n=highest_n,
     )
 
 
@@ -116,8 +118,8 @@ def simulate_person(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> 
     """Simulate a run of a person drawn from the crowd. key: seeds the draws. Returns the true threshold (dB re 1 N),
     the last state, and the highest level played (N)."""
     generator = np.random.default_rng(key)
-    spread = crowd.frequency_sd_db[0] if isinstance(crowd.frequency_sd_db, tuple) else crowd.frequency_sd_db
-    true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * generator.standard_normal()
+    frequency_sd_db = crowd.frequency_sd_db[0] if isinstance(crowd.frequency_sd_db, tuple) else crowd.frequency_sd_db
+    true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, frequency_sd_db) * generator.standard_normal()
     slope = (crowd.slope or STARTING_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * generator.standard_normal())
     person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * generator.standard_normal())
     draws = generator.random((MOST_TRIALS, 2))
@@ -129,16 +131,19 @@ def simulate_person(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> 
 def answer_trials(
     crowd: Crowd, rule: StaircaseRule, person: ComparedPerson, draws: FloatArray
 ) -> tuple[StaircaseState, list[float]]:
-    """The run's last state, and the amplitude (N) that each trial played. draws: (trials, 3) in [0, 1), for the
-    direction, the answer, and the roving of the amplitude; levels of Psi are not roved."""
+    """Simulate the trials of a run until it is finished or there are no more draws. Returns the last state, and the
+    amplitude (N) that each trial played. draws: (trials, 3) in [0, 1), for the direction, the answer, and the roving of
+    the amplitude; levels of Psi are not roved."""
     state, played_n = begin_staircase(rule), list[float]()
     rove_db = 0.0 if rule.is_bayesian else crowd.rove_db
     while not is_finished(rule, state) and state.trials < len(draws):
-        draw = draws[state.trials]
-        staircase_n = level_n(rule, state)
-        played_n.append(to_newton(to_db(staircase_n) + rove_db * (float(draw[2]) - 0.5)) if rove_db else staircase_n)
+        trial_draws = draws[state.trials]
+        staircase_n = compute_level_n(rule, state)
+        played_n.append(
+            to_newton(to_db(staircase_n) + rove_db * (float(trial_draws[2]) - 0.5)) if rove_db else staircase_n
+        )
         scaled_db = person.slope * (to_db(played_n[-1]) - person.threshold_db)
-        state = step(rule, state, _is_correct(crowd, scaled_db, person.criterion, draw))
+        state = step(rule, state, _is_correct(crowd, scaled_db, person.criterion, trial_draws))
     return state, played_n
 
 
@@ -154,7 +159,8 @@ def _is_correct(crowd: Crowd, scaled_db: float, criterion: float, draw: FloatArr
 
 
 def estimate_db(rule: StaircaseRule, state: StaircaseState) -> float:
-    """Threshold of a complete run, in dB re 1 N, estimated as in the analysis of a session."""
+    """Estimate the threshold of a complete run, in dB re 1 N, as in the analysis of a session: the mean of the averaged
+    reversals, or for Psi the posterior mean, at most the cap."""
     if rule.is_bayesian:
         cap_db = to_db(rule.cap_n)
         return min(estimate_threshold(compute_posterior(state.answered, cap_db), cap_db).mean_db, cap_db)

@@ -2,7 +2,8 @@
 
 Model of `study.participants.delivered_feeler`: the felt amplitude is sqrt(along^2 - across^2), harmonics add to the
 threshold in squares, and the threshold rises during a run (adaptation). The level matters, because friction absorbs
-weak forces. Called by `study.cli.power`; `simulated_study` uses the tables."""
+weak forces. Called by `study.cli.power`; `simulated_study` uses the tables.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -34,11 +35,11 @@ class FeltDelivery:
 
 
 def tabulate_felt_delivery(
-    trials: Iterable[Trial], frequencies_hz: Sequence[float], flawless_mps2_per_n: Sequence[float]
+    trials: Iterable[Trial], frequencies_hz: Sequence[float], ideal_mps2_per_n: Sequence[float]
 ) -> FeltDelivery:
-    """Tabulate medians over the measured test trials, by played levels rounded to 1 dB. flawless_mps2_per_n: along the
-    direction, at each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a
-    frequency lacks a measured direction."""
+    """Tabulate medians over the measured test trials, by played levels rounded to 1 dB. ideal_mps2_per_n: gain of an
+    ideal device along the direction, at each frequency. Coupling or harmonics that no trial of a level measured count
+    as 0. Raises ValueError where a frequency lacks a measured direction."""
     groups_by_frequency = {group.frequency_hz: group for group in select_delivered_trials(trials)}
     if missing_frequencies := [
         f"{frequency:g} Hz"
@@ -49,20 +50,20 @@ def tabulate_felt_delivery(
     return FeltDelivery(
         tuple(
             (
-                _tabulate_direction(groups_by_frequency[frequency_hz], 1.0, flawless_gain),
-                _tabulate_direction(groups_by_frequency[frequency_hz], -1.0, flawless_gain),
+                _tabulate_direction(groups_by_frequency[frequency_hz], 1.0, ideal_gain),
+                _tabulate_direction(groups_by_frequency[frequency_hz], -1.0, ideal_gain),
             )
-            for frequency_hz, flawless_gain in zip(frequencies_hz, flawless_mps2_per_n, strict=True)
+            for frequency_hz, ideal_gain in zip(frequencies_hz, ideal_mps2_per_n, strict=True)
         )
     )
 
 
-def _tabulate_direction(group: DeliveredTrials, side: float, flawless_mps2_per_n: float) -> DeliveryTable:
+def _tabulate_direction(group: DeliveredTrials, side: float, ideal_mps2_per_n: float) -> DeliveryTable:
     """Tabulate the delivery of one direction, by rising level. side: +1 or -1, as in `DeliveredTrials`; the gain of an
     ideal device is in m/s^2 per N."""
     # Over the level that was played: that of the staircase differs from it where levels were roved.
     gain_db = group.values_db[Cue.INTENSITY] + group.nominal_db - group.played_db
-    relative_gain = 10.0 ** (gain_db / 20.0) / flawless_mps2_per_n
+    relative_gain = 10.0 ** (gain_db / 20.0) / ideal_mps2_per_n
     columns = (
         relative_gain,
         relative_gain * _compute_amplitude_ratio(group, Cue.COUPLING),
@@ -85,6 +86,7 @@ def _compute_measured_median(values: FloatArray) -> float | None:
 
 
 def _compute_amplitude_ratio(group: DeliveredTrials, cue: Cue) -> FloatArray:
-    """Compute h / a or c / a (n,) from the cue, 20 log10(1 + ratio); NaN where it was not measured."""
+    """Compute the amplitude (n,) across the direction (`Cue.COUPLING`) or of the harmonics (`Cue.SPECTRUM`), relative
+    to that along it, from the cue's value 20 log10(1 + ratio); NaN where it was not measured."""
     values_db = group.values_db.get(cue)
     return np.full(len(group.side), np.nan) if values_db is None else 10.0 ** (values_db / 20.0) - 1.0

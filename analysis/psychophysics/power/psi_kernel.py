@@ -13,9 +13,9 @@ the expected entropy after the answer, in nats, is by Bayes' rule
 
     H = - sum over i, a of p_i s_ia log s_ia  -  sum over i of p_i log p_i  +  sum over a of c_a log c_a
 
-This is some hundred times faster than `protocols.procedure.psi`: the sum over a of s_ia log s_ia is tabulated, the
-second term is the same for all levels and is left out, and the logarithm of the posterior is updated after each answer
-instead of recomputed.
+It is faster than `protocols.procedure.psi`: it is compiled, the sum over a of s_ia log s_ia is tabulated, the second
+term is the same for all levels and is left out, and the logarithm of the posterior is updated after each answer instead
+of recomputed.
 """
 
 import math

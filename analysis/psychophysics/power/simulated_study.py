@@ -2,7 +2,8 @@
 
 True thresholds are normal in dB: median of the frequency + deviation of the person + deviation of person x frequency,
 the model that `hierarchy.marginal` fits. Slopes are log-normal, criteria normal. The result has the form that the
-analyses take: counted answers, and the threshold of each run.
+analyses take: counted answers, and the threshold of each run. Called by `power_curve`; `compare_rules`,
+`study.cli.power` and `study.workflows.planning.simulate_power` use `Crowd`.
 """
 
 import math
@@ -81,6 +82,7 @@ class SimulatedStudy:
     """Answers, thresholds of runs, and true thresholds of a simulated study."""
 
     answers: Answers
+    """Counted answers of all runs."""
     threshold_n: FloatArray
     """(people, frequencies): arithmetic mean of the averaged reversal levels, N; NaN for a run without all reversals.
     For Psi: posterior mean, at most the cap."""
@@ -112,23 +114,25 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
     tracks = _allocate_tracks(people * k, rule.reversals)
     run_results = _simulate_sessions(crowd, rule, participants, seeds.ravel(), tracks, (*seed, _HABIT_SEED))
-    counts = np.array([run.trials for run in run_results])
-    within_run = np.arange(MOST_TRIALS) < counts[:, None]
+    trial_counts = np.array([run.trials for run in run_results])
+    is_within_run = np.arange(MOST_TRIALS) < trial_counts[:, None]
     answers = count_cells(
         tuple(f"S{number + 1:03d}" for number in range(people)),
         crowd.frequencies_hz,
-        np.repeat(np.arange(people * k), counts),
-        tracks.level_db[within_run],
-        tracks.side[within_run],
-        tracks.correct[within_run].astype(np.bool_),
+        np.repeat(np.arange(people * k), trial_counts),
+        tracks.level_db[is_within_run],
+        tracks.side[is_within_run],
+        tracks.correct[is_within_run].astype(np.bool_),
     )
-    runs = (_compute_posterior_means if rule.is_bayesian else _compute_reversal_means)(rule, tracks, run_results)
+    run_thresholds = (_compute_posterior_means if rule.is_bayesian else _compute_reversal_means)(
+        rule, tracks, run_results
+    )
     return SimulatedStudy(
         answers=answers,
-        threshold_n=runs.newton.reshape(people, k),
-        threshold_db=runs.db.reshape(people, k),
-        cap_reversals=runs.cap_reversals.reshape(people, k),
-        trials=int(counts.sum()),
+        threshold_n=run_thresholds.newton.reshape(people, k),
+        threshold_db=run_thresholds.db.reshape(people, k),
+        cap_reversals=run_thresholds.cap_reversals.reshape(people, k),
+        trials=int(trial_counts.sum()),
         true_db=true_db,
     )
 
@@ -153,28 +157,29 @@ def _draw_people(crowd: Crowd, people: int, rng: np.random.Generator) -> tuple[F
 
 
 def _compute_reversal_means(rule: StaircaseRule, tracks: Track, run_results: Sequence[SimulatedRun]) -> _RunThresholds:
-    """Means of the averaged reversals of each run; NaN where a run did not reach all its reversals."""
-    averaged = tracks.reversal_db[:, -rule.averaged_reversals :]
-    nan_unless_complete = np.where(np.array([run.reversals for run in run_results]) == rule.reversals, 1.0, math.nan)
-    newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
-    at_cap = averaged >= to_db(rule.cap_n) - LEVEL_TOLERANCE_DB
+    """Compute the means of the averaged reversals of each run; NaN where a run did not reach all its reversals."""
+    averaged_db = tracks.reversal_db[:, -rule.averaged_reversals :]
+    completeness_factor = np.where(np.array([run.reversals for run in run_results]) == rule.reversals, 1.0, math.nan)
+    averaged_n = np.minimum(10.0 ** (averaged_db / 20.0), rule.cap_n)
+    is_at_cap = averaged_db >= to_db(rule.cap_n) - LEVEL_TOLERANCE_DB
     return _RunThresholds(
-        newtons.mean(axis=1) * nan_unless_complete,
-        averaged.mean(axis=1) * nan_unless_complete,
-        at_cap.sum(axis=1).astype(np.float64),
+        averaged_n.mean(axis=1) * completeness_factor,
+        averaged_db.mean(axis=1) * completeness_factor,
+        is_at_cap.sum(axis=1).astype(np.float64),
     )
 
 
 def _compute_posterior_means(rule: StaircaseRule, tracks: Track, run_results: Sequence[SimulatedRun]) -> _RunThresholds:
-    """Posterior means of Psi, limited by the cap and marked as cut by it as in `thresholds.compute_run_threshold`."""
-    db = np.minimum([run.mean_db for run in run_results], to_db(rule.cap_n))
-    cut = np.array([run.above_cap for run in run_results]) > CUT_PROBABILITY
-    return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))
+    """Collect the posterior means of Psi, limited by the cap; cut by it, as in `thresholds.compute_run_threshold`,
+    where the probability of a threshold above the cap exceeds `CUT_PROBABILITY`."""
+    mean_db = np.minimum([run.mean_db for run in run_results], to_db(rule.cap_n))
+    is_cut = np.array([run.above_cap for run in run_results]) > CUT_PROBABILITY
+    return _RunThresholds(np.minimum(10.0 ** (mean_db / 20.0), rule.cap_n), mean_db, is_cut.astype(np.float64))
 
 
 def _apply_delivery(participant: Participant, delivery: FeltDelivery | None, frequency_index: int) -> Participant:
     """Return the participant with the stimuli that the device delivers at the frequency of index `frequency_index`;
-    unchanged without a delivery: the commands are then felt as they are."""
+    unchanged without a delivery: the commanded amplitudes are then felt."""
     if delivery is None:
         return participant
     felt_1, felt_2 = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[frequency_index])
@@ -186,10 +191,10 @@ def _apply_delivery(participant: Participant, delivery: FeltDelivery | None, fre
     )
 
 
-def _allocate_tracks(runs: int, reversals: int) -> Track:
-    """Empty tracks of all runs together, each with a leading axis (runs,)."""
-    levels, sides, correct = (np.empty((runs, MOST_TRIALS)) for _ in range(3))
-    return Track(levels, sides, correct, np.full((runs, reversals), np.nan))
+def _allocate_tracks(run_count: int, reversal_count: int) -> Track:
+    """Allocate the tracks of all runs together: arrays as in `Track` with a leading axis (runs,), reversals NaN."""
+    levels, sides, correct = (np.empty((run_count, MOST_TRIALS)) for _ in range(3))
+    return Track(levels, sides, correct, np.full((run_count, reversal_count), np.nan))
 
 
 def _simulate_sessions(

@@ -20,7 +20,7 @@ MOST_TRIALS = 2000
 under the published rule; the longest of 500 simulated runs took 262."""
 LEVEL_TOLERANCE_DB = 1e-9
 """Tolerance (dB) within which two levels count as equal, for rounding errors."""
-LARGEST_T = (3.2, 25.0, 6.7)
+LARGEST_T_BY_FAMILY = (3.2, 25.0, 6.7)
 """Upper limit of t by family (Weibull, logistic, Gauss), where 1 - F is 1e-11 to 2e-11: above it, wrong answers occur
 practically by lapses only."""
 
@@ -29,10 +29,15 @@ class PackedRule(NamedTuple):
     """A `StaircaseRule` as numbers for compiled code; levels in dB re 1 N."""
 
     start_db: float
+    """Level of the first trial."""
     cap_db: float
+    """Largest level."""
     cap_n: float
+    """Largest level, N."""
     up_after_wrong: int
+    """Number of successive wrong answers after which the level rises."""
     down_after_right: int
+    """Number of successive right answers after which the level falls."""
     steps_db: FloatArray
     """Step size (dB) by the number of reversals that count towards the schedule; as long as the schedule's phases have
     reversals, plus 3."""
@@ -129,8 +134,9 @@ class Track(NamedTuple):
 
 @njit(cache=True)
 def compute_evidence(t: float, family: int) -> float:
-    """Evidence q(t) in units of d', with Phi(q) = 1/2 + F(t)/2. family: 0 Weibull, 1 logistic, 2 Gauss."""
-    t = min(t, LARGEST_T[family])
+    """Compute the evidence q(t), half of d' of an unbiased participant, with Phi(q) = 1/2 + F(t)/2. family: 0 Weibull,
+    1 logistic, 2 Gauss."""
+    t = min(t, LARGEST_T_BY_FAMILY[family])
     if family == 0:
         survival = math.exp(-math.exp(t))
     elif family == 1:
@@ -149,8 +155,8 @@ def compute_evidence(t: float, family: int) -> float:
 
 @njit(cache=True)
 def compute_equivalent_level_db(person: Participant, level_db: float, is_direction_1: bool, trial: int) -> float:
-    """Equivalent level (dB re 1 N): the level that without adaptation on an ideal device gives the same evidence as
-    this level on the given device. trial: index of the trial in the run."""
+    """Compute the equivalent level (dB re 1 N): the level that without adaptation on an ideal device gives the same
+    evidence as this level on the given device. trial: index of the trial in the run."""
     table = person.felt_1 if is_direction_1 else person.felt_2
     equivalent_db = level_db
     if len(table) > 0:
@@ -227,7 +233,8 @@ def draw_roved_level(level_db: float, rove_db: float) -> float:
 
 @njit(cache=True)
 def simulate_staircase(rule: PackedRule, person: Participant, seed: int, track: Track) -> SimulatedRun:
-    """Simulate trials until the run has its reversals or reaches its limit of trials, and fill the track."""
+    """Simulate trials until the run has its reversals or reaches its limit of trials, and fill the track. At the cap, a
+    step up is left out and counts as no reversal. seed: of the random draws."""
     np.random.seed(seed)
     level_db, previous_direction, right_in_row, wrong_in_row, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
     repeats_left = person.repeats

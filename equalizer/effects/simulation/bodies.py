@@ -102,39 +102,41 @@ def simulate_bodies(
     actuator_force: one row per sample, or per step. counts: number of samples n, and of steps per sample. step_s:
     length of a step.
     """
-    linear, stepping, ports = _prepare_steps(bodies, actuator_force, counts, step_s)
+    discrete_model, stepping, ports = _prepare_steps(bodies, actuator_force, counts, step_s)
     stride = len(actuator_force.mean) // counts[0]
-    output_matrix = _assemble_output_matrix(linear, stepping.state_from_modal, ports, with_motion)
+    output_matrix = _assemble_output_matrix(discrete_model, stepping.state_from_modal, ports, with_motion)
     motion_rows, port_forces = (
         np.empty((counts[0], output_matrix.shape[1])),
         np.zeros((counts[0], bodies.ports.shape[1] if with_motion else 0)),
     )
-    force_columns, rows = len(output_matrix) - actuator_force.end.shape[1], stepping.rows
+    force_columns, rows_per_sample = len(output_matrix) - actuator_force.end.shape[1], stepping.rows
     mean_force, end_force = (
-        actuator_force.mean.reshape(counts[0] * rows, -1),
+        actuator_force.mean.reshape(counts[0] * rows_per_sample, -1),
         actuator_force.end[stride - 1 :: stride],
     )
-    buffer = np.zeros((min(stepping.block, counts[0]) * rows, len(output_matrix)))
+    buffer = np.zeros((min(stepping.block, counts[0]) * rows_per_sample, len(output_matrix)))
     # Overflow is no error: a fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
         for first, stop in _iterate_blocks(counts[0], stepping.block, restarts):
             if restarts is not None and first in restarts.sample_indices:
                 state = restarts.states[np.searchsorted(restarts.sample_indices, first)]
                 stepping.set_state(extend_state(bodies.structure, state, bodies.ports[:, bodies.axes :]))
-            rows_of_block = buffer[: (stop - first) * rows]
+            rows_of_block = buffer[: (stop - first) * rows_per_sample]
             np.matmul(
-                mean_force[first * rows : stop * rows], stepping.input_matrix, out=rows_of_block[:, :force_columns]
+                mean_force[first * rows_per_sample : stop * rows_per_sample],
+                stepping.input_matrix,
+                out=rows_of_block[:, :force_columns],
             )
             stepping.run(rows_of_block, first)
-            inputs = rows_of_block[::rows]
+            input_rows = rows_of_block[::rows_per_sample]
             # An acceleration depends on the actuator force at the instant itself, not on the mean over the last step.
-            inputs[0, force_columns:], inputs[1:, force_columns:] = (
+            input_rows[0, force_columns:], input_rows[1:, force_columns:] = (
                 end_force[first - 1] if first else 0.0,
                 end_force[first : stop - 1],
             )
-            np.matmul(inputs, output_matrix, out=motion_rows[first:stop])
+            np.matmul(input_rows, output_matrix, out=motion_rows[first:stop])
             if with_motion:
-                port_forces[first:stop, list(ports)] = inputs[:, len(stepping.state_from_modal) : force_columns]
+                port_forces[first:stop, list(ports)] = input_rows[:, len(stepping.state_from_modal) : force_columns]
     return motion_rows, port_forces
 
 
@@ -148,15 +150,17 @@ def simulate_states(
     """Simulate, from rest, the positions and velocities (k, 2n) of the structure's coordinates just before the samples
     `sample_indices` (k,). Other arguments as for `simulate_bodies`."""
     _, stepping, _ = _prepare_steps(bodies, actuator_force, counts, step_s)
-    states, rows = np.zeros((len(sample_indices), len(stepping.state_from_modal))), stepping.rows
-    mean_force = actuator_force.mean.reshape(counts[0] * rows, -1)
+    states, rows_per_sample = np.zeros((len(sample_indices), len(stepping.state_from_modal))), stepping.rows
+    mean_force = actuator_force.mean.reshape(counts[0] * rows_per_sample, -1)
     with np.errstate(over="ignore", invalid="ignore"):
         for first, stop in _iterate_blocks(counts[0], stepping.block, None):
-            rows_of_block = np.ascontiguousarray(mean_force[first * rows : stop * rows] @ stepping.input_matrix)
+            rows_of_block = np.ascontiguousarray(
+                mean_force[first * rows_per_sample : stop * rows_per_sample] @ stepping.input_matrix
+            )
             stepping.run(rows_of_block, first)
-            in_block = (sample_indices >= first) & (sample_indices < stop)
-            states[in_block] = (
-                rows_of_block[(sample_indices[in_block] - first) * rows, : len(stepping.state_from_modal)]
+            is_in_block = (sample_indices >= first) & (sample_indices < stop)
+            states[is_in_block] = (
+                rows_of_block[(sample_indices[is_in_block] - first) * rows_per_sample, : len(stepping.state_from_modal)]
                 @ stepping.state_from_modal.T
             )
     return states
@@ -167,13 +171,17 @@ def _prepare_steps(
 ) -> tuple[DiscreteModel, Stepping, tuple[int, ...]]:
     """Prepare a simulation: matrices of a linear step, stepping function, and ports at which forces act or motion is
     read."""
-    linear = discretise_model(bodies.structure, step_s, bodies.ports)
+    discrete_model = discretise_model(bodies.structure, step_s, bodies.ports)
     ports = tuple(sorted({*bodies.force_ports, *range(bodies.axes if bodies.reads_all_axes else 0)}))
     steps, stride = (counts[1], len(actuator_force.mean) // counts[0])
     if not ports:
-        return linear, build_unforced_stepping(linear, steps, stride), ports
+        return discrete_model, build_unforced_stepping(discrete_model, steps, stride), ports
     commands = actuator_force.mean if actuator_force.commanded is None else actuator_force.commanded
-    return (linear, build_forced_stepping(linear, pack_kernel_forces(bodies, ports), steps, stride, commands), ports)
+    return (
+        discrete_model,
+        build_forced_stepping(discrete_model, pack_kernel_forces(bodies, ports), steps, stride, commands),
+        ports,
+    )
 
 
 def _iterate_blocks(sample_count: int, max_length: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
@@ -195,8 +203,8 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
     The added coordinates take the static equilibrium with zero travel of the joints, in the sense of least squares
     (minimum norm where it is not unique), and move with it.
     """
-    model_coordinates, n = len(state) // 2, structure.coordinates
-    if n == model_coordinates:
+    model_coordinates, structure_coordinates = len(state) // 2, structure.coordinates
+    if structure_coordinates == model_coordinates:
         return state
     equilibrium_rows = np.vstack([structure.stiffness[model_coordinates:], joints.T])
     added_stiffness, coupling = equilibrium_rows[:, model_coordinates:], equilibrium_rows[:, :model_coordinates]
@@ -206,15 +214,30 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
 
 
 def _assemble_output_matrix(
-    linear: DiscreteModel, state_from_modal: FloatArray, ports: tuple[int, ...], with_motion: bool
+    discrete_model: DiscreteModel, state_from_modal: FloatArray, ports: tuple[int, ...], with_motion: bool
 ) -> FloatArray:
     """Assemble the matrix (s + f + m, rows) from state, forces at the f ports and commands at an instant to the rows
     that `simulate_bodies` returns."""
-    p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
-    first_row = 0 if with_motion else 3 * r
-    from_state = np.vstack((linear.motion, linear.response, linear.position))[first_row:]
-    from_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first_row:]
-    from_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first_row:]
+    response_count, (command_count, port_count) = (
+        len(discrete_model.position),
+        (discrete_model.state_by_command.shape[1], discrete_model.state_by_port_force.shape[1]),
+    )
+    first_row = 0 if with_motion else 3 * port_count
+    from_state = np.vstack((discrete_model.motion, discrete_model.response, discrete_model.position))[first_row:]
+    from_force = np.vstack(
+        (
+            discrete_model.motion_by_port_force,
+            discrete_model.response_by_port_force,
+            np.zeros((response_count, port_count)),
+        )
+    )[first_row:]
+    from_command = np.vstack(
+        (
+            discrete_model.motion_by_command,
+            discrete_model.response_by_command,
+            np.zeros((response_count, command_count)),
+        )
+    )[first_row:]
     return np.vstack([(from_state @ state_from_modal).T, from_force.T[list(ports)], from_command.T])
 
 

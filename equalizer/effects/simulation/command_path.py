@@ -154,5 +154,5 @@ def compute_delayed_mean(commands: FloatArray, step_s: float, delay_s: float) ->
 
 def compute_delayed_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
     """Delay held commands (n, …) by delay_s, value just before each step's end: only whole steps of the delay matter
-    there."""
+    there. A negative delay counts as 0."""
     return compute_delayed_mean(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)

@@ -1,8 +1,8 @@
 """Forces along a measured motion: the actuators' force, and the motion-dependent forces of effects.
 
 Nothing is simulated: the laws are evaluated at the measured positions, velocities and accelerations, for a balance of
-forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m). Called by `analysis.diagnosis`:
-`force_measure`, `predicted_force`, `balance_with_model` and `windows`.
+forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m). Called by `force_measure`,
+`predicted_force`, `balance_with_model` and `windows` of `analysis.diagnosis`; `friction_laws` reads `REST_SPEED_SHARE`.
 """
 
 from collections.abc import Sequence
@@ -50,20 +50,21 @@ def compute_effect_forces_along_motion(
     if not bodies.actions:
         return np.zeros_like(unbalanced_force)
     axes = tuple(range(model.inputs))
-    packed = pack_kernel_forces(bodies, axes)
+    kernel_forces = pack_kernel_forces(bodies, axes)
     discrete_model = discretise_model(model, 1 / sample_rate_hz)
     motion_per_newton = np.vstack(
         [
-            _select_diagonal_responses(discrete_model.motion[: 2 * len(axes)] @ discrete_model.by_axis_force),
-            _select_diagonal_responses(discrete_model.motion_by_axis_force[2 * len(axes) :]),
+            _select_diagonal_responses(discrete_model.motion[: 2 * len(axes)] @ discrete_model.state_by_port_force),
+            _select_diagonal_responses(discrete_model.motion_by_port_force[2 * len(axes) :]),
         ]
     )
     _limit_light_axis_response(motion_per_newton, motion[1], commands, 1 / sample_rate_hz)
     force = np.array(unbalanced_force, dtype=np.float64, order="C")
     position, velocity, acceleration = (np.ascontiguousarray(signal) for signal in motion)
     evaluate_laws_along_motion(
-        packed.laws, packed.places, packed.parameters, packed.memory, (position, velocity, acceleration),
-        np.ascontiguousarray(commands, dtype=np.float64) if packed.reads_all_axes else np.empty((0, 0)),
+        kernel_forces.laws, kernel_forces.places, kernel_forces.parameters, kernel_forces.memory,
+        (position, velocity, acceleration),
+        np.ascontiguousarray(commands, dtype=np.float64) if kernel_forces.reads_all_axes else np.empty((0, 0)),
         motion_per_newton, force, 1 / sample_rate_hz,
     )  # fmt: skip
     return force

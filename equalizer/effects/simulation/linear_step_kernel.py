@@ -13,6 +13,7 @@ FAST_MATH_FLAGS = {"reassoc", "contract"}
 """LLVM flags: sums may be reordered and products fused, for vectorised loops; NaN and infinity are still exact."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
+"""numba types of contiguous arrays that a kernel may write to."""
 
 
 @njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=FAST_MATH_FLAGS)

@@ -61,11 +61,13 @@ _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 READ_ONLY_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _INT_MATRIX = types.int64[:, ::1]
+"""numba types of contiguous arrays; a kernel may write to all but READ_ONLY_MATRIX."""
 LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
 """Signature that every force law is compiled with."""
 
 Integers = npt.NDArray[np.int64]
 StepMatrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""The four matrices of the argument `step` of `step_mechanism`."""
 
 _MATRICES = types.UniTuple(_MATRIX, 4)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-untyped-call]

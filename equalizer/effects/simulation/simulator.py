@@ -2,7 +2,8 @@
 
 Main function: `simulate_mechanism`. Variants: `simulate_response` without the motion of the axes, faster;
 `simulate_windows` with restarts from given states, for multiple shooting; `simulate_states_before` for these states.
-Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants."""
+Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants. Called by
+`analysis.diagnosis`: output errors, evidence, signature curves, next experiment."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -112,23 +113,26 @@ def simulate_states_before(
     effects: Sequence[PlacedEffect],
     sample_indices: npt.NDArray[np.int64],
 ) -> FloatArray:
-    """(k, 2 c): positions, then velocities, of the model's own c coordinates just before the samples `sample_indices`
-    (k,), simulated from rest; coordinates that effects add are left out. sampling: as in `simulate_windows`."""
+    """Simulate, from rest, the states (k, 2 c) just before the samples `sample_indices` (k,): positions, then
+    velocities, of the model's own c coordinates; coordinates that effects add are left out. sampling: as in
+    `simulate_windows`."""
     bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
     states = simulate_states(bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), sample_indices)
-    n, model_coordinates = bodies.structure.coordinates, model.coordinates
-    return np.hstack([states[:, :model_coordinates], states[:, n : n + model_coordinates]])
+    structure_coordinates, model_coordinates = bodies.structure.coordinates, model.coordinates
+    return np.hstack(
+        [states[:, :model_coordinates], states[:, structure_coordinates : structure_coordinates + model_coordinates]]
+    )
 
 
 def _prepare_simulation(
     model: MechanicalModel, commands: FloatArray, sampling: tuple[float, Hold], effects: Sequence[PlacedEffect]
 ) -> tuple[Bodies, ActuatorForce, int]:
-    """The bodies, the actuator force that drives them, and the number of integration steps per sample: the most that a
-    motion-dependent effect asks for, else `STEPS` where the force changes between samples, else 1."""
+    """Prepare the bodies, the actuator force that drives them, and the number of integration steps per sample: the most
+    that a motion-dependent effect asks for, else `STEPS` where the force changes between samples, else 1."""
     bodies, (rate_hz, hold) = build_bodies(model, effects), sampling
-    is_changing_between_samples = has_intersample_changes(model, effects, hold)
-    steps = max((action.steps for action in bodies.actions), default=STEPS if is_changing_between_samples else 1)
-    command_steps = steps if is_changing_between_samples else 1
+    changes_between_samples = has_intersample_changes(model, effects, hold)
+    steps = max((action.steps for action in bodies.actions), default=STEPS if changes_between_samples else 1)
+    command_steps = steps if changes_between_samples else 1
     return (
         bodies,
         drive_actuators(
@@ -149,17 +153,21 @@ def _simulate_motion(
     """Simulate the motion, with the true response before the sensor. with_axes: whether to output the driven axes,
     whose arrays are else (n, 0)."""
     bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
-    port_and_response_rows, port_forces = simulate_bodies(
+    motion_rows, port_forces = simulate_bodies(
         bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), with_axes, restarts
     )
-    m, p, ports = bodies.axes if with_axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
-    response_rows = port_and_response_rows[:, 3 * ports if with_axes else 0 :]
+    axis_count, output_count, port_count = (
+        bodies.axes if with_axes else 0,
+        bodies.structure.outputs,
+        bodies.ports.shape[1],
+    )
+    response_rows = motion_rows[:, 3 * port_count if with_axes else 0 :]
     return SimulationResult(
-        response_rows[:, :p],
-        response_rows[:, p:],
-        port_and_response_rows[:, :m],
-        port_and_response_rows[:, ports : ports + m],
-        port_forces[:, :m],
+        response_rows[:, :output_count],
+        response_rows[:, output_count:],
+        motion_rows[:, :axis_count],
+        motion_rows[:, port_count : port_count + axis_count],
+        port_forces[:, :axis_count],
     )
 
 
@@ -172,11 +180,13 @@ def _apply_sensor(
 ) -> SimulationResult:
     """Apply the sensor: low pass of each channel, effects in the order of their stages, limits of the range. Positions
     change only by effects on the clock and by lost samples."""
-    on_response = [(placed.effect.action, placed) for placed in effects if isinstance(placed.effect.action, OnResponse)]
-    on_response.sort(key=lambda item: item[0].stage)
-    bandwidths_hz = _list_bandwidths_hz(model, motion.response.shape[1], on_response)
+    response_effects = [
+        (placed.effect.action, placed) for placed in effects if isinstance(placed.effect.action, OnResponse)
+    ]
+    response_effects.sort(key=lambda item: item[0].stage)
+    bandwidths_hz = _list_bandwidths_hz(model, motion.response.shape[1], response_effects)
     response, position = _filter_channels(motion.response, sample_rate_hz, bandwidths_hz), motion.position
-    for action, placed in on_response:
+    for action, placed in response_effects:
         previous_response = response
         if measurement is not None and action.conditioned is not None:
             response = action.conditioned(
@@ -199,8 +209,8 @@ def _change_response(
     sample_rate_hz: float,
     measurement: Measurement | None,
 ) -> FloatArray:
-    """The response after an effect. For an effect that depends on the recording's length, an excerpt is first extended
-    to that length by its last sample."""
+    """Compute the response (n, p) after an effect. For an effect that depends on the recording's length, an excerpt
+    is first extended to that length by its last sample."""
     missing_samples = (
         measurement.full_length - len(response) if action.needs_full_length and measurement is not None else 0
     )
@@ -211,22 +221,22 @@ def _change_response(
 
 
 def _filter_channels(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
-    """The response (n, p) through the low pass of each channel."""
+    """Filter the response (n, p) by the low pass of each channel. bandwidths_hz: p values, 0 = no low pass."""
     if len(set(bandwidths_hz)) == 1:
         return apply_low_pass(response, sample_rate_hz, bandwidths_hz[0])
-    filtered = [
-        apply_low_pass(row, sample_rate_hz, bandwidth_hz)
-        for row, bandwidth_hz in zip(response.T, bandwidths_hz, strict=True)
+    filtered_channels = [
+        apply_low_pass(channel_response, sample_rate_hz, bandwidth_hz)
+        for channel_response, bandwidth_hz in zip(response.T, bandwidths_hz, strict=True)
     ]
-    return np.stack(filtered, axis=1)
+    return np.stack(filtered_channels, axis=1)
 
 
 def _list_bandwidths_hz(
-    model: MechanicalModel, channels: int, on_response: Sequence[tuple[OnResponse, PlacedEffect]]
+    model: MechanicalModel, channel_count: int, response_effects: Sequence[tuple[OnResponse, PlacedEffect]]
 ) -> list[float]:
-    """Bandwidth in Hz of each channel's low pass: that of the model, replaced by effects; 0 = no low pass."""
-    bandwidths_hz = [model.sensor.bandwidth_hz] * channels
-    for action, placed in on_response:
+    """List the bandwidth (Hz) of each channel's low pass: that of the model, replaced by effects; 0 = no low pass."""
+    bandwidths_hz = [model.sensor.bandwidth_hz] * channel_count
+    for action, placed in response_effects:
         for channel in placed.sites if action.bandwidth_hz is not None else ():
             assert action.bandwidth_hz is not None
             bandwidths_hz[channel] = action.bandwidth_hz(bandwidths_hz[channel], placed.values)

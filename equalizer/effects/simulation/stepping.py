@@ -42,7 +42,7 @@ class Forces:
     laws: tuple[object, ...]
     """Addresses of the compiled laws, `MAX_LAWS` of them."""
     places: Integers
-    """(items, 6): indices of law and port, ranges of parameters and memory of each force."""
+    """(number of forces, 6): indices of law and port, ranges of parameters and memory of each force."""
     parameters: FloatArray
     """Parameters of all forces, one after another."""
     memory: FloatArray
@@ -76,9 +76,9 @@ class Stepping:
 
 
 def build_unforced_stepping(linear: DiscreteModel, steps: int, stride: int) -> Stepping:
-    """Build the stepping without motion-dependent forces, a whole sample at once, from rest. steps: steps of `linear`
-    per sample; stride: commands per sample, `steps`, or 1 where a command is held over all steps."""
-    responses = [linear.by_command]
+    """Build the stepping without motion-dependent forces, a whole sample at once, from rest. steps: steps of
+    `linear` per sample; stride: commands per sample, `steps`, or 1 where a command is held over all steps."""
+    responses = [linear.state_by_command]
     for _ in range(steps - 1):
         responses.append(linear.transition @ responses[-1])
     by_command = np.hstack(responses[::-1]) if stride > 1 else np.sum(responses, axis=0)
@@ -90,6 +90,7 @@ def build_unforced_stepping(linear: DiscreteModel, steps: int, stride: int) -> S
         advance_unforced(form.step_matrix, rows, state)
 
     def set_state(initial_state: FloatArray) -> None:
+        """Set the state (2n,), positions then velocities: `Stepping.set_state`."""
         state[:] = form.modal_from_state @ initial_state
 
     return Stepping(1, (form.modal_from_state @ by_command).T, form.state_from_modal, BLOCK, run, set_state)
@@ -102,16 +103,16 @@ def build_forced_stepping(
     commands per sample, `steps`, or 1 where a command is held over all steps. commands: (L * stride, m), for laws that
     read them."""
     form = build_step_form(linear.transition)
-    port_indices, axis_count = np.array(forces.ports), linear.by_axis_force.shape[1]
+    port_indices, axis_count = np.array(forces.ports), linear.state_by_port_force.shape[1]
     output = linear.motion[np.concatenate([port_indices, axis_count + port_indices, 2 * axis_count + port_indices])]
-    by_force = linear.by_axis_force[:, port_indices]
+    by_force = linear.state_by_port_force[:, port_indices]
     per_newton = output @ by_force
-    per_newton[2 * len(port_indices) :] = linear.motion_by_axis_force[2 * axis_count + port_indices][:, port_indices]
+    per_newton[2 * len(port_indices) :] = linear.motion_by_port_force[2 * axis_count + port_indices][:, port_indices]
     law_output = output if forces.acceleration else output[: 2 * len(port_indices)]
     port_output, force_input = law_output @ form.state_from_modal, (form.modal_from_state @ by_force).T
     step_matrices = (form.step_matrix, _to_c_order(port_output), _to_c_order(force_input), _to_c_order(per_newton.T))
     input_matrix = np.hstack(
-        [(form.modal_from_state @ linear.by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
+        [(form.modal_from_state @ linear.state_by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
     )
     read_commands = np.ascontiguousarray(commands, dtype=np.float64) if forces.reads_all_axes else np.empty((0, 0))
     state, ports, memory = (

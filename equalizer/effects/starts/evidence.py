@@ -1,7 +1,7 @@
 """Data class of the signals from which the starting values of an effect are estimated: one recording and its residuals.
 
-Made by `evidence_from_residuals`, read by the effects (`Effect.starts`). Sizes: n samples, m driven axes, p response
-channels, d position channels. SI units; on rotational axes N stands for N m and m for rad.
+Made by `analysis.diagnosis.errors.evidence_from_residuals`, read by the effects (`Effect.starts`). Sizes: n samples, m
+driven axes, p response channels, d position channels. SI units; on rotational axes N stands for N m and m for rad.
 """
 
 from dataclasses import dataclass

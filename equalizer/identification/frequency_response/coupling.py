@@ -1,6 +1,6 @@
 """Cross-axis coupling of a frequency response: how strongly the other axes respond when one axis is driven.
 
-Used by `coupling_onset` (frequency from which coupling disturbs) and by figures.
+Called by `coupling_onset` (frequency from which coupling disturbs) and `analysis.figures.frequency_bands`.
 """
 
 import numpy as np
@@ -9,7 +9,8 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def compute_worst_coupling(response: ComplexArray) -> FloatArray:
-    """Compute the ratio of the off-axis to the on-axis response when axis i is driven, for the worst axis:
+    """Compute the ratio of the off-axis to the on-axis response when axis i is driven, for the axis i with the largest
+    ratio:
 
         max over i of sqrt(sum over j != i of |H_ji|²) / |H_ii|
 
@@ -26,6 +27,6 @@ def compute_worst_coupling(response: ComplexArray) -> FloatArray:
 
 def require_square_response(response: ComplexArray) -> None:
     """Require as many outputs as inputs. Raises ValueError unless the response (..., outputs, inputs) is square."""
-    outputs, inputs = response.shape[-2:]
-    if outputs != inputs:
-        raise ValueError(f"coupling compares equal axes, but there are {outputs} outputs and {inputs} inputs")
+    output_count, input_count = response.shape[-2:]
+    if output_count != input_count:
+        raise ValueError(f"coupling compares equal axes, but there are {output_count} outputs and {input_count} inputs")

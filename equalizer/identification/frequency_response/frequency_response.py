@@ -9,6 +9,7 @@ import numpy.typing as npt
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
+"""Array of truth values of any shape."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,23 +32,30 @@ class FrequencyResponse:
     sample_rate_hz: float
     """Rate (Hz) of the samples of commands and responses."""
     input_channels: tuple[str, ...]
+    """Names of the command channels, in the order of the inputs."""
     output_channels: tuple[str, ...]
+    """Names of the response channels, in the order of the outputs."""
     input_unit: str = "N"
     output_unit: str = "m/s^2"
     remarks: tuple[str, ...] = ()
+    """Sentences on the estimate, such as why lines are not reliable."""
 
     def __post_init__(self) -> None:
-        lines, p, m = len(self.frequency_hz), len(self.output_channels), len(self.input_channels)
+        line_count, output_count, input_count = (
+            len(self.frequency_hz),
+            len(self.output_channels),
+            len(self.input_channels),
+        )
         shapes = {
-            "response": (lines, p, m),
-            "noise_variance": (lines, p, m),
-            "coherence": (lines, p),
-            "reliable": (lines,),
+            "response": (line_count, output_count, input_count),
+            "noise_variance": (line_count, output_count, input_count),
+            "coherence": (line_count, output_count),
+            "reliable": (line_count,),
         }
         for name, shape in shapes.items():
             if np.shape(getattr(self, name)) != shape:
                 raise ValueError(f"{name} has shape {np.shape(getattr(self, name))}, not {shape}")
-        if lines and not (np.diff(self.frequency_hz) > 0).all():
+        if line_count and not (np.diff(self.frequency_hz) > 0).all():
             raise ValueError("frequency_hz must rise from line to line")
 
     def __len__(self) -> int:
@@ -57,14 +65,14 @@ class FrequencyResponse:
         """Select the lines of a band (Hz), limits included."""
         return self.select_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
 
-    def select_lines(self, mask: BoolArray) -> "FrequencyResponse":
-        """Select the lines where `mask` (lines,) is true."""
+    def select_lines(self, is_selected: BoolArray) -> "FrequencyResponse":
+        """Select the lines where `is_selected` (lines,) is true."""
         return FrequencyResponse(
-            self.frequency_hz[mask],
-            self.response[mask],
-            self.noise_variance[mask],
-            self.coherence[mask],
-            self.reliable[mask],
+            self.frequency_hz[is_selected],
+            self.response[is_selected],
+            self.noise_variance[is_selected],
+            self.coherence[is_selected],
+            self.reliable[is_selected],
             self.sample_rate_hz,
             self.input_channels,
             self.output_channels,

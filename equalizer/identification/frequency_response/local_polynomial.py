@@ -35,32 +35,33 @@ class LocalPolynomial:
 
     @classmethod
     def from_response(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
-        """Weights for the lines of a response. neighbours: lines on either side. Raises ValueError for a negative
-        order, for fewer than order + 2 lines in a neighbourhood, or for fewer lines in the response than in a
+        """Compute the weights for the lines of a response. neighbours: lines on either side. Raises ValueError for a
+        negative order, for fewer than order + 2 lines in a neighbourhood, or for fewer lines in the response than in a
         neighbourhood."""
-        width, lines = 2 * neighbours + 1, len(response)
+        width, line_count = 2 * neighbours + 1, len(response)
         if order < 0:
             raise ValueError(f"order is {order}; a polynomial has order 0 or above")
         if width < order + 2:
             raise ValueError(f"a polynomial of order {order} needs more than {width} lines; increase neighbours")
-        if lines < width:
+        if line_count < width:
             raise ValueError(
-                f"smoothing takes {width} lines at a time, but there are {lines}; widen the band, or reduce neighbours"
+                f"smoothing takes {width} lines at a time, but there are {line_count}; widen the band, or reduce "
+                "neighbours"
             )
-        window = np.clip(np.arange(lines) - neighbours, 0, lines - width)[:, None] + np.arange(width)
-        weight = _compute_line_weights(response)[window]
+        window = np.clip(np.arange(line_count) - neighbours, 0, line_count - width)[:, None] + np.arange(width)
+        line_weights = _compute_line_weights(response)[window]
         powers = _compute_powers(response.frequency_hz, window, order)
-        weights = np.linalg.pinv(powers * weight[:, :, None])[:, 0, :] * weight
+        weights = np.linalg.pinv(powers * line_weights[:, :, None])[:, 0, :] * line_weights
         return cls(window, weights, order)
 
     def apply(self, values: ComplexArray) -> ComplexArray:
-        """Smoothed values, (lines, ...), of values of the same shape."""
+        """Smooth values (lines, ...) over the lines; the result has the same shape."""
         smoothed: ComplexArray = np.einsum("lk,lk...->l...", self.weights, values[self.window])
         return smoothed
 
     def propagate_variance(self, variances: FloatArray) -> FloatArray:
-        """(lines, ...): variance after smoothing of errors that are independent between lines. variances: (lines, ...),
-        before smoothing."""
+        """Compute the variance (lines, ...) after smoothing of errors that are independent between lines. variances:
+        (lines, ...), before smoothing."""
         smoothed_variance: FloatArray = np.einsum("lk,lk...->l...", self.weights**2, variances[self.window])
         return smoothed_variance
 
@@ -69,7 +70,7 @@ def smooth_response(
     response: FrequencyResponse, neighbours: int = 8, order: int = 2, baseline: ComplexArray | None = None
 ) -> FrequencyResponse:
     """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over an asymmetric
-    neighbourhood of the same number of lines.
+    neighbourhood of the same number of lines. The defaults (17 lines, a parabola) are chosen.
 
     baseline: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so
     that a resonance narrower than the neighbourhood is not flattened.
@@ -79,40 +80,44 @@ def smooth_response(
     independent. Raises ValueError as `LocalPolynomial.from_response` does.
     """
     polynomial = LocalPolynomial.from_response(response, neighbours, order)
-    subtracted = 0.0 if baseline is None else baseline
-    difference = replace(response, response=np.asarray(response.response - subtracted, dtype=np.complex128))
-    smoothed = np.asarray(polynomial.apply(difference.response) + subtracted, dtype=np.complex128)
-    noise = polynomial.propagate_variance(response.noise_variance)
-    scatter = _estimate_scatter(difference, polynomial) * np.sum(polynomial.weights**2, axis=1)[:, None, None]
+    baseline_response = 0.0 if baseline is None else baseline
+    difference = replace(response, response=np.asarray(response.response - baseline_response, dtype=np.complex128))
+    smoothed = np.asarray(polynomial.apply(difference.response) + baseline_response, dtype=np.complex128)
+    propagated_variance = polynomial.propagate_variance(response.noise_variance)
+    scatter_variance = _estimate_scatter(difference, polynomial) * np.sum(polynomial.weights**2, axis=1)[:, None, None]
     remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
     return replace(
-        response, response=smoothed, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)
+        response,
+        response=smoothed,
+        noise_variance=np.fmax(propagated_variance, scatter_variance),
+        remarks=(*response.remarks, remark),
     )
 
 
 def _compute_line_weights(response: FrequencyResponse) -> FloatArray:
-    """(lines,): least-squares weights, 1 / standard deviation of the noise over all outputs and inputs, at most 1; all
-    1 where the noise of a line is not known or zero."""
-    power = response.noise_variance.sum(axis=(1, 2))
-    if not (np.isfinite(power) & (power > 0)).all():
+    """Compute the least-squares weights (lines,): 1 / standard deviation of the noise over all outputs and inputs,
+    scaled to at most 1; all 1 where the noise of a line is not known or zero."""
+    noise_power = response.noise_variance.sum(axis=(1, 2))
+    if not (np.isfinite(noise_power) & (noise_power > 0)).all():
         return np.ones(len(response))
-    weights: FloatArray = np.sqrt(power.min() / power)
+    weights: FloatArray = np.sqrt(noise_power.min() / noise_power)
     return weights
 
 
 def _compute_powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
-    """(lines, width, order + 1): powers 0 to `order` of the frequency difference from the line, scaled to at most 1."""
+    """Compute powers 0 to `order` of the frequency difference from the line, scaled to at most 1: (lines, width,
+    order + 1)."""
     offset_hz = frequency_hz[window] - frequency_hz[:, None]
     powers: FloatArray = (offset_hz / np.abs(offset_hz).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
     return powers
 
 
 def _estimate_scatter(response: FrequencyResponse, polynomial: LocalPolynomial) -> FloatArray:
-    """(lines, outputs, inputs): residual variance of an unweighted polynomial fit in each window, per degree of
-    freedom."""
+    """Estimate the residual variance (lines, outputs, inputs) of an unweighted polynomial fit in each window, per
+    degree of freedom."""
     basis, _ = np.linalg.qr(_compute_powers(response.frequency_hz, polynomial.window, polynomial.order))
     values = response.response[polynomial.window]
     explained_power = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2
     residual_power = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained_power, axis=1)
-    power: FloatArray = np.maximum(residual_power, 0.0) / (values.shape[1] - polynomial.order - 1)
-    return power
+    scatter_variance: FloatArray = np.maximum(residual_power, 0.0) / (values.shape[1] - polynomial.order - 1)
+    return scatter_variance

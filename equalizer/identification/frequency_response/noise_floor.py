@@ -43,8 +43,8 @@ def estimate_line_scatter(response: ComplexArray) -> FloatArray:
         return np.full(response.shape, np.nan)
     error_power = np.abs(np.diff(response, n=3, axis=0)) ** 2 / _THIRD_DIFFERENCE_GAIN
     padding = [(1, 2)] + [(0, 0)] * (response.ndim - 1)
-    padded: FloatArray = np.pad(error_power, padding, mode="edge")
-    return padded
+    padded_power: FloatArray = np.pad(error_power, padding, mode="edge")
+    return padded_power
 
 
 def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
@@ -55,9 +55,9 @@ def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
     # Imported here, because importing SciPy's ndimage takes longer than many estimates.
     from scipy.ndimage import uniform_filter1d
 
-    smoothed: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
+    smoothed_power: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
     # A running sum keeps rounding errors of strong lines after these have left the window, and may become negative.
-    return np.asarray(np.maximum(smoothed, 0.0))
+    return np.asarray(np.maximum(smoothed_power, 0.0))
 
 
 def estimate_rest_density(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:

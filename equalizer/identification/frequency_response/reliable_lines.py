@@ -13,9 +13,9 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
 
-_LEAST_INDEPENDENCE = 0.1
-"""Least singular value of the matrix whose columns are the excited directions, each of unit length: 1 where they are
-orthogonal, 0 where one lies in the span of the others. Chosen."""
+_MIN_INDEPENDENCE = 0.1
+"""Singular value to be exceeded by the smallest one of the matrix whose columns are the excited directions, each of
+unit length: 1 where they are orthogonal, 0 where one lies in the span of the others. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least
 
     excitation: spectra (lines, inputs, experiments), at least as many experiments as inputs. Returns a mask (lines,):
     where the smallest singular value of the excitations with at least `least_energy_db` of energy
-    (`ReliabilityRules`), each of unit length, exceeds `_LEAST_INDEPENDENCE`.
+    (`ReliabilityRules`), each of unit length, exceeds `_MIN_INDEPENDENCE`.
     """
     least_power = 10 ** (least_energy_db / 10)
     power = np.sum(np.abs(excitation) ** 2, axis=1)
@@ -81,31 +81,31 @@ def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least
     is_strong = (power >= least_power * power.max(axis=0)) | (
         power_per_octave >= least_power * power_per_octave.max(axis=0)
     )
-    norms = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
-    directions = np.where(is_strong[:, None, :], excitation / norms[:, None, :], 0.0)
-    spans_inputs: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _LEAST_INDEPENDENCE
+    excitation_norms = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
+    directions = np.where(is_strong[:, None, :], excitation / excitation_norms[:, None, :], 0.0)
+    spans_inputs: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _MIN_INDEPENDENCE
     return spans_inputs
 
 
-def find_spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
-    """Find the highest natural frequency (Hz) of a virtual spring in the recordings' meta data; 0 where there is
+def find_spring_frequency_hz(metadata_items: Sequence[Mapping[str, Any]]) -> float:
+    """Find the highest natural frequency (Hz) of a virtual spring in the metadata of recordings; 0 where there is
     none."""
     frequencies_hz = [0.0]
-    for meta in metas:
-        feedback = meta.get("feedback")
+    for metadata in metadata_items:
+        feedback = metadata.get("feedback")
         natural_hz = feedback.get("natural_frequency_hz") if isinstance(feedback, Mapping) else None
         if isinstance(natural_hz, int | float) and np.isfinite(natural_hz):
             frequencies_hz.append(float(natural_hz))
     return max(frequencies_hz)
 
 
-def _describe_spans(frequency_hz: FloatArray, selected: BoolArray) -> str:
+def _describe_spans(frequency_hz: FloatArray, is_selected: BoolArray) -> str:
     """Describe the selected lines: up to three spans, such as "1 to 4 Hz and from 38 Hz on", else their number and
-    range. selected: (lines,), at least one."""
-    spans = find_runs(selected)
+    range. is_selected: (lines,), true for at least one."""
+    spans = find_runs(is_selected)
     if len(spans) > 3:
-        first, last = frequency_hz[selected][[0, -1]]
-        return f"{int(selected.sum())} lines between {first:.4g} and {last:.4g} Hz"
+        first, last = frequency_hz[is_selected][[0, -1]]
+        return f"{int(is_selected.sum())} lines between {first:.4g} and {last:.4g} Hz"
     return " and ".join(_describe_span(frequency_hz, first, stop - 1) for first, stop in spans)
 
 

@@ -44,7 +44,7 @@ class SharedLines:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Columns:
+class _SpectraColumns:
     """Mean spectra, a column per experiment, times the root of its effective number of samples (length times effective
     periods), so that the noise power of a column equals the noise density."""
 
@@ -70,7 +70,7 @@ def solve_shared_lines(
     rank are left out."""
     all_columns = _stack_columns(experiments)
     is_solvable = _has_full_rank(all_columns)
-    columns = _Columns(
+    columns = _SpectraColumns(
         all_columns.command[is_solvable],
         all_columns.response[is_solvable],
         all_columns.instrument[is_solvable],
@@ -97,25 +97,26 @@ def solve_shared_lines(
     return SharedLines(frequency_hz[is_solvable], response, variance, coherence, columns.instrument)
 
 
-def _stack_columns(experiments: Sequence[Experiment]) -> _Columns:
+def _stack_columns(experiments: Sequence[Experiment]) -> _SpectraColumns:
     """Stack the weighted mean spectra of the experiments as the columns of U, Y and R."""
 
     def stack(name: str) -> ComplexArray:
-        weighted = [
+        """Stack the weighted mean spectra with this attribute's name, (lines, channels, experiments)."""
+        weighted_spectra = [
             getattr(experiment, name).mean(axis=0) * np.sqrt(experiment.length * experiment.effective_periods)
             for experiment in experiments
         ]
-        return np.stack(weighted, axis=2)
+        return np.stack(weighted_spectra, axis=2)
 
     power = sum(experiment.length * np.mean(np.abs(experiment.response) ** 2, axis=0) for experiment in experiments)
-    return _Columns(stack("command"), stack("response"), stack("instrument"), np.asarray(power))
+    return _SpectraColumns(stack("command"), stack("response"), stack("instrument"), np.asarray(power))
 
 
-def _has_full_rank(columns: _Columns) -> BoolArray:
+def _has_full_rank(columns: _SpectraColumns) -> BoolArray:
     """(lines,): whether the excitations R and the commands U both have full rank, which is the number of inputs."""
-    inputs, experiments = columns.command.shape[1:]
-    has_full_rank = np.full(len(columns.command), experiments >= inputs)
-    if experiments >= inputs and len(has_full_rank):
+    input_count, experiment_count = columns.command.shape[1:]
+    has_full_rank = np.full(len(columns.command), experiment_count >= input_count)
+    if experiment_count >= input_count and len(has_full_rank):
         for matrices in (columns.instrument, columns.command):
             singular_values = np.linalg.svd(matrices, compute_uv=False)
             has_full_rank &= singular_values[:, -1] > _RANK_TOLERANCE * singular_values.max()
@@ -145,12 +146,12 @@ def _estimate_density_from_periods(
     return np.stack([mean_density if density is None else density for density in densities], axis=2)
 
 
-def _estimate_density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
+def _estimate_density_from_residuals(columns: _SpectraColumns, response: ComplexArray) -> FloatArray | None:
     """Estimate the noise density (lines, outputs, experiments) from the residual power over all experiments per degree
     of freedom, the same for each; None for fewer than inputs + 2 experiments."""
-    inputs, experiments = columns.command.shape[1:]
-    if experiments < inputs + 2:
+    input_count, experiment_count = columns.command.shape[1:]
+    if experiment_count < input_count + 2:
         return None
     residual_power = np.abs(columns.response - response @ columns.command) ** 2
-    density = residual_power.sum(axis=2, keepdims=True) / (experiments - inputs)
+    density = residual_power.sum(axis=2, keepdims=True) / (experiment_count - input_count)
     return np.broadcast_to(density, residual_power.shape).copy()

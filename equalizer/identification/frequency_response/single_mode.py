@@ -71,20 +71,21 @@ def _project_out(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
 
 
 def _solve_two_unknowns(
-    first: ComplexArray, second: ComplexArray, target: ComplexArray
+    x_factors: ComplexArray, y_factors: ComplexArray, target: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve first x + second y = target for real x and y, (draws,) each, in least squares, draw by draw. All arrays:
-    (draws, lines, entries)."""
+    """Solve x_factors x + y_factors y = target for real x and y, (draws,) each, in least squares, draw by draw. All
+    arrays: (draws, lines, entries)."""
 
     def compute_inner_product(first_values: ComplexArray, second_values: ComplexArray) -> FloatArray:
+        """Compute the real part of the inner product of each draw, (draws,)."""
         product: FloatArray = np.sum((np.conj(first_values) * second_values).real, axis=(1, 2))
         return product
 
     aa, ab, bb = (
-        compute_inner_product(first, first),
-        compute_inner_product(first, second),
-        compute_inner_product(second, second),
+        compute_inner_product(x_factors, x_factors),
+        compute_inner_product(x_factors, y_factors),
+        compute_inner_product(y_factors, y_factors),
     )
-    ar, br = compute_inner_product(first, target), compute_inner_product(second, target)
+    ar, br = compute_inner_product(x_factors, target), compute_inner_product(y_factors, target)
     determinant = np.maximum(aa * bb - ab**2, np.finfo(np.float64).tiny)
     return (ar * bb - br * ab) / determinant, (br * aa - ar * ab) / determinant

@@ -9,7 +9,8 @@ the data support. Steps of `fit_mechanical_model`:
    collocated with the commands, modes with free shapes at the sensors are tried (`modal_order`);
 4. the chosen structure is fitted to all lines, and simulated on the segments that were kept for the test.
 
-a, v and x are acceleration, velocity and position (n,) of the coordinates; command in N or N m.
+a, v and x are acceleration, velocity and position (n,) of the coordinates; command in N or N m. Called by
+`analysis.diagnosis.first_model`, `rigid_body` and `study.workflows.diagnosis.write_twin`; exported by `equalizer`.
 """
 
 from collections.abc import Callable, Sequence
@@ -80,12 +81,14 @@ def choose_structure(
     best = choose_simplest(starts)
     if settings.joint:
         return StructureChoice(*grow_across_joint(groups, best, band_hz, settings, on_progress))
-    if settings.sensors_elsewhere:
-        return _fit_sensors_elsewhere(groups, best, band_hz, settings, on_progress)
+    if settings.noncollocated_sensors:
+        return _fit_noncollocated_sensors(groups, best, band_hz, settings, on_progress)
     collocated = StructureChoice(*grow_by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))
-    if collocated.best.error < NONCOLLOCATED_ERROR or settings.sensors_elsewhere is False:
+    if collocated.best.error < NONCOLLOCATED_ERROR or settings.noncollocated_sensors is False:
         return collocated
-    noncollocated = _fit_sensors_elsewhere(groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2))
+    noncollocated = _fit_noncollocated_sensors(
+        groups, best, band_hz, settings, lambda share: on_progress(0.5 + share / 2)
+    )
     candidates = (
         *collocated.candidates,
         *(replace(trial, description=f"sensors elsewhere: {trial.description}") for trial in noncollocated.candidates),
@@ -94,14 +97,14 @@ def choose_structure(
     return replace(noncollocated if prefers_noncollocated else collocated, candidates=candidates)
 
 
-def _fit_sensors_elsewhere(
+def _fit_noncollocated_sensors(
     groups: Sequence[LineGroup],
     best: RefinedFit[Structure],
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
-    """Structure for sensors that are not collocated with the commands: modes with free shapes or, where a group
+    """Fit a structure for sensors that are not collocated with the commands: modes with free shapes or, where a group
     contains a transient, which `choose_modes` cannot fit, oscillators whose motion the driven axes' own sensors measure
     too."""
     if not any(group.transient for group in groups):
@@ -113,12 +116,13 @@ def _fit_sensors_elsewhere(
 
 LINES_PER_GROUP, LINES_IN_ALL = 400, 1600
 """Largest number of lines of each group, and of all groups together, while structures are searched, to limit computing
-time; the chosen structure is then fitted to all lines."""
-_LEAST_LINES = 8
-"""Fewest driven lines from which a model is fitted; times the number of axes where a part of the band is used."""
+time; the chosen structure is then fitted to all lines. Chosen."""
+_MIN_LINES = 8
+"""Smallest number of driven lines from which a model is fitted; times the number of axes where a part of the band is
+used. Chosen."""
 _BAND_SHARES = (0.25, 0.5, 1.0)
 """Parts of the first stage's band, from its lower end and as shares of its octaves, to which the rigid body is fitted:
-a mode at higher frequencies would bias it."""
+a mode at higher frequencies would bias it. Chosen."""
 
 
 def fit_mechanical_model(
@@ -135,34 +139,34 @@ def fit_mechanical_model(
     """
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
-    fit, test = split_fit_and_test(recordings)
-    lines = [spectra for pair in fit if (spectra := compute_segment_lines(*pair)) is not None]
-    segments = select_band(lines, settings.band_hz)
-    if sum(len(segment.frequency_hz) for segment in segments) < _LEAST_LINES:
+    fit_segments, test_segments = split_fit_and_test(recordings)
+    fit_lines = [spectra for pair in fit_segments if (spectra := compute_segment_lines(*pair)) is not None]
+    segments = select_band(fit_lines, settings.band_hz)
+    if sum(len(segment.frequency_hz) for segment in segments) < _MIN_LINES:
         raise MechanicalFitRefused(
             "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
             "record a sweep, noise or a multisine along every axis"
         )
-    band = _find_covered_band(segments)
+    band_hz = _find_covered_band(segments)
     groups = build_line_groups(segments, settings.floor)
-    structure = _make_rigid_structure(recordings[0], settings, band)
+    structure = _make_rigid_structure(recordings[0], settings, band_hz)
     thinned = [group.limit_lines(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
-    starts = _fit_rigid_starts(segments, thinned, structure, band, settings)
-    choice = choose_structure(thinned, starts, band, settings, on_progress)
+    starts = _fit_rigid_starts(segments, thinned, structure, band_hz, settings)
+    choice = choose_structure(thinned, starts, band_hz, settings, on_progress)
     full_groups = [group.select_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
-    final = _refit(_include_all_lines(full_groups), choice.best, band)
+    final = _refit(_include_all_lines(full_groups), choice.best, band_hz)
     refuse_unstable(final)
-    test_lines = [spectra for pair in test if (spectra := compute_segment_lines(*pair)) is not None]
+    test_lines = [spectra for pair in test_segments if (spectra := compute_segment_lines(*pair)) is not None]
     on_progress(1.0)
     model = make_physical_model(final, name)
-    errors = _compute_channel_errors(model, lines, test_lines, band, recordings[0].response.channels)
+    errors = _compute_channel_errors(model, fit_lines, test_lines, band_hz, recordings[0].response.channels)
     return MechanicalFit(
         model=model,
         errors=errors[:-1],
         error=errors[-1].fit,
         held_out=errors[-1].held_out,
         noise=errors[-1].noise,
-        band_hz=band,
+        band_hz=band_hz,
         candidates=choice.candidates,
         reason=choice.reason,
         remarks=_list_remarks(final, recordings[0].response.channels, bool(test_lines)),
@@ -171,24 +175,24 @@ def fit_mechanical_model(
 
 def _compute_channel_errors(
     model: MechanicalModel,
-    fitted: Sequence[SegmentLines],
-    tested: Sequence[SegmentLines],
-    band: tuple[float, float],
+    fit_lines: Sequence[SegmentLines],
+    test_lines: Sequence[SegmentLines],
+    band_hz: tuple[float, float],
     channels: tuple[str, ...],
 ) -> tuple[ChannelError, ...]:
-    """Errors per channel; the last entry is over all channels. Raises MechanicalFitRefused where nothing is
-    explained."""
-    error, noise = compute_simulation_errors(model, fitted, band)
+    """Compute the errors per channel, and over all channels as last entry. Raises MechanicalFitRefused where no channel
+    is explained (`refuse_noise`)."""
+    error, noise = compute_simulation_errors(model, fit_lines, band_hz)
     refuse_noise(error, channels)
-    test_error = compute_simulation_errors(model, tested, band)[0] if tested else None
+    test_error = compute_simulation_errors(model, test_lines, band_hz)[0] if test_lines else None
     return tuple(
         ChannelError(
             channel,
-            float(error[i]),
-            None if test_error is None else float(test_error[i]),
-            float(noise[i]) if np.isfinite(noise[i]) else None,
+            float(error[index]),
+            None if test_error is None else float(test_error[index]),
+            float(noise[index]) if np.isfinite(noise[index]) else None,
         )
-        for i, channel in enumerate((*channels, "all"))
+        for index, channel in enumerate((*channels, "all"))
     )
 
 
@@ -196,42 +200,43 @@ def _fit_rigid_starts(
     segments: Sequence[SegmentLines],
     groups: Sequence[LineGroup],
     structure: Structure,
-    band: tuple[float, float],
+    band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
 ) -> list[RefinedFit[Structure]]:
-    """Fits of a rigid body at the driven axes up to the end of the first stage, one for each initial value: from
-    growing parts of that band, without and, if asked for, with a delay."""
+    """Fit a rigid body at the driven axes up to the end of the first stage, once for each initial value: from growing
+    parts of that band, without and, with `settings.fit_delay`, with a delay."""
     fits: list[RefinedFit[Structure]] = []
-    stage_end = compute_stage_ends(band)[0]
+    stage_end_hz = compute_stage_ends(band_hz)[0]
     stage_groups = [
-        part for group in groups if len((part := group.select_lines(group.frequency_hz <= stage_end)).frequency_hz)
+        part for group in groups if len((part := group.select_lines(group.frequency_hz <= stage_end_hz)).frequency_hz)
     ]
-    for share in _BAND_SHARES:
-        end = band[0] * (stage_end / band[0]) ** share
-        low_segments = select_band(segments, (band[0], end))
-        lines = sum(len(segment.frequency_hz) for segment in low_segments)
-        if lines < _LEAST_LINES * structure.inputs and (fits or share != _BAND_SHARES[-1]):
+    for band_share in _BAND_SHARES:
+        end_hz = band_hz[0] * (stage_end_hz / band_hz[0]) ** band_share
+        low_segments = select_band(segments, (band_hz[0], end_hz))
+        line_count = sum(len(segment.frequency_hz) for segment in low_segments)
+        if line_count < _MIN_LINES * structure.inputs and (fits or band_share != _BAND_SHARES[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
             rigid_structure, unknowns = estimate_rigid_start(
                 low_segments, replace(structure, delayed=delayed), settings.floor
             )
-            fits.append(refine_unknowns(stage_groups, rigid_structure, unknowns, (band[0], stage_end)))
+            fits.append(refine_unknowns(stage_groups, rigid_structure, unknowns, (band_hz[0], stage_end_hz)))
     return fits
 
 
 def _make_rigid_structure(
-    recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]
+    recording: Recording, settings: MechanicalFitSettings, band_hz: tuple[float, float]
 ) -> Structure:
-    """Structure without modes; its speed scale (rad/s) is 2 pi times the geometric mean of the band's ends (Hz)."""
-    inputs, outputs = len(recording.command.channels), len(recording.response.channels)
+    """Make the structure without modes; its speed scale (rad/s) is 2 pi times the geometric mean of the band's ends
+    (Hz)."""
+    input_count, output_count = len(recording.command.channels), len(recording.response.channels)
     return Structure(
-        inputs=inputs,
-        outputs=outputs,
+        inputs=input_count,
+        outputs=output_count,
         quantity=recording.response.quantities[0],
         mass_scale=1.0,
-        speed_scale=2 * np.pi * float(np.sqrt(band[0] * band[1])),
-        signs=(1.0,) * inputs,
+        speed_scale=2 * np.pi * float(np.sqrt(band_hz[0] * band_hz[1])),
+        signs=(1.0,) * input_count,
         step_s=1 / recording.sample_rate_hz,
         sensor=settings.sensor,
         actuator=settings.actuator,
@@ -240,7 +245,7 @@ def _make_rigid_structure(
 
 
 def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
-    """Frequencies (Hz) of the lowest and the highest line of all segments."""
+    """Find the frequencies (Hz) of the lowest and the highest line of all segments."""
     return (
         float(min(segment.frequency_hz[0] for segment in segments)),
         float(max(segment.frequency_hz[-1] for segment in segments)),
@@ -248,23 +253,24 @@ def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
 
 
 def _refit(
-    groups: Sequence[LineGroup], best: RefinedFit[Structure] | RefinedFit[ModalStructure], band: tuple[float, float]
+    groups: Sequence[LineGroup], best: RefinedFit[Structure] | RefinedFit[ModalStructure], band_hz: tuple[float, float]
 ) -> RefinedFit[Structure] | RefinedFit[ModalStructure]:
-    """The chosen structure fitted to all lines, from the parameters of the search."""
+    """Fit the chosen structure to all lines, from the parameters of the search. Modes with free shapes take at most 6
+    evaluations (chosen), because the search has refined them."""
     if isinstance(best.structure, ModalStructure):
-        return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band, max_evaluations=6))
-    return refine_unknowns(groups, best.structure, best.unknowns, band)
+        return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band_hz, max_evaluations=6))
+    return refine_unknowns(groups, best.structure, best.unknowns, band_hz)
 
 
 def _include_all_lines(groups: Sequence[LineGroup]) -> list[LineGroup]:
-    """The groups with no line held out for cross-validation, so that a fit uses all lines."""
+    """Mark no line of the groups as held out for cross-validation, so that a fit uses all lines."""
     return [replace(group, held_out=np.zeros(len(group.held_out), dtype=bool)) for group in groups]
 
 
 def _list_remarks(
-    final: RefinedFit[Structure] | RefinedFit[ModalStructure], channels: tuple[str, ...], tested: bool
+    final: RefinedFit[Structure] | RefinedFit[ModalStructure], channels: tuple[str, ...], has_test: bool
 ) -> tuple[str, ...]:
-    """Sentences on what was assumed and what the fit shows."""
+    """List sentences on what was assumed and what the fit shows. has_test: whether segments were kept for the test."""
     structure = final.structure
     collocated = ", ".join(channels[: structure.inputs])
     remarks = [f"No model was given, so a linear one was fitted; {collocated} taken to move as the commands act."]
@@ -274,6 +280,6 @@ def _list_remarks(
         remarks.append("The response is positive in the direction opposite to the command.")
     if isinstance(structure, Structure) and not structure.grounded:
         remarks.append("No spring to the ground was found: the device drifts under a constant command.")
-    if not tested:
+    if not has_test:
         remarks.append("No segment was kept for a test: the error is that of the fitted segments.")
     return tuple(remarks)

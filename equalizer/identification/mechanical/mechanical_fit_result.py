@@ -1,4 +1,7 @@
-"""Data classes of the fit of a mechanical model (`mechanical_fit`): settings, errors, compared structures, result."""
+"""Data classes of the fit of a mechanical model (`mechanical_fit`): settings, errors, compared structures, result.
+
+Made and read by `mechanical_fit`, `mechanical_order`, `modal_order`, `rigid_body` and `analysis.diagnosis.first_model`.
+"""
 
 from dataclasses import dataclass, field
 
@@ -23,12 +26,12 @@ class MechanicalFitSettings:
     """Bandwidth and range of the sensor from its data sheet: assumed, not fitted."""
     actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
     """Known limits of the actuator; its delay is the starting value where a delay is fitted."""
-    sensors_elsewhere: bool | None = None
+    noncollocated_sensors: bool | None = None
     """Whether sensor i may be non-collocated with actuator i (a cable or joint lies between). None: decided by
     cross-validation."""
     joint: bool = False
     """Whether sensors and oscillators are connected to the driven axes by an elastic joint, such as cables. Set it only
-    where that is known of the device; `sensors_elsewhere` is then ignored."""
+    where that is known of the device; `noncollocated_sensors` is then ignored."""
     fit_delay: bool = True
     """Whether a delay is added where it lowers the cross-validated error."""
     floor: float = 0.02

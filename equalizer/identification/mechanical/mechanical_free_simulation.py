@@ -28,11 +28,11 @@ def compute_simulation_errors(
     output_count = model.outputs
     error_power, response_power, noise_power = np.zeros(output_count), np.zeros(output_count), np.zeros(output_count)
     for segment in segments:
-        in_band = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
-        misfit = compute_simulation_misfit(model, segment)[in_band]
+        is_in_band = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
+        misfit = compute_simulation_misfit(model, segment)[is_in_band]
         error_power += (np.abs(misfit) ** 2).sum(axis=0)
-        response_power += (np.abs(segment.response[in_band]) ** 2).sum(axis=0)
-        noise_power += segment.noise[in_band].sum(axis=0)
+        response_power += (np.abs(segment.response[is_in_band]) ** 2).sum(axis=0)
+        noise_power += segment.noise[is_in_band].sum(axis=0)
     # 1e-300 avoids a division by zero for a response without power.
     error_shares, noise_shares = (
         error_power / np.maximum(response_power, 1e-300),

@@ -29,15 +29,15 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _GRID_FREQUENCIES = 60
-"""Number of resonance frequencies on the grid."""
+"""Number of resonance frequencies on the grid. Chosen."""
 _DAMPING_RATIOS = (0.01, 0.05, 0.25)
-"""Damping ratios on the grid. Heuristic."""
+"""Damping ratios on the grid. Chosen."""
 _INTENDED_ROWS = 6000
 """Intended number of rows of the regression over all groups; a larger number is reduced to one between this and twice
-this."""
+this. Chosen."""
 _MIN_RELATIVE_ROOT_MASS = 0.02
-"""Least starting value of the root of the mode's mass over the mass scale, because the linear estimate may be zero or
-negative. Heuristic."""
+"""Smallest starting value of the root of the mode's mass over the mass scale, because the linear estimate may be zero
+or negative. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,9 @@ class ModeStart:
 
     structure: Structure
     unknowns: FloatArray
+    """(parameters,): starting values, scaled as `Structure` states."""
     frequency_hz: float
+    """Resonance frequency of the further oscillator (Hz)."""
 
 
 def estimate_mode_starts(
@@ -55,7 +57,7 @@ def estimate_mode_starts(
     """Estimate starting values of a further oscillator, at the `max_starts` frequencies whose oscillators reduce the
     residual most, best first; frequencies differ by more than 10 % (0.1 in the natural logarithm). band_hz: band of the
     frequency responses; the grid extends beyond it by a factor of 1.5, because a mode outside also acts inside. Both
-    factors are heuristic."""
+    factors are chosen."""
     thinned_groups = [_thin_group(group.exclude_held_out(), len(groups)) for group in groups]
     model = current.structure.build_model(current.unknowns)
     misfit = stack_real(compute_misfits(thinned_groups, model))
@@ -94,12 +96,12 @@ def _compute_tangent_basis(
 
 
 def _thin_group(group: LineGroup, group_count: int) -> LineGroup:
-    """Return the group on every k-th line, with k such that `group_count` groups of this size have fewer than twice
+    """Reduce a group to every k-th line, with k such that `group_count` groups of this size have fewer than twice
     `_INTENDED_ROWS` rows together."""
-    rows = 2 * group.target[0].size * len(group.frequency_hz)
-    is_chosen = np.zeros(len(group.frequency_hz), dtype=bool)
-    is_chosen[:: max(1, rows * group_count // _INTENDED_ROWS)] = True
-    return group.select_lines(is_chosen)
+    row_count = 2 * group.target[0].size * len(group.frequency_hz)
+    is_kept = np.zeros(len(group.frequency_hz), dtype=bool)
+    is_kept[:: max(1, row_count * group_count // _INTENDED_ROWS)] = True
+    return group.select_lines(is_kept)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,8 +175,8 @@ def _make_start(
     """Make the starting values of the structure with a further oscillator. frequency_hz, damping_ratio: of the
     oscillator; coefficients: of the columns of `_compute_mode_columns`."""
     structure, inputs = current.structure, current.structure.inputs
-    extended = replace(structure, modes=structure.modes + 1)
-    unknowns = structure.convert_unknowns(current.unknowns, extended)
+    extended_structure = replace(structure, modes=structure.modes + 1)
+    unknowns = structure.convert_unknowns(current.unknowns, extended_structure)
     pair_count = inputs * (inputs + 1) // 2
     mass_matrix, sensor_rows = (
         build_symmetric_matrix(coefficients[:pair_count], inputs),
@@ -196,6 +198,6 @@ def _make_start(
     mode_unknowns = np.concatenate(
         [[log_frequency, np.log(damping_ratio)], participation / root_mass, sensor_shape * root_mass]
     )
-    mode_slice = extended.slices["modes"]
+    mode_slice = extended_structure.slices["modes"]
     unknowns[mode_slice.stop - len(mode_unknowns) : mode_slice.stop] = mode_unknowns
-    return ModeStart(extended, unknowns, frequency_hz)
+    return ModeStart(extended_structure, unknowns, frequency_hz)

@@ -2,8 +2,8 @@
 
 Forward selection: from the driven axes alone, the first larger structure is adopted that lowers the squared error on
 held-out lines (every fourth line) enough, see `improves_enough`. Candidates are a further mode, sensors that measure
-the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are heuristic. Called by
-`mechanical_fit`.
+the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are chosen. Called by
+`mechanical_fit`; `modal_order` uses `TARGET_REACHED`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ from equalizer.identification.mechanical.mechanical_structure import Structure, 
 
 LEAST_GAIN = 0.08
 """Smallest relative fall of the cross-validated squared error for which a larger structure is adopted; it limits the
-order where no linear model fits the device."""
+order where no linear model fits the device. `modal_order.LEAST_GAIN` is the same for modes with free shapes."""
 GAIN_PER_UNKNOWN = 4.0
 """Smallest fall of the squared error per additional unknown, in units of the fall expected from noise alone."""
 TARGET_ERROR = 1.1
@@ -80,7 +80,9 @@ class _Limits:
     """Limits of the extensions that `_fit_extensions` may try."""
 
     most_modes: int
+    """Largest number of modes in addition to the driven axes."""
     fit_delay: bool
+    """Whether a delay is tried."""
     extend_couplings: bool
     """Whether a structure with several inputs may get a delay, a sensor rotation and shared sensors."""
 
@@ -90,19 +92,22 @@ def compute_stage_ends(band_hz: tuple[float, float]) -> tuple[float, ...]:
     the band."""
     lowest_hz, highest_hz = band_hz
     first_end_hz = min(highest_hz, max(lowest_hz * FIRST_STAGE_RATIO, highest_hz * LEAST_FIRST_STAGE_SHARE))
-    count = int(np.ceil(np.log(highest_hz / first_end_hz) / np.log(STAGE_RATIO))) + 1
-    return tuple(float(end) for end in np.geomspace(first_end_hz, highest_hz, count))
+    stage_count = int(np.ceil(np.log(highest_hz / first_end_hz) / np.log(STAGE_RATIO))) + 1
+    return tuple(float(end) for end in np.geomspace(first_end_hz, highest_hz, stage_count))
 
 
 def _try_without_ground(
     groups: Sequence[LineGroup], best: RefinedFit[Structure], band_hz: tuple[float, float], trials: list[OrderCandidate]
 ) -> RefinedFit[Structure]:
-    """The fit without springs to the ground if the error rises by `SIMPLER_RATIO` at most, else `best`."""
+    """Fit without springs to the ground; return that fit if the squared error rises by a factor of at most
+    `SIMPLER_RATIO`, else `best`. The trial is recorded in `trials`."""
     structure = replace(best.structure, grounded=False)
-    ungrounded = refine_unknowns(groups, structure, best.structure.convert_unknowns(best.unknowns, structure), band_hz)
-    is_simpler = ungrounded.held_out_squares <= SIMPLER_RATIO * best.held_out_squares
-    trials.append(_record_trial("without springs to the ground", ungrounded, structure, is_simpler))
-    return ungrounded if is_simpler else best
+    ungrounded_fit = refine_unknowns(
+        groups, structure, best.structure.convert_unknowns(best.unknowns, structure), band_hz
+    )
+    is_simpler = ungrounded_fit.held_out_squares <= SIMPLER_RATIO * best.held_out_squares
+    trials.append(_record_trial("without springs to the ground", ungrounded_fit, structure, is_simpler))
+    return ungrounded_fit if is_simpler else best
 
 
 def _grow_structure(
@@ -144,12 +149,12 @@ def grow_across_joint(
 ) -> tuple[RefinedFit[Structure], tuple[OrderCandidate, ...], str]:
     """Grow a structure with an elastic joint. Oscillators are first fitted without the joint in the lower part of the
     band (`JOINT_FREE_SHARE`), where it has little effect. Returns as `grow_by_stages`."""
-    joint_free_hz = max(JOINT_FREE_SHARE * band_hz[1], compute_stage_ends(band_hz)[0])
+    end_hz = max(JOINT_FREE_SHARE * band_hz[1], compute_stage_ends(band_hz)[0])
     low_groups = [
-        part for group in groups if len((part := group.select_lines(group.frequency_hz <= joint_free_hz)).frequency_hz)
+        part for group in groups if len((part := group.select_lines(group.frequency_hz <= end_hz)).frequency_hz)
     ]
     without_joint, stage_trials, _ = grow_by_stages(
-        low_groups, best, (band_hz[0], joint_free_hz), settings, lambda s: on_progress(0.5 * s), extend_couplings=False
+        low_groups, best, (band_hz[0], end_hz), settings, lambda share: on_progress(0.5 * share), extend_couplings=False
     )
     structure = replace(without_joint.structure, joint=True)
     trials = list(stage_trials)
@@ -182,34 +187,34 @@ def _remove_superfluous_modes(
     band_hz: tuple[float, float],
     trials: list[OrderCandidate],
 ) -> RefinedFit[Structure]:
-    """Remove, the last first, oscillators without which the fit with the joint is hardly worse."""
+    """Remove oscillators, the last first, whose addition would not pass `improves_enough`; record the trials."""
     for mode in reversed(range(current.structure.modes)):
-        smaller, unknowns = remove_mode(current.structure, current.unknowns, mode)
-        fit = refine_unknowns(groups, smaller, unknowns, band_hz)
+        smaller_structure, unknowns = remove_mode(current.structure, current.unknowns, mode)
+        fit = refine_unknowns(groups, smaller_structure, unknowns, band_hz)
         is_simpler = not improves_enough(fit, current)
-        trials.append(_record_trial(f"without mode {mode + 1}", fit, smaller, is_simpler))
+        trials.append(_record_trial(f"without mode {mode + 1}", fit, smaller_structure, is_simpler))
         current = fit if is_simpler else current
     return current
 
 
 def choose_simplest(starts: Sequence[RefinedFit[Structure]]) -> RefinedFit[Structure]:
-    """The best fit with the fewest unknowns, unless a fit with more reduces the squared error by `DELAY_RATIO` or
-    more."""
+    """Choose the best fit with the fewest unknowns, unless a fit with more reduces the squared error by more than the
+    factor `DELAY_RATIO`."""
     fewest_unknowns = min(start.structure.parameters for start in starts)
-    best = min(
+    simplest = min(
         (start for start in starts if start.structure.parameters == fewest_unknowns),
         key=lambda start: start.held_out_squares,
     )
-    best_of_all = min(starts, key=lambda start: start.held_out_squares)
-    return best_of_all if DELAY_RATIO * best_of_all.held_out_squares < best.held_out_squares else best
+    best = min(starts, key=lambda start: start.held_out_squares)
+    return best if DELAY_RATIO * best.held_out_squares < simplest.held_out_squares else simplest
 
 
 def improves_enough(current: RefinedFit[Structure], extended_fit: RefinedFit[Structure]) -> bool:
     """Whether the larger structure lowers the squared error on held-out lines by more than LEAST_GAIN of it, and by
     more than GAIN_PER_UNKNOWN times what its further unknowns gain by chance."""
     gain = current.held_out_squares - extended_fit.held_out_squares
-    unknowns = extended_fit.structure.parameters - current.structure.parameters
-    chance_gain = unknowns * extended_fit.held_out_squares / max(extended_fit.held_out_count, 1)
+    added_unknowns = extended_fit.structure.parameters - current.structure.parameters
+    chance_gain = added_unknowns * extended_fit.held_out_squares / max(extended_fit.held_out_count, 1)
     return gain > max(LEAST_GAIN * current.held_out_squares, GAIN_PER_UNKNOWN * chance_gain)
 
 
@@ -245,5 +250,5 @@ def _fit_extensions(
 
 
 def _record_trial(description: str, fit: RefinedFit[Structure], structure: Structure, accepted: bool) -> OrderCandidate:
-    """The trial as an entry of the result. accepted: whether the structure was adopted."""
+    """Record a trial as an entry of the result. accepted: whether the structure was adopted."""
     return OrderCandidate(description, structure.coordinates, structure.parameters, fit.error, accepted)

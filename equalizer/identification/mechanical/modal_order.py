@@ -2,7 +2,7 @@
 
 Forward selection: a further mode is adopted while the squared error on held-out lines falls enough (`modal_search`
 finds it). Shapes (p, m) of full rank are then reduced to rank-one modes by singular value decomposition, and all
-unknowns are refined. Thresholds are heuristic.
+unknowns are refined. Thresholds are chosen. Called by `mechanical_fit`.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 
 LEAST_GAIN = 0.08
 """Smallest relative fall of the cross-validated squared error for which a further frequency, with its shape, is
-adopted."""
+adopted; equal to `mechanical_order.LEAST_GAIN`."""
 DELAY_ERROR = 1.02
 """Cross-validated rms error, in units of noise and floor, from which a delay is tried."""
 DELAY_RATIO = 1.1
@@ -43,29 +43,39 @@ def choose_modes(
     substitute missing modes."""
     most_modes = settings.most_modes + structure.inputs
     best, trials, reason = _add_modes(
-        ModalSearch(groups, structure, band_hz, fit_delay=False), structure, most_modes, lambda s: on_progress(0.4 * s)
+        ModalSearch(groups, structure, band_hz, fit_delay=False),
+        structure,
+        most_modes,
+        lambda share: on_progress(0.4 * share),
     )
     if settings.fit_delay and _compute_held_out_error(best) >= DELAY_ERROR:
         search = ModalSearch(groups, structure, band_hz, fit_delay=True)
-        delayed, delayed_trials, delayed_reason = _add_modes(
-            search, structure, most_modes, lambda s: on_progress(0.4 + 0.4 * s)
+        delayed_estimate, delayed_trials, delayed_reason = _add_modes(
+            search, structure, most_modes, lambda share: on_progress(0.4 + 0.4 * share)
         )
         trials = [
             *trials,
             *(replace(trial, description=f"{trial.description}, with a delay") for trial in delayed_trials),
         ]
-        has_fewer_modes = len(delayed.logs) < len(best.logs)
-        if delayed.held_out_squares < (DELAY_RATIO if has_fewer_modes else 1 - LEAST_GAIN) * best.held_out_squares:
-            best, reason = delayed, delayed_reason
-    modal, unknowns = _split_into_rank_one_modes(best, structure)
-    return balance_fit(refine_unknowns(groups, modal, unknowns, band_hz, max_evaluations=10)), tuple(trials), reason
+        has_fewer_modes = len(delayed_estimate.logs) < len(best.logs)
+        if (
+            delayed_estimate.held_out_squares
+            < (DELAY_RATIO if has_fewer_modes else 1 - LEAST_GAIN) * best.held_out_squares
+        ):
+            best, reason = delayed_estimate, delayed_reason
+    modal_structure, unknowns = _split_into_rank_one_modes(best, structure)
+    return (
+        balance_fit(refine_unknowns(groups, modal_structure, unknowns, band_hz, max_evaluations=10)),
+        tuple(trials),
+        reason,
+    )
 
 
 def _add_modes(
     search: ModalSearch, structure: Structure, most_modes: int, on_progress: Callable[[float], None]
 ) -> tuple[ModeEstimate, list[OrderCandidate], str]:
-    """Add modes, up to `most_modes`, while the error on held-out lines falls enough; also the orders tried and the
-    reason."""
+    """Add modes, up to `most_modes`, while the error on held-out lines falls enough. Returns the estimate, the orders
+    tried, and the reason for the end."""
     best = search.add_mode(None)
     trials = [_record_trial(best, structure, True)]
     for number in range(1, most_modes):
@@ -83,44 +93,51 @@ def _add_modes(
 
 
 def _compute_held_out_error(estimate: ModeEstimate) -> float:
-    """Rms error on the held-out lines, in units of the expected error."""
+    """Compute the rms error on the held-out lines, in units of the expected error."""
     return float(np.sqrt(estimate.held_out_squares / max(estimate.held_out_count, 1)))
 
 
 def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
-    """The same fit with the factors of `find_balancing_factors` on its unknowns; every response is unchanged."""
+    """Scale the unknowns of a fit by the factors of `find_balancing_factors`; every response is unchanged."""
     factors = find_balancing_factors(fit.structure, fit.unknowns)
     return replace(fit, unknowns=fit.unknowns * factors, jacobian=fit.jacobian / factors)
 
 
-def _split_into_rank_one_modes(modes: ModeEstimate, structure: Structure) -> tuple[ModalStructure, FloatArray]:
-    """Rank-one modes, as a structure and its unknowns: a frequency whose shape has a higher rank becomes several
-    modes."""
-    half = len(modes.logs) // 2
-    rows = []
-    for speed, ratio, shape in zip(modes.logs[:half], modes.logs[half:], modes.shapes, strict=True):
+def _split_into_rank_one_modes(estimate: ModeEstimate, structure: Structure) -> tuple[ModalStructure, FloatArray]:
+    """Split modes with shapes of any rank into rank-one modes; returns their structure and unknowns. A frequency whose
+    shape has a higher rank becomes several modes. A delay of a thousandth of a step or less (chosen) becomes zero."""
+    mode_count = len(estimate.logs) // 2
+    mode_unknowns = []
+    for log_frequency, log_damping_ratio, shape in zip(
+        estimate.logs[:mode_count], estimate.logs[mode_count:], estimate.shapes, strict=True
+    ):
         left_vectors, singular_values, right_vectors = np.linalg.svd(shape, full_matrices=False)
         for k in np.flatnonzero(singular_values >= MIN_SINGULAR_VALUE * singular_values[0]):
             root = np.sqrt(singular_values[k] * structure.mass_scale)
-            pole_unknowns = [speed - np.log(structure.speed_scale), ratio]
-            rows.append(np.concatenate([pole_unknowns, root * right_vectors[k], root * left_vectors[:, k]]))
-    modal = ModalStructure(
+            pole_unknowns = [log_frequency - np.log(structure.speed_scale), log_damping_ratio]
+            mode_unknowns.append(np.concatenate([pole_unknowns, root * right_vectors[k], root * left_vectors[:, k]]))
+    modal_structure = ModalStructure(
         structure.inputs,
         structure.outputs,
         structure.quantity,
-        len(rows),
+        len(mode_unknowns),
         structure.mass_scale,
         structure.speed_scale,
         structure.sensor,
-        replace(structure.actuator, delay_s=modes.delay_s if modes.delay_s > 1e-3 * structure.step_s else 0.0),
+        replace(structure.actuator, delay_s=estimate.delay_s if estimate.delay_s > 1e-3 * structure.step_s else 0.0),
         structure.rotational,
     )
-    return modal, np.concatenate(rows)
+    return modal_structure, np.concatenate(mode_unknowns)
 
 
 def _record_trial(estimate: ModeEstimate, structure: Structure, accepted: bool) -> OrderCandidate:
-    modes = len(estimate.logs) // 2
-    parameters = modes * (2 + structure.inputs * structure.outputs)
+    """Record an estimate as an entry of the result. accepted: whether it was adopted."""
+    mode_count = len(estimate.logs) // 2
+    parameter_count = mode_count * (2 + structure.inputs * structure.outputs)
     return OrderCandidate(
-        f"{modes} frequencies, every shape free", modes, parameters, _compute_held_out_error(estimate), accepted
+        f"{mode_count} frequencies, every shape free",
+        mode_count,
+        parameter_count,
+        _compute_held_out_error(estimate),
+        accepted,
     )

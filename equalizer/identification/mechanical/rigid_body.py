@@ -68,7 +68,7 @@ def fit_rigid_body(
     low_hz, high_hz = fit.band_hz
     up_to_hz = min(high_hz, low_hz * 2**RIGID_OCTAVES)
     rigid_settings = replace(
-        settings, band_hz=(low_hz, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
+        settings, band_hz=(low_hz, up_to_hz), most_modes=0, joint=False, fit_delay=False, noncollocated_sensors=False
     )
     level_ratio = _find_largest_amplitude(stronger_recording) / _find_largest_amplitude(weaker_recording)
     stronger_values, weaker_values = (

@@ -34,7 +34,7 @@ def draw_bootstrap_parameters(
     """Draw parameters by a parametric bootstrap, (draws, k), in the order of `IdentifiedModel.parameters`; each row is
     a fit to another draw of complex normal noise. lines: the fitted lines, binned or not. radius: largest magnitude of
     the poles (`stable_poles.Radius`). noise_factor: assumed standard error over 1 / weight, above 1 where residuals
-    exceed the noise. seed: of the random generator; the same seed gives the same draws.
+    exceed the noise. draws: at least one. seed: of the random generator; the same seed gives the same draws.
 
     A covariance from the Jacobian is not used: where the order is higher than the data determine, the response depends
     on some directions of the parameters only beyond first order, and normally distributed draws would be unstable
@@ -42,11 +42,11 @@ def draw_bootstrap_parameters(
     """
     generator = np.random.default_rng(seed)
     modelled_response = fitted.compute_response(lines.z)
-    noise_deviation = noise_factor / lines.weight / np.sqrt(2)
+    part_deviation = noise_factor / lines.weight / np.sqrt(2)
     refitted_parameters = []
     for _ in range(draws):
         real, imaginary = generator.standard_normal((2, *modelled_response.shape))
-        noisy_lines = replace(lines, response=modelled_response + noise_deviation * (real + 1j * imaginary))
+        noisy_lines = replace(lines, response=modelled_response + part_deviation * (real + 1j * imaginary))
         refit = refine_form(fitted.form, noisy_lines, radius, REFIT_STEPS)
         matrices = (refit.form.state_matrix, refit.B, refit.form.C, refit.D)
         refitted_parameters.append(np.concatenate([matrix.ravel() for matrix in matrices]))

@@ -17,7 +17,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 NOISE_POWER_MARGIN = 1.1
 """Multiple of the noise power that counts as noise: only residual power above it is a misfit, because the noise itself
-is estimated from few periods. Heuristic."""
+is estimated from few periods. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +69,9 @@ def compute_misfit(lines: WeightedLines, modelled: ComplexArray, in_band: BoolAr
 
 
 def _compute_lower_noise_bound(variance: FloatArray, parameter_count: int) -> float:
-    """One-sided lower 95 % bound of the noise power in the residuals, by a normal approximation: the relative variance
-    2 / entries counts the scatter of the noise and that of its estimate. variance: noise variance of each complex
-    entry, i.e. of two real numbers, of which the fit of parameter_count parameters absorbs as many."""
+    """Compute the one-sided lower 95 % bound of the noise power in the residuals, by a normal approximation: the
+    relative variance 2 / entries counts the scatter of the noise and that of its estimate. variance: noise variance of
+    each complex entry, i.e. of two real numbers, of which the fit of parameter_count parameters absorbs as many."""
     noise_power = float(variance.sum())
     effective_entries = noise_power**2 / max(float((variance**2).sum()), 1e-300)  # effective number of entries
     return noise_power * (
@@ -84,11 +84,11 @@ def _compute_lower_noise_bound(variance: FloatArray, parameter_count: int) -> fl
 def compute_estimate_misfit(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:
     """Compute the misfit of a model on an estimate's reliable lines within the model's band."""
     lines = weight_lines((estimate,), model.band_hz)
-    modelled, all_lines = compute_model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
-    return compute_misfit(lines, modelled, all_lines, count_unknowns(model.order, *model.D.shape))
+    modelled_response, is_counted = compute_model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
+    return compute_misfit(lines, modelled_response, is_counted, count_unknowns(model.order, *model.D.shape))
 
 
-def count_unknowns(order: int, p: int, m: int) -> int:
-    """Number of identifiable real parameters of a model with p outputs and m inputs: its n (n + m + p) + p m entries
+def count_unknowns(order: int, output_count: int, input_count: int) -> int:
+    """Count the identifiable real parameters of a model with p outputs and m inputs: its n (n + m + p) + p m entries
     less the n² of a change of state coordinates, n = order."""
-    return order * (p + m) + p * m
+    return order * (output_count + input_count) + output_count * input_count

@@ -1,7 +1,7 @@
 """Likely causes of a model's misfit, as sentences; where the evidence is insufficient, the sentences state that.
 
 Evidence: the residual power over the noise power (`cost`), the residuals' correlation between neighbouring lines, poles
-at the decay bound, the error on a test, and the levels of fit and test. All thresholds are heuristic. Called by
+at the decay bound, the error on a test, and the levels of fit and test. All thresholds are chosen. Called by
 `identify`, `identify_recordings` and `study.workflows.equalizer.identify_model`.
 """
 
@@ -37,8 +37,9 @@ def describe_misfit_causes(
     is_bound_binding: bool,
     settings: IdentificationSettings,
 ) -> list[str]:
-    """Remarks on the fit alone, as sentences without full stop. Those on the decay bound come first, because its effect
-    resembles the other causes. cost: residual power over noise power. is_bound_binding: see `RelaxedFit`."""
+    """Describe likely causes by the fit alone, as sentences without full stop. Those on the decay bound come first,
+    because its effect resembles the other causes. cost: residual power over noise power. is_bound_binding: see
+    `RelaxedFit`."""
     bound_s, order = settings.decay_s, settings.order
     remarks = [
         f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
@@ -75,7 +76,7 @@ def describe_misfit_causes(
 def describe_test_error_causes(
     validation: HeldOutValidation | None, cost: float, misfit: Misfit, recordings: Sequence[Recording]
 ) -> tuple[str, ...]:
-    """Remarks, as whole sentences, on clipped sensors and on a test error that neither noise nor the fit's misfit
+    """Describe, in whole sentences, clipped sensors, and a test error that neither noise nor the fit's misfit
     explains. A test error is reported only where its noise is known and the fit's cost is at most `UNEXPLAINED_COST`.
     validation: None = without a test; recordings: those of the fit and of the test."""
     remarks = [
@@ -87,7 +88,7 @@ def describe_test_error_causes(
     expected_error = float(np.hypot(validation.noise or 0.0, misfit.error))
     if validation.noise is None or validation.error <= HELD_OUT_RATIO * expected_error or cost > UNEXPLAINED_COST:
         return tuple(remarks)
-    fit_n, test_n = (_find_largest_amplitude(recordings, test=is_test) for is_test in (False, True))
+    fit_n, test_n = (_find_largest_amplitude(recordings, of_test=is_test) for is_test in (False, True))
     if min(fit_n, test_n) > 0 and max(fit_n, test_n) > LEVEL_RATIO * min(fit_n, test_n):
         remarks.append(
             "The error on the test is larger than that of the fit, and the test was played at another level (up to "
@@ -101,31 +102,32 @@ def describe_test_error_causes(
     return tuple(remarks)
 
 
-def _find_largest_amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
-    """Largest stated amplitude of the segments with the role "test", or of all others; 0 without any."""
+def _find_largest_amplitude(recordings: Sequence[Recording], *, of_test: bool) -> float:
+    """Find the largest stated amplitude (unit of the command) of the segments with the role "test", or of all others; 0
+    without any."""
     amplitudes = [
         segment.amplitude
         for recording in recordings
         for segment in recording.segments
-        if (segment.role == "test") is test
+        if (segment.role == "test") is of_test
     ]
     return max(amplitudes, default=0.0)
 
 
 def _find_clipped_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Response channels that stay at their largest or smallest value for `CLIPPED_PAIRS` or more pairs of successive
-    samples in a recording; constant channels are not reported."""
-    clipped: dict[str, None] = {}
+    """Find the response channels that stay at their largest or smallest value for `CLIPPED_PAIRS` or more pairs of
+    successive samples in a recording; constant channels are not reported."""
+    clipped_channels: dict[str, None] = {}
     for recording in recordings:
         samples = recording.response.samples
         for column, channel in enumerate(recording.response.channels):
-            values = samples[np.isfinite(samples[:, column]), column]
-            for extreme in (values.max(initial=-np.inf), values.min(initial=np.inf)):
-                is_extreme = values == extreme
+            finite_samples = samples[np.isfinite(samples[:, column]), column]
+            for extreme in (finite_samples.max(initial=-np.inf), finite_samples.min(initial=np.inf)):
+                is_extreme = finite_samples == extreme
                 if (
                     np.sum(is_extreme[1:] & is_extreme[:-1]) >= CLIPPED_PAIRS
-                    and np.ptp(values) > 0
+                    and np.ptp(finite_samples) > 0
                     and not is_extreme.all()
                 ):
-                    clipped[channel] = None
-    return tuple(clipped)
+                    clipped_channels[channel] = None
+    return tuple(clipped_channels)

@@ -108,13 +108,13 @@ class _ProjectedFit:
     """Sum of squares of the residual, J."""
 
 
-def refine_form(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: int = 60) -> FittedForm:
+def refine_form(form: ModalForm, lines: WeightedLines, radius: Radius, max_steps: int = 60) -> FittedForm:
     """Refine poles and C to a local minimum of the cost, with all poles within the radius (common, or (blocks,)). Ends
-    after `most_steps` accepted steps (default chosen), a decrease below `LEAST_COST_DECREASE`, or a damping above
+    after `max_steps` accepted steps (default chosen), a decrease below `LEAST_COST_DECREASE`, or a damping above
     `LARGEST_DAMPING`."""
     current_fit = _evaluate_form(form, lines)
     damping, damping_factor = FIRST_DAMPING, 2.0
-    for _ in range(most_steps):
+    for _ in range(max_steps):
         jacobian = _compute_jacobian(current_fit, lines)
         normal_matrix = np.einsum("jra,jrb->ab", jacobian, jacobian, optimize=True)
         gradient = np.einsum("jra,jr->a", jacobian, current_fit.residual, optimize=True)

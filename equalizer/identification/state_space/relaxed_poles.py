@@ -27,9 +27,9 @@ from equalizer.signals.signal import FloatArray
 
 RESOLVED_PERIODS = 4.0
 """Longest resolvable time constant, in periods (1 / line spacing). The flanks of a resonance that is narrower than the
-line spacing still determine its decay, up to the point where they equal those of an undamped mode. Heuristic."""
+line spacing still determine its decay, up to the point where they equal those of an undamped mode. Chosen."""
 SIGNIFICANCE_LEVEL = 1e-3
-"""Significance level of the test: probability that noise alone relaxes a pole."""
+"""Significance level of the test: probability that noise alone relaxes a pole. Chosen."""
 RELAXED_SUFFIX = ", poles relaxed"
 """Suffix of the name of a candidate whose poles were relaxed."""
 
@@ -93,7 +93,8 @@ def refine_and_tighten(candidate: Candidate, lines: WeightedLines, settings: Ide
 
 
 def list_slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tuple[SlowPole, ...]:
-    """Poles of a candidate with a time constant above bound_s, slowest first."""
+    """List the poles of a candidate with a time constant above bound_s (beyond rounding, 1e-9), slowest first; of each
+    pair of real poles the slower one."""
     form = chosen.fitted.form
     first_poles, second_poles = form.poles.reshape(2, -1)
     slower_poles = np.where(np.abs(first_poles) >= np.abs(second_poles), first_poles, second_poles)
@@ -108,19 +109,20 @@ def list_slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) ->
 
 
 def compute_longest_resolved_decay_s(lines: WeightedLines) -> float:
-    """Time constant (s) above which these lines do not distinguish a decay from an undamped mode: `RESOLVED_PERIODS`
-    over the median line spacing; 0 for a single line."""
+    """Compute the time constant (s) above which these lines do not distinguish a decay from an undamped mode:
+    `RESOLVED_PERIODS` over the median line spacing; 0 for a single line."""
     spacings_hz = np.diff(np.unique(lines.frequency_hz))
     return RESOLVED_PERIODS / float(np.median(spacings_hz)) if len(spacings_hz) else 0.0
 
 
 def is_at_bound(fitted: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(blocks,): whether the larger pole of a block lies on the radius, to within 1e-7 of it."""
+    """Whether the pole of larger magnitude of each block, (blocks,), lies on the radius or beyond, with a relative
+    tolerance of 1e-7 for rounding."""
     return np.asarray(_compute_pole_radii(fitted) >= radius * (1 - 1e-7))
 
 
 def _compute_pole_radii(fitted: FittedForm) -> FloatArray:
-    """(blocks,): magnitude of the larger pole."""
+    """Compute the magnitude of the larger pole of each block, (blocks,)."""
     poles = np.abs(fitted.form.poles).reshape(2, -1)
     return np.asarray(poles.max(axis=0))
 
@@ -130,13 +132,13 @@ def _is_bound_binding(
 ) -> bool:
     """Whether lifting the bound for the poles at it lowers the cost by more than noise does, judged from a limited
     number of refinement steps."""
-    at_bound = is_at_bound(chosen.fitted, chosen.radius)
-    if not at_bound.any():
+    is_pole_at_bound = is_at_bound(chosen.fitted, chosen.radius)
+    if not is_pole_at_bound.any():
         return False
     bins = average_about_model(chosen.fitted, lines, settings)
-    radii = np.where(at_bound, limit_radius, chosen.radius)
+    pole_radii = np.where(is_pole_at_bound, limit_radius, chosen.radius)
     relaxed_cost = bins.compute_cost(
-        refine_form(chosen.fitted.form, bins, radii, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+        refine_form(chosen.fitted.form, bins, pole_radii, MOST_BIN_STEPS[-1]).compute_response(bins.z)
     )
     if not _exceeds_noise(
         bins.compute_cost(chosen.fitted.compute_response(bins.z)) - relaxed_cost, relaxed_cost, bins, len(lines)
@@ -155,8 +157,10 @@ def _has_outlying_line(chosen: Candidate, lines: WeightedLines) -> bool:
     line_costs = (np.abs(lines.weight * (chosen.fitted.compute_response(lines.z) - lines.response)) ** 2).sum(
         axis=(1, 2)
     )
-    entries = lines.response[0].size
-    return bool(2 * line_costs.max() / max(chosen.cost, 1.0) > chi2.isf(SIGNIFICANCE_LEVEL / len(lines), 2 * entries))
+    entry_count = lines.response[0].size
+    return bool(
+        2 * line_costs.max() / max(chosen.cost, 1.0) > chi2.isf(SIGNIFICANCE_LEVEL / len(lines), 2 * entry_count)
+    )
 
 
 def _tighten_poles(
@@ -164,29 +168,29 @@ def _tighten_poles(
 ) -> Candidate:
     """Return poles to the ordinary bound, slowest first, where that raises the cost by no more than noise would."""
     ordinary_radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
-    pole_radii, entries = _compute_pole_radii(relaxed.fitted), lines.response.size
+    pole_radii, entry_count = _compute_pole_radii(relaxed.fitted), lines.response.size
     name = f"{relaxed.name.removesuffix(RELAXED_SUFFIX)}{RELAXED_SUFFIX}"
     tightened = replace(
         relaxed, name=name, radius=np.where(pole_radii > ordinary_radius, limit_radius, ordinary_radius)
     )
     for block in [int(k) for k in np.argsort(-pole_radii) if pole_radii[k] > ordinary_radius]:
-        radii = np.array(tightened.radius)
-        radii[block] = ordinary_radius
+        trial_radii = np.array(tightened.radius)
+        trial_radii[block] = ordinary_radius
         form = tightened.fitted.form
-        a, b = stabilise_blocks(form.a, form.b, radii)
-        trial = refine_candidate(name, complete_form(replace(form, a=a, b=b), lines), lines, settings, radii)
-        increase = entries * (trial.cost - relaxed.cost)
-        if trial.has_acceptable_gain and not _exceeds_noise(increase, entries * relaxed.cost, lines, len(lines)):
+        a, b = stabilise_blocks(form.a, form.b, trial_radii)
+        trial = refine_candidate(name, complete_form(replace(form, a=a, b=b), lines), lines, settings, trial_radii)
+        increase = entry_count * (trial.cost - relaxed.cost)
+        if trial.has_acceptable_gain and not _exceeds_noise(increase, entry_count * relaxed.cost, lines, len(lines)):
             tightened = trial
     return tightened
 
 
 def _lowers_cost(tightened: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
     """Whether a pole is still relaxed, and the cost fell by more than noise alone explains."""
-    entries = lines.response.size
-    decrease = entries * (chosen.cost - tightened.cost)
+    entry_count = lines.response.size
+    decrease = entry_count * (chosen.cost - tightened.cost)
     return bool(np.any(tightened.radius > np.min(tightened.radius))) and _exceeds_noise(
-        decrease, entries * tightened.cost, lines, len(lines)
+        decrease, entry_count * tightened.cost, lines, len(lines)
     )
 
 
@@ -194,6 +198,8 @@ def _exceeds_noise(decrease: float, remaining: float, lines: WeightedLines, test
     """Whether the fall `decrease` of the cost, to `remaining`, exceeds that of a resonance fitted to noise at the best
     of `tested_lines` lines: chi-squared with 2 (p + m + 1) degrees of freedom. Residuals larger than the noise count as
     the noise."""
-    p, m = lines.response.shape[1:]
+    output_count, input_count = lines.response.shape[1:]
     noise_scale = max(remaining / lines.response.size, 1.0)
-    return bool(2 * decrease / noise_scale > chi2.isf(SIGNIFICANCE_LEVEL / tested_lines, 2 * (p + m + 1)))
+    return bool(
+        2 * decrease / noise_scale > chi2.isf(SIGNIFICANCE_LEVEL / tested_lines, 2 * (output_count + input_count + 1))
+    )

@@ -1,8 +1,8 @@
 """Frequency lines that a model is fitted to: measured responses, weighted by the inverse of their standard errors.
 
 With circular complex Gaussian noise of variance E|error|² = 1 / weight², the weighted sum of squares is the negative
-log-likelihood, up to a constant. `weight_lines` prepares the data for `identify`; `average_bins` reduces them
-for `candidates`.
+log-likelihood, up to a constant. `weight_lines` prepares the data, called by `refusals` (for `identify`)
+and `misfit`; `candidates` reduces them by `group_lines` and `average_bins`.
 """
 
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-LEAST_RELATIVE_NOISE = 1e-9
-"""Least standard error, relative to the largest magnitude of all entries, so that noise-free data have finite weights.
-Chosen: far below measured noise."""
+MIN_RELATIVE_NOISE = 1e-9
+"""Smallest standard error, relative to the largest magnitude of all entries, so that noise-free data have finite
+weights. Chosen: far below measured noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,12 +41,13 @@ class WeightedLines:
         return len(self.frequency_hz)
 
     def compute_cost(self, modelled: ComplexArray) -> float:
-        """Weighted sum of squares of a model's responses (lines, outputs, inputs): the negative log-likelihood up to a
-        constant, for noise whose E|error|² is 1 / weight²."""
+        """Compute the weighted sum of squares of a model's responses (lines, outputs, inputs): the negative
+        log-likelihood up to a constant, for noise whose E|error|² is 1 / weight²."""
         return float((np.abs(self.weight * (modelled - self.response)) ** 2).sum())
 
     def compute_relative_error(self, modelled: ComplexArray) -> FloatArray:
-        """(lines,): Frobenius norm of modelled minus measured response, over the rms norm of the measured responses."""
+        """Compute, (lines,), the Frobenius norm of modelled minus measured response, over the rms norm of the measured
+        responses."""
         rms_norm = np.sqrt((np.abs(self.response) ** 2).sum(axis=(1, 2)).mean())
         return np.asarray(np.linalg.norm(modelled - self.response, axis=(1, 2)) / rms_norm, dtype=np.float64)
 
@@ -55,24 +56,27 @@ def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, f
     """Join the reliable, finite lines of the band (Hz, limits included) of all estimates, one or more, in ascending
     order with weights. Where the noise of an entry is not known, it is estimated from the scatter between lines
     (`estimate_scatter_variance`)."""
-    in_band = [estimate.select_band(*band_hz) for estimate in responses]
+    band_estimates = [estimate.select_band(*band_hz) for estimate in responses]
     reliable_estimates = [
         estimate.select_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2)))
-        for estimate in in_band
+        for estimate in band_estimates
     ]
     reliable_estimates = [estimate for estimate in reliable_estimates if len(estimate)]
     if not reliable_estimates:
-        p, m = len(responses[0].output_channels), len(responses[0].input_channels)
+        output_count, input_count = len(responses[0].output_channels), len(responses[0].input_channels)
         return WeightedLines(
-            np.empty(0), np.empty((0, p, m), complex), np.empty((0, p, m)), responses[0].sample_rate_hz
+            np.empty(0),
+            np.empty((0, output_count, input_count), complex),
+            np.empty((0, output_count, input_count)),
+            responses[0].sample_rate_hz,
         )
     frequency_hz = np.concatenate([estimate.frequency_hz for estimate in reliable_estimates])
-    ascending = np.argsort(frequency_hz, kind="stable")
-    response = np.concatenate([estimate.response for estimate in reliable_estimates])[ascending]
-    variance = np.concatenate([_complete_noise_variance(estimate) for estimate in reliable_estimates])[ascending]
-    least_error = LEAST_RELATIVE_NOISE * float(np.abs(response).max())
-    weight = 1 / np.sqrt(np.maximum(variance, least_error**2))
-    return WeightedLines(frequency_hz[ascending], response, weight, reliable_estimates[0].sample_rate_hz)
+    ascending_order = np.argsort(frequency_hz, kind="stable")
+    response = np.concatenate([estimate.response for estimate in reliable_estimates])[ascending_order]
+    variance = np.concatenate([_complete_noise_variance(estimate) for estimate in reliable_estimates])[ascending_order]
+    min_error = MIN_RELATIVE_NOISE * float(np.abs(response).max())
+    weight = 1 / np.sqrt(np.maximum(variance, min_error**2))
+    return WeightedLines(frequency_hz[ascending_order], response, weight, reliable_estimates[0].sample_rate_hz)
 
 
 def _complete_noise_variance(estimate: FrequencyResponse) -> FloatArray:
@@ -116,12 +120,12 @@ def compute_bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> Float
     return np.array([lines.frequency_hz[bin_lines].mean() for bin_lines in bins])
 
 
-def group_lines(lines: WeightedLines, least_lines: int, octave_share: float) -> tuple[slice, ...]:
+def group_lines(lines: WeightedLines, min_lines: int, octave_share: float) -> tuple[slice, ...]:
     """Group neighbouring lines into consecutive slices: each of all lines less than `octave_share` octaves above its
-    first line, and of at least `least_lines` lines, the last slice excepted."""
+    first line, and of at least `min_lines` lines, the last slice excepted."""
     edges, frequency_hz = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]
         octave_end = int(np.searchsorted(frequency_hz, frequency_hz[start] * 2**octave_share))
-        edges.append(min(max(start + least_lines, octave_end), len(lines)))
+        edges.append(min(max(start + min_lines, octave_end), len(lines)))
     return tuple(slice(start, stop) for start, stop in pairwise(edges))

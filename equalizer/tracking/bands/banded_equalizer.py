@@ -2,7 +2,8 @@
 
 An identified model is valid in a limited band only. Low band: inverse dynamics of a rigid model along a planned motion
 (`low_band`). Middle: linear-quadratic tracking with the identified model (`lqr`). High: one degree of freedom along the
-direction of least force (`high_band`). The forces are added. Without edges in the split, all is middle band.
+direction of the smallest peak force (`high_band`). The forces are added. Without edges in the split, all is middle
+band. Called by `narrow_and_wide_models`.
 
 Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²).
 """
@@ -40,12 +41,13 @@ from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
-LEAST_PADDING_S = 0.3
+MIN_PADDING_S = 0.3
 """Least duration (s) of the zeros added before and after the reference. The inverse is non-causal: a constant force
-causes no lasting acceleration, so that forces begin before and end after the reference acceleration."""
+causes no lasting acceleration, so that forces begin before and end after the reference acceleration. Chosen, as the
+default of `lqr.padding.Padding`."""
 PADDING_DECAYS = 6.0
 """Duration of the padding, in time constants of the low band's return to rest. A shorter padding would cut off a force
-that has not decayed, which excites the device."""
+that has not decayed, which excites the device; after six, exp(-6) = 0.25 % remains. Chosen."""
 MIN_FORCE_WEIGHT, MAX_FORCE_WEIGHT = 1e-3, 1e-2
 """Allowed range of the force weight R (`TrackingWeights.weight`), (m/s² per N)². Below it, forces drift at frequencies
 outside the identified band; above it, the delivered level is too low. Chosen by hand."""
@@ -66,8 +68,9 @@ class HighBand:
     source: ResponseSource
     """Frequency response of the device over the whole high band."""
     settings: HighBandSettings = field(default_factory=HighBandSettings)
-    """Its `causal` is replaced by that of the split."""
+    """Settings; `causal` is replaced by whether the split is causal."""
     stylus: StylusActuator | None = None
+    """None where the motors render the whole high band."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,28 +86,33 @@ class CapPolicy:
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedEqualizer:
     """The equalizer of a device. Raises ValueError if the split and the models disagree on bands or sample rate, for a
-    force weight outside 1e-3 to 1e-2, and for a stylus actuator with a causal split."""
+    force weight outside its allowed range, and for a stylus actuator with a causal split."""
 
     middle: IdentifiedModel
-    """Identified model, used for the middle band."""
+    """Identified model of the middle band."""
     split: LinearPhaseSplit | CausalSplit
     """Filters that split the reference into bands. With a causal split all forces are causal: they begin with the first
     row of the reference, as at a contact."""
     low: LowBand | None = None
+    """None exactly where the split has no lower edge."""
     high: HighBand | None = None
+    """None exactly where the split has no upper edge."""
     weights: TrackingWeights = field(default_factory=TrackingWeights)
+    """Weights of the middle band's tracking."""
     spring: VirtualSpring = NO_SPRING
     """Spring of the device's control loop, whose force is subtracted from the commands."""
 
     def __post_init__(self) -> None:
-        for name, edge_hz, band_model in (
+        for band_name, edge_hz, band_model in (
             ("low", self.split.edges.low_hz, self.low),
             ("high", self.split.edges.high_hz, self.high),
         ):
             if edge_hz is not None and band_model is None:
-                raise ValueError(f"the split has a {name} band beyond {edge_hz:g} Hz, but there is no model to play it")
+                raise ValueError(
+                    f"the split has a {band_name} band beyond {edge_hz:g} Hz, but there is no model to play it"
+                )
             if edge_hz is None and band_model is not None:
-                raise ValueError(f"there is a model for a {name} band, but the split has none")
+                raise ValueError(f"there is a model for a {band_name} band, but the split has none")
         if self.causal and self.high is not None and self.high.stylus is not None:
             raise ValueError(
                 "the share of a stylus actuator has no causal form: it would begin before the contact; use a "
@@ -138,18 +146,18 @@ class BandedEqualizer:
     def compute_forces(self, reference: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
         """Compute the forces of all three bands for a reference acceleration. reference: (n, p), m/s²; cap: None = no
         limit. Raises ForceLimitError for forces above the cap, TrackingError if no forces under it are found."""
-        bands = self.split.split(self._pad(reference))
-        low, motion = self._compute_low_forces(bands.low)
+        bands = self.split.split(self._pad_reference(reference))
+        low_forces, motion = self._compute_low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)
-        middle_track = track(compute_stored_gains(problem, len(low)), bands.middle)
-        middle, middle_response, loss = middle_track.forces, middle_track.predicted, None
-        high, stylus_share = self._compute_high_forces(bands.high, low + middle)
-        other_forces = low if high is None else low + high.forces
+        middle_track = track(compute_stored_gains(problem, len(low_forces)), bands.middle)
+        middle_forces, middle_response, loss = middle_track.forces, middle_track.predicted, None
+        high_result, stylus_share = self._compute_high_forces(bands.high, low_forces + middle_forces)
+        other_forces = low_forces if high_result is None else low_forces + high_result.forces
         if cap is not None and cap.constrain:
-            capped = track_under_cap(problem, bands.middle, cap.cap_n, other_forces)
-            middle, middle_response, loss = capped.forces, capped.predicted, capped.loss
-        total_forces = middle + other_forces
-        by_band = (low, middle, other_forces - low)
+            capped_track = track_under_cap(problem, bands.middle, cap.cap_n, other_forces)
+            middle_forces, middle_response, loss = capped_track.forces, capped_track.predicted, capped_track.loss
+        total_forces = middle_forces + other_forces
+        by_band = (low_forces, middle_forces, other_forces - low_forces)
         return BandedForces(
             commands=total_forces - self._compute_spring_force(motion, middle_response),
             total_forces=total_forces,
@@ -160,21 +168,22 @@ class BandedEqualizer:
             peaks=None if cap is None else require_under_cap(total_forces, cap.cap_n, self._rate_hz),
             loss=loss,
             motion=motion,
-            high=high,
+            high=high_result,
             stylus=stylus_share,
         )
 
     @property
     def _rate_hz(self) -> float:
+        """Sample rate (Hz) of the model and the split."""
         return self.middle.sample_rate_hz
 
     @property
     def _padding_rows(self) -> int:
         """Number of rows of zeros before and after the reference."""
         padding_decay_s = 0.0 if self.low is None else PADDING_DECAYS / (2 * np.pi * self.low.corner_hz)
-        return int(np.ceil(max(LEAST_PADDING_S, padding_decay_s) * self._rate_hz))
+        return int(np.ceil(max(MIN_PADDING_S, padding_decay_s) * self._rate_hz))
 
-    def _pad(self, reference: FloatArray) -> FloatArray:
+    def _pad_reference(self, reference: FloatArray) -> FloatArray:
         """Pad reference (n, p) with zeros, to a length for which the FFT is fast; if causal, only at the end."""
         rows_before = 0 if self.causal else self._padding_rows
         filter_rows = 2 * self.split.latency_samples
@@ -187,13 +196,13 @@ class BandedEqualizer:
         return np.pad(np.asarray(reference, dtype=np.float64), ((rows_before, rows_after), (0, 0)))
 
     def _plan_motion(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
-        """Motion whose acceleration is `acceleration` (N, p) above a corner frequency: causal or with zero phase, as
-        the split is."""
+        """Plan the motion whose acceleration is `acceleration` (N, p), m/s², above a corner frequency: by a causal
+        filter for a causal split, else by a zero-phase one."""
         plan_for_split = plan_motion_causally if self.causal else plan_motion
         return plan_for_split(acceleration, self._rate_hz, corner_hz)
 
     def _compute_low_forces(self, reference: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
-        """Forces (N, m) of the low band and its planned motion; zeros and None without a low band."""
+        """Compute the forces (N, m) of the low band and its planned motion; zeros and None without a low band."""
         if self.low is None:
             return np.zeros((len(reference), self.middle.B.shape[1])), None
         motion = self._plan_motion(reference, self.low.corner_hz)
@@ -202,7 +211,8 @@ class BandedEqualizer:
     def _compute_high_forces(
         self, reference: FloatArray, other_forces: FloatArray
     ) -> tuple[HighBandForces | None, StylusShare | None]:
-        """Forces of the high band, and the share of the stylus. other_forces: (N, m), the forces of the other bands."""
+        """Compute the forces of the high band and the share of the stylus; None where absent. other_forces: (N, m), N,
+        the forces of the other bands."""
         if self.high is None:
             return None, None
         one_dof_reference = project_to_one_dof(reference) if self.causal else reduce_to_one_dof(reference)
@@ -216,24 +226,28 @@ class BandedEqualizer:
         ), stylus_share
 
     def _compute_spring_force(self, motion: SlowMotion | None, middle_response: FloatArray) -> FloatArray:
-        """(N, m), N: force -(k x + b v) of the virtual spring along the motion of the low and the middle band; that of
-        the high band is negligible. middle_response: (N, p), m/s², predicted acceleration of the middle band."""
+        """Compute the force -(k x + b v), (N, m), N, of the virtual spring along the motion of the low and the middle
+        band; that of the high band is negligible. middle_response: (N, p), m/s², predicted acceleration of the middle
+        band."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m
         if k == b == 0:
             return np.zeros_like(middle_response)
-        motions = [self._plan_motion(middle_response, CORNER_HZ)] + ([] if motion is None else [motion])
+        planned_motions = [self._plan_motion(middle_response, CORNER_HZ)] + ([] if motion is None else [motion])
         force: FloatArray = -sum(
-            (k * planned.position_m + b * planned.velocity_m_s for planned in motions), np.zeros(())
+            (k * motion_part.position_m + b * motion_part.velocity_m_s for motion_part in planned_motions), np.zeros(())
         )
         return force
 
     def _predict_bands(
         self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, middle_response: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Predicted acceleration (N, p) of each band: by the high band's frequency response if there is a high band,
-        because it covers all frequencies; else by each band's own model. middle_response: that of the middle model."""
+        """Predict the acceleration (N, p), m/s², of each band: by the high band's frequency response if there is a high
+        band, because it covers all frequencies; else by each band's model. middle_response: that of the middle model.
+        """
         if self.high is not None:
-            low, middle, high = (predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band)
-            return low, middle, high
+            low_acceleration, middle_acceleration, high_acceleration = (
+                predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band
+            )
+            return low_acceleration, middle_acceleration, high_acceleration
         zeros = np.zeros_like(middle_response)
         return zeros if motion is None else motion.acceleration, middle_response, zeros

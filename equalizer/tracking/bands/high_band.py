@@ -1,4 +1,4 @@
-"""The high band: acceleration matching with one degree of freedom, along the direction that needs the least force.
+"""The high band: acceleration matching with one degree of freedom, along the direction of the smallest peak force.
 
 Above the limit of direction perception a person perceives the strength of a vibration but hardly its direction. The
 reference acceleration is therefore reduced to a single signal of the same spectral energy and played along a single
@@ -17,9 +17,9 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
+MIN_WEIGHT, MAX_WEIGHT = 1e-3, 1e-2
 """Allowed range of the weight of |force|², to be compared with |G|², (m/s² per N)². A smaller weight amplifies noise at
-antiresonances; with a larger weight the level at weak lines is too low. Both chosen."""
+antiresonances; with a larger weight the level at lines of low gain is too low. Both chosen."""
 DEFAULT_WEIGHT = 1e-3
 """Default weight of |force|² against |error|², (m/s² per N)²: the smallest allowed."""
 SPIRAL_DIRECTION_COUNT = 64
@@ -57,18 +57,18 @@ class MeasuredResponse:
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, p, m): interpolated response, m/s² per N, at frequencies (lines,), Hz."""
-        channels = self.response.reshape(len(self.frequency_hz), -1)
-        columns = []
-        for column in channels.T:
-            magnitude = np.interp(frequency_hz, self.frequency_hz, np.abs(column))
-            phase = np.interp(frequency_hz, self.frequency_hz, np.unwrap(np.angle(column)))
-            columns.append(magnitude * np.exp(1j * phase))
-        return np.stack(columns, axis=1).reshape(len(frequency_hz), *self.response.shape[1:])
+        flat_response = self.response.reshape(len(self.frequency_hz), -1)
+        interpolated_channels = []
+        for channel_response in flat_response.T:
+            magnitude = np.interp(frequency_hz, self.frequency_hz, np.abs(channel_response))
+            phase = np.interp(frequency_hz, self.frequency_hz, np.unwrap(np.angle(channel_response)))
+            interpolated_channels.append(magnitude * np.exp(1j * phase))
+        return np.stack(interpolated_channels, axis=1).reshape(len(frequency_hz), *self.response.shape[1:])
 
 
 @dataclass(frozen=True, slots=True)
 class HighBandSettings:
-    """Settings of the high band. Raises ValueError for a weight outside `SMALLEST_WEIGHT` to `LARGEST_WEIGHT`."""
+    """Settings of the high band. Raises ValueError for a weight outside `MIN_WEIGHT` to `MAX_WEIGHT`."""
 
     weight: float = DEFAULT_WEIGHT
     """Weight of |force|², (m/s² per N)²."""
@@ -78,8 +78,8 @@ class HighBandSettings:
     """Whether forces start with the first row: the inverse then has the same magnitude and minimum phase."""
 
     def __post_init__(self) -> None:
-        if not SMALLEST_WEIGHT <= self.weight <= LARGEST_WEIGHT:
-            raise ValueError(f"weight is {self.weight}; it must be within {SMALLEST_WEIGHT:g} and {LARGEST_WEIGHT:g}")
+        if not MIN_WEIGHT <= self.weight <= MAX_WEIGHT:
+            raise ValueError(f"weight is {self.weight}; it must be within {MIN_WEIGHT:g} and {MAX_WEIGHT:g}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,9 +91,9 @@ class HighBandForces:
     direction: FloatArray
     """(m,): unit vector of the force."""
     peak_n: float
-    """Peak (N) of the norm of the sum of these and the other forces."""
+    """Peak (N) of the norm of the sum of these and the added forces."""
     peak_by_axis_n: FloatArray
-    """(m,): that peak (N) for forces along each single axis, for comparison."""
+    """(m,): that peak (N) for forces along each single axis, with the better sign, for comparison."""
 
 
 def reduce_to_one_dof(reference: FloatArray) -> FloatArray:
@@ -102,7 +102,7 @@ def reduce_to_one_dof(reference: FloatArray) -> FloatArray:
     rendering, 2010)."""
     spectrum = np.fft.rfft(reference, axis=0)
     magnitude = np.linalg.norm(spectrum, axis=1)
-    # The sum over axes vanishes where axes cancel each other; the phase is then that of the strongest axis.
+    # The sum over axes vanishes to rounding (1e-9) where axes cancel; the phase is then that of the strongest axis.
     spectrum_sum = spectrum.sum(axis=1)
     strongest_spectrum = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
     phase = np.angle(np.where(np.abs(spectrum_sum) > 1e-9 * magnitude, spectrum_sum, strongest_spectrum))
@@ -114,9 +114,13 @@ def project_to_one_dof(reference: FloatArray) -> FloatArray:
     `reduce_to_one_dof` it is causal: each row depends on the same row of `reference`, apart from direction and
     scale."""
     direction = np.linalg.svd(reference, full_matrices=False)[2][0]
-    projected = reference @ direction
-    projected_norm = float(np.linalg.norm(projected))
-    return np.asarray(projected * (np.linalg.norm(reference) / projected_norm) if projected_norm > 0 else projected)
+    projected_reference = reference @ direction
+    projected_norm = float(np.linalg.norm(projected_reference))
+    return np.asarray(
+        projected_reference * (np.linalg.norm(reference) / projected_norm)
+        if projected_norm > 0
+        else projected_reference
+    )
 
 
 def compute_high_band_forces(
@@ -127,12 +131,12 @@ def compute_high_band_forces(
     settings: HighBandSettings | None = None,
 ) -> HighBandForces:
     """Compute the forces along the direction of the smallest peak. reference: (N,), m/s², one degree of freedom; unless
-    causal, at rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N,
-    further forces, which are included in the peak."""
+    causal, at rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N, forces of the
+    other bands, which are included in the peak; None = zeros. settings: None = defaults."""
     settings = settings or HighBandSettings()
     fft_length = 2 * len(reference) if settings.causal else len(reference)
     response = source.at(compute_lines_hz(fft_length, sample_rate_hz))
-    other_forces_n = (
+    added_forces_n = (
         np.zeros((len(reference), response.shape[2]))
         if added_forces is None
         else np.asarray(added_forces, dtype=np.float64)
@@ -149,7 +153,7 @@ def compute_high_band_forces(
         for sign in (1.0, -1.0)
     ]
     peaks_n = np.array(
-        [np.linalg.norm(forces + other_forces_n, axis=1).max(initial=0.0) for forces in candidate_forces]
+        [np.linalg.norm(forces + added_forces_n, axis=1).max(initial=0.0) for forces in candidate_forces]
     )
     best_index = int(peaks_n.argmin())
     peak_by_axis_n = peaks_n.reshape(-1, 2).min(axis=1)[: response.shape[2]]
@@ -167,9 +171,9 @@ def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: Resp
     return np.asarray(np.fft.irfft(response, fft_length, axis=0)[: len(forces)])
 
 
-def compute_lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
-    """Compute (samples // 2 + 1,): frequencies (Hz) of the lines of a real FFT of `samples` samples."""
-    return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
+def compute_lines_hz(sample_count: int, sample_rate_hz: float) -> FloatArray:
+    """Compute the frequencies (Hz), (sample_count // 2 + 1,), of the lines of a real FFT of sample_count samples."""
+    return np.asarray(np.fft.rfftfreq(sample_count, 1 / sample_rate_hz), dtype=np.float64)
 
 
 def _compute_force_along(
@@ -194,18 +198,18 @@ def compute_minimum_phase(gain: FloatArray) -> ComplexArray:
     """
     fft_length = 2 * (len(gain) - 1)
     # A zero, as at 0 Hz, has no logarithm: it is replaced by the rounding error of the largest gain.
-    floor = max(np.finfo(float).eps * float(gain.max()), np.finfo(float).tiny)
-    cepstrum = np.fft.irfft(np.log(np.maximum(gain, floor)), fft_length)
+    min_gain = max(np.finfo(float).eps * float(gain.max()), np.finfo(float).tiny)
+    cepstrum = np.fft.irfft(np.log(np.maximum(gain, min_gain)), fft_length)
     cepstrum[1 : fft_length // 2] *= 2
     cepstrum[fft_length // 2 + 1 :] = 0
     return np.asarray(np.exp(np.fft.rfft(cepstrum)))
 
 
-def _list_candidate_directions(inputs: int, with_oblique: bool) -> list[FloatArray]:
-    """List the unit vectors (inputs,) that are tried: the axes; with three inputs, if `with_oblique`, also a
+def _list_candidate_directions(input_count: int, with_oblique: bool) -> list[FloatArray]:
+    """List the unit vectors (input_count,) that are tried: the axes; with three inputs, if `with_oblique`, also a
     golden-angle spiral over the half sphere."""
-    axes = list(np.eye(inputs))
-    if not with_oblique or inputs != 3:
+    axes = list(np.eye(input_count))
+    if not with_oblique or input_count != 3:
         return axes
     z = 1 - (2 * np.arange(SPIRAL_DIRECTION_COUNT) + 1) / (2 * SPIRAL_DIRECTION_COUNT)
     azimuth = np.pi * (1 + np.sqrt(5)) * np.arange(SPIRAL_DIRECTION_COUNT)

@@ -19,12 +19,13 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.bands.rigid_model import RigidModel
 
 CORNER_HZ = 0.5
-"""Corner of the high-pass filter: lower frequencies would move the handle out of its workspace."""
+"""Default corner of the high-pass filter: lower frequencies would move the handle out of its workspace. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlowMotion:
-    """Position, velocity and acceleration, (N, m) each; consistent, as each is the derivative of the one before."""
+    """Position, velocity and acceleration, (N, m) each. They are consistent: the velocity is the derivative of the
+    position, the acceleration that of the velocity."""
 
     position_m: FloatArray
     velocity_m_s: FloatArray
@@ -45,16 +46,18 @@ def plan_motion(reference: FloatArray, sample_rate_hz: float, corner_hz: float =
     acceleration is real, f² / (f² + corner²), so that there is no phase error.
     """
     a, corner_rad_s = np.asarray(reference, dtype=np.float64), _convert_corner_to_rad_per_s(corner_hz, sample_rate_hz)
-    # Zeros over eight time constants, so that the kernel does not wrap around the ends.
+    # Zeros over eight time constants, after which exp(-8) of the kernel remains: it does not wrap around the ends.
     padding_rows = int(np.ceil(8 * sample_rate_hz / corner_rad_s))
     padded_acceleration = np.pad(a, ((padding_rows, padding_rows), (0, 0)))
     s = 2j * np.pi * np.fft.rfftfreq(len(padded_acceleration), 1 / sample_rate_hz)[:, None]
-    position = np.fft.rfft(padded_acceleration, axis=0) / (s**2 - corner_rad_s**2)
-    signals = [
+    position_spectrum = np.fft.rfft(padded_acceleration, axis=0) / (s**2 - corner_rad_s**2)
+    position_and_velocity = [
         np.fft.irfft(spectrum, len(padded_acceleration), axis=0)[padding_rows:][: len(a)]
-        for spectrum in (position, s * position)
+        for spectrum in (position_spectrum, s * position_spectrum)
     ]
-    return SlowMotion(signals[0], signals[1], a + corner_rad_s**2 * signals[0])
+    return SlowMotion(
+        position_and_velocity[0], position_and_velocity[1], a + corner_rad_s**2 * position_and_velocity[0]
+    )
 
 
 def plan_motion_causally(reference: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:

@@ -5,7 +5,7 @@ complete friction would count it twice, which is worse than no compensation. It 
 which the effects were subtracted (`subtract_effects`). Where there is only a model, the equivalent for a sinusoid of
 the identification's amplitude (`compute_equivalent_impedance`, a describing function) is subtracted. This is an
 approximation: it does not describe an axis that stuck while another was swept. Called by `equalize_trajectory`;
-`subtract_effects` uses the same laws and axes.
+`subtract_effects` uses its functions for laws, axes and gains.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,12 +37,13 @@ from equalizer.tracking.feedforward.band_pass import compute_band_gain, find_pad
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion, integrate_motion
 from equalizer.tracking.learning.iteration import find_largest_share
 
-SLIP_SHARE = 0.05
-"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity. With a smaller
-velocity, errors of the planned velocity near zero would switch the force back and forth; with a larger velocity, too
-little would be compensated. Chosen by hand."""
+SMOOTHING_SHARE = 0.05
+"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity; for an effect on
+the command, the force below which the correction changes sign smoothly, relative to the rms force. A smaller share
+would let errors of the planned velocity near zero switch the force back and forth; a larger one would compensate too
+little. Chosen by hand."""
 
-LEAST_SPEED_MPS = 1e-9
+MIN_SPEED_AMPLITUDE_MPS = 1e-9
 """Least velocity amplitude (m/s) in the identification, assumed for an axis that did not move: keeps the describing
 function finite."""
 
@@ -58,7 +59,7 @@ class Compensation:
     not_used: tuple[tuple[ModelEffect, str], ...]
     """Effects that are not compensated, with the reason."""
     share: float
-    """Factor, 0 to 1, by which the compensation was scaled to fit under the cap; 1 = complete."""
+    """Factor, 0 to 1, by which the compensation was scaled to keep the forces under the cap; 1 = complete."""
 
 
 def compensate(
@@ -73,8 +74,9 @@ def compensate(
     that begin and end at rest; p = m, in the same order of axes.
 
     identified_with_n: amplitude (N) of the sinusoidal forces (sweeps of one axis after the other) with which the model
-    was identified on the device with the effects; None = the model does not contain them. Raises ValueError for shapes
-    that differ, an amplitude that is not above zero, and an axis that the model does not have.
+    was identified on the device with the effects; None = the model does not contain them. cap_n: cap (N) on the norm of
+    the force vector; None = no cap. Raises ValueError for shapes that differ, an amplitude that is not above zero, and
+    an axis that the model does not have.
     """
     if forces.shape != reference.shape:
         raise ValueError(f"forces of shape {forces.shape} do not match the wanted accelerations, {reference.shape}")
@@ -85,23 +87,23 @@ def compensate(
         integrate_motion(reference, rate_hz, model.band_hz, compute_lead_s(physics, rate_hz)), physics
     )
     effect_reasons = [(effect, explain_not_compensated(effect, model.input_channels)) for effect in physics.effects]
-    compensated = tuple(effect for effect, reason in effect_reasons if not reason)
+    compensated_effects = tuple(effect for effect, reason in effect_reasons if not reason)
     axis_gains = compute_axis_gains(physics, model.input_channels, model.output_channels)
-    scaled_forces, compensating = forces.copy(), np.zeros_like(forces)
-    for effect, axis in _iterate_effects_by_axis(compensated, model):
+    scaled_forces, compensating_forces = forces.copy(), np.zeros_like(forces)
+    for effect, axis in _iterate_effects_by_axis(compensated_effects, model):
         if effect.kind in LAWS or _is_force_law(effect):
-            compensating[:, axis] += (
+            compensating_forces[:, axis] += (
                 _compute_force_beyond_model(effect, axis, motion, model, identified_with_n) / axis_gains[axis]
             )
-    for effect, axis in _iterate_effects_by_axis(compensated, model):
+    for effect, axis in _iterate_effects_by_axis(compensated_effects, model):
         if effect.kind == "force_deadband":
-            _compensate_deadband(effect.parameters, scaled_forces, compensating, axis, identified_with_n)
+            _compensate_deadband(effect.parameters, scaled_forces, compensating_forces, axis, identified_with_n)
         elif effect.law is not None and not _is_force_law(effect):
-            _compensate_command_map(effect.law, scaled_forces, compensating, axis, identified_with_n)
-    added_forces = scaled_forces + compensating - forces
+            _compensate_command_map(effect.law, scaled_forces, compensating_forces, axis, identified_with_n)
+    added_forces = scaled_forces + compensating_forces - forces
     scale = 1.0 if cap_n is None else find_largest_share(forces, added_forces, cap_n)
     not_used = tuple((effect, reason) for effect, reason in effect_reasons if reason)
-    return Compensation(forces + scale * added_forces, compensated, not_used, scale)
+    return Compensation(forces + scale * added_forces, compensated_effects, not_used, scale)
 
 
 def convert_motion_to_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
@@ -120,16 +122,16 @@ def find_effect_axes(effect: ModelEffect, inputs: tuple[str, ...], outputs: tupl
     """Find the indices of the axes that an effect acts on, by the name of an input or output channel or its last
     letter; all where the effect has no axis. Raises ValueError for an unknown axis, and for different numbers of
     channels."""
-    matches = tuple(
+    axis_indices = tuple(
         index
         for index, channels in enumerate(zip(inputs, outputs, strict=True))
         if effect.axis is None or any(effect.axis in (channel, channel[-1:]) for channel in channels)
     )
-    if not matches:
+    if not axis_indices:
         raise ValueError(
             f"{effect.kind} is on the axis '{effect.axis}', but there are {', '.join(inputs)} and {', '.join(outputs)}"
         )
-    return matches
+    return axis_indices
 
 
 def compute_axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> FloatArray:
@@ -142,9 +144,9 @@ def compute_axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], output
 
 
 def compute_slip_speed(velocity: FloatArray) -> float:
-    """Compute the velocity below which a friction force changes sign smoothly: SLIP_SHARE of the rms of velocity (N,),
-    in its unit."""
-    return SLIP_SHARE * float(np.sqrt(np.mean(velocity**2)))
+    """Compute the velocity below which a friction force changes sign smoothly: `SMOOTHING_SHARE` of the rms of velocity
+    (N,), N >= 1, in its unit."""
+    return SMOOTHING_SHARE * float(np.sqrt(np.mean(velocity**2)))
 
 
 def _iterate_effects_by_axis(
@@ -170,13 +172,16 @@ def _compute_force_beyond_model(
     lines_hz = np.asarray(np.fft.rfftfreq(padded_length, 1 / model.sample_rate_hz), dtype=np.float64)
     band_lines = np.flatnonzero(compute_band_gain(lines_hz, model.band_hz) > 0)
     direct_gain = np.abs(compute_model_response(model, lines_hz[band_lines])[:, axis, axis])
-    speed_amplitudes = np.maximum(direct_gain * identified_with_n / (2 * np.pi * lines_hz[band_lines]), LEAST_SPEED_MPS)
-    equivalent = np.zeros(len(lines_hz), dtype=np.complex128)
-    equivalent[band_lines] = compute_equivalent_impedance(
-        law, effect.parameters, lines_hz[band_lines], speed_amplitudes, SLIP_SHARE
+    speed_amplitudes = np.maximum(
+        direct_gain * identified_with_n / (2 * np.pi * lines_hz[band_lines]), MIN_SPEED_AMPLITUDE_MPS
+    )
+    equivalent_impedance = np.zeros(len(lines_hz), dtype=np.complex128)
+    equivalent_impedance[band_lines] = compute_equivalent_impedance(
+        law, effect.parameters, lines_hz[band_lines], speed_amplitudes, SMOOTHING_SHARE
     )
     return np.asarray(
-        force - np.fft.irfft(equivalent * np.fft.rfft(velocity, padded_length), padded_length)[: len(velocity)]
+        force
+        - np.fft.irfft(equivalent_impedance * np.fft.rfft(velocity, padded_length), padded_length)[: len(velocity)]
     )
 
 
@@ -191,9 +196,9 @@ def evaluate_force_law(
     command_channels_and_rate: channels of the commands, and the sample rate (Hz). slip_mps: speed below which a change
     of sign is smoothed, m/s; for 0 (an axis at rest), the force of a law of `LAWS` is zero."""
     if effect.law is not None:
-        letters = derive_axis_letters(command_channels_and_rate[0])
-        force = compute_compensating_force(effect.law, letters, motion, command_channels_and_rate[1], slip_mps)
-        return make_single_axis_law(effect.law, letters, axis), force
+        axis_letters = derive_axis_letters(command_channels_and_rate[0])
+        force = compute_compensating_force(effect.law, axis_letters, motion, command_channels_and_rate[1], slip_mps)
+        return make_single_axis_law(effect.law, axis_letters, axis), force
     law, velocity = LAWS[effect.kind], motion.velocity[:, axis]
     if slip_mps == 0:
         return law, np.zeros_like(velocity)
@@ -206,30 +211,37 @@ def _is_force_law(effect: ModelEffect) -> bool:
 
 
 def _compensate_command_map(
-    law: DiscoveredLaw, scaled_forces: FloatArray, compensating: FloatArray, axis: int, identified_with_n: float | None
+    law: DiscoveredLaw,
+    scaled_forces: FloatArray,
+    compensating_forces: FloatArray,
+    axis: int,
+    identified_with_n: float | None,
 ) -> None:
-    """Change the commands in place so that a command map (a discovered law) turns them into the intended forces."""
+    """Change column `axis` of both arrays (N, m), N, in place, so that a command map (a discovered law) turns their sum
+    into the intended force: scale scaled_forces by the linear share of the map at the amplitude identified_with_n, and
+    add to compensating_forces the command minus the intended force."""
     if identified_with_n is not None:
         scaled_forces[:, axis] *= compute_linear_share(law, identified_with_n)
-    intended_n = scaled_forces[:, axis] + compensating[:, axis]
-    slip_n = SLIP_SHARE * float(np.sqrt(np.mean(intended_n**2)))
-    compensating[:, axis] += invert_command_map(law, intended_n, slip_n) - intended_n
+    intended_n = scaled_forces[:, axis] + compensating_forces[:, axis]
+    slip_n = SMOOTHING_SHARE * float(np.sqrt(np.mean(intended_n**2)))
+    compensating_forces[:, axis] += invert_command_map(law, intended_n, slip_n) - intended_n
 
 
 def _compensate_deadband(
     parameters: Mapping[str, float],
     scaled_forces: FloatArray,
-    compensating: FloatArray,
+    compensating_forces: FloatArray,
     axis: int,
     identified_with_n: float | None,
 ) -> None:
-    """Change the commands in place so that the forces after a dead band are the intended forces: the force that the
-    dead band removes, (1 - jump) width (N), is added in the direction of the force, smoothly near zero. Intended forces
-    below the jump, which no command gives, are not played."""
+    """Change column `axis` of both arrays (N, m), N, in place, so that the force after a dead band is the intended one:
+    the force that the dead band removes, (1 - jump) width (N), is added in the direction of the force, smoothly near
+    zero. scaled_forces is first scaled as in `_compensate_command_map`. Intended forces below the jump, which no
+    command gives, are not played."""
     if identified_with_n is not None:
         scaled_forces[:, axis] *= compute_deadband_share(parameters, identified_with_n)
-    intended_n = scaled_forces[:, axis] + compensating[:, axis]
+    intended_n = scaled_forces[:, axis] + compensating_forces[:, axis]
     rms_n = float(np.sqrt(np.mean(intended_n**2)))
     if rms_n > 0:
         deadband_loss_n = (1.0 - parameters.get("jump", 0.0)) * parameters["width"]
-        compensating[:, axis] += deadband_loss_n * np.tanh(intended_n / (SLIP_SHARE * rms_n))
+        compensating_forces[:, axis] += deadband_loss_n * np.tanh(intended_n / (SMOOTHING_SHARE * rms_n))

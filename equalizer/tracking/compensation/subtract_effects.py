@@ -77,8 +77,8 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
         acts_on = "force" if effect.law is None else effect.law.acts_on
         if acts_on == "force" and effect.kind != "force_deadband" and not explain_not_compensated(effect, inputs):
             for axis in find_effect_axes(effect, inputs, outputs):
-                slip_speed = max(compute_slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
+                slip_mps = max(compute_slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
                 commands[:, axis] -= (
-                    evaluate_force_law(effect, axis, motion, (inputs, rate_hz), slip_speed)[1] / axis_gains[axis]
+                    evaluate_force_law(effect, axis, motion, (inputs, rate_hz), slip_mps)[1] / axis_gains[axis]
                 )
     return replace(recording, command=replace(recording.command, samples=commands))

@@ -15,7 +15,11 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, compute_regularised_inverse, invert_regularised
+from equalizer.tracking.feedforward.periodic_inverse import (
+    FORCE_WEIGHT,
+    compute_regularised_inverse,
+    invert_regularised,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +98,7 @@ def fit_rigid_body_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> 
 
 
 def invert_measured_response(
-    measured_response: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT
+    measured_response: FrequencyResponse, frequency_hz: FloatArray, weight: float = FORCE_WEIGHT
 ) -> Inverse:
     """Regularised inverse of the measured response, interpolated linearly between its reliable lines. weight: of
     |force|², (m/s² per N)². Cost: FIR filters whose length in seconds is the inverse of the smallest line spacing.
@@ -120,7 +124,7 @@ def invert_measured_response(
     return Inverse("raw estimate", invert_regularised(np.asarray(G, dtype=complex), weight), tap_count * p * m)
 
 
-def make_identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
+def make_identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = FORCE_WEIGHT) -> Inverse:
     """Regularised inverse of the identified model. weight: of |force|², (m/s² per N)². Cost: state update and stored
     gains, with a full state matrix; less in modal form."""
     m, p = model.D.shape[1], model.D.shape[0]

@@ -3,10 +3,10 @@ model.
 
 The reference is first limited to the model's band, because the model is not valid outside it; the result states the
 share outside. There is one row of forces per row of the reference, from rest. Forces above a cap are refused, or solved
-again under the cap with the loss stated (`constrained`). Called by `workspace.feedforward_at_place` (a single model)
-and `bands.narrow_and_wide_models` (the middle band of two models); exported as `equalizer.equalize`. The band and its
-edges are also used by `realtime.realtime_controller` and `study.workflows.equalizer`. Sizes: N rows (samples), m
-inputs, p outputs.
+again under the cap with the loss stated (`lqr.constrained`). Called by `workspace.feedforward_at_place` (a single
+model) and `bands.narrow_and_wide_models` (the middle band of two models); exported as `equalizer.equalize`. The band
+and its edges are also used by `realtime.realtime_controller` and `study.workflows.equalizer`. Sizes: N rows (samples),
+m inputs, p outputs.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class FeedforwardSettings:
     weight: float = 1e-3
     """R = weight I, of |u|² against the squared tracking error, (m/s² per N)². Default chosen by hand."""
     cap_n: float = 3.0
-    """Largest norm of the force vector of a row, N."""
+    """Largest norm of the force vector of a row, N. Default chosen."""
     constrain: bool = False
     """Where forces exceed the cap: False raises ForceLimitError; True solves again under the cap and states the
     loss."""
@@ -152,13 +152,13 @@ def solve_causally(
     the forces did not have to be constrained. With `settings.constrain`, the sum of the forces and other_forces (N, m)
     is kept under the cap; otherwise the cap is not applied here. reference: (N, p), m/s². Raises TrackingError as
     `track_padded` and `track_under_cap`."""
-    unconstrained = track_padded(problem, reference, CAUSAL).forces
-    total_forces = unconstrained if other_forces is None else unconstrained + other_forces
+    unconstrained_forces = track_padded(problem, reference, CAUSAL).forces
+    total_forces = unconstrained_forces if other_forces is None else unconstrained_forces + other_forces
     if not settings.constrain or find_force_peaks(total_forces, settings.cap_n).is_under_cap:
-        return unconstrained, None
+        return unconstrained_forces, None
     padding = (0, CAUSAL.count_rows(problem.sample_rate_hz)[1]), (0, 0)
     padded_other_forces = None if other_forces is None else np.pad(other_forces, padding)
-    capped_forces = track_under_cap(
+    capped_track = track_under_cap(
         problem, np.pad(reference, padding), settings.cap_n, padded_other_forces, CapSettings(gap=DUALITY_GAP)
     )
-    return capped_forces.forces[: len(reference)], capped_forces.loss
+    return capped_track.forces[: len(reference)], capped_track.loss

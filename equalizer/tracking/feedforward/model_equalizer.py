@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, compute_periodic_command
+from equalizer.tracking.feedforward.periodic_inverse import FORCE_WEIGHT, compute_periodic_command
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.lqr.lqr import (
     StoredGains,
@@ -34,7 +34,7 @@ class ModelEqualizer:
     spring: VirtualSpring = NO_SPRING
     """Virtual spring whose force the device's control loop adds to the commands, from which it is therefore
     subtracted."""
-    weight: float = WEIGHT
+    weight: float = FORCE_WEIGHT
     """Weight of |force|² against |acceleration error|², (m/s² per N)²."""
 
     def __post_init__(self) -> None:
@@ -43,7 +43,7 @@ class ModelEqualizer:
 
     @property
     def name(self) -> str:
-        """Kind, order and band of the model, for a session's log."""
+        """Kind, order and band (Hz) of the model, for a session's log."""
         low_hz, high_hz = self.model.band_hz
         return f"identified model, order {self.model.order}, {low_hz:g} to {high_hz:g} Hz"
 
@@ -59,9 +59,10 @@ class ModelEqualizer:
         return compute_periodic_command(self.model, reference, self.weight, self.spring)
 
     def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> Signal:
-        """Compute the forces (ticks, m), in N, from rest into the loop. Little transient follows, because the deviation
-        of the final state from the loop's is weighted by the observability Gramian. reference: one loop, as in
-        `compute_loop_commands`; envelope: (ticks,), factor on it. Raises as `compute_loop_commands`."""
+        """Compute the forces (ticks, m), in N, from rest into the loop. The transient at the start of the loop is
+        small, because the deviation of the final state from the loop's is weighted by the observability Gramian.
+        reference: one loop, as in `compute_loop_commands`; envelope: (ticks,), factor on it. Raises as
+        `compute_loop_commands`."""
         onset_ticks, loop_ticks = len(envelope), len(reference)
         gains = _compute_onset_gains(self.model, self.weight, onset_ticks)
         loop = compute_periodic_command(self.model, reference, self.weight)
@@ -71,7 +72,7 @@ class ModelEqualizer:
         faded_reference = envelope[:, None] * reference.samples[np.arange(onset_ticks) % loop_ticks]
         forces = track(gains, faded_reference, final_state=loop_state).forces
         return Signal(
-            forces - self._compute_onset_spring_force(reference, loop, envelope), *_list_force_properties(loop)
+            forces - self._compute_onset_spring_force(reference, loop, envelope), *_get_signal_properties(loop)
         )
 
     def _compute_onset_spring_force(self, reference: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
@@ -83,14 +84,14 @@ class ModelEqualizer:
         return faded_force
 
 
-def _list_force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
-    """List sample rate, quantity, unit and channels of a force signal, in the order of the fields of `Signal`."""
+def _get_signal_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
+    """Return sample rate, quantity, unit and channels of a signal, in the order of the fields of `Signal`."""
     return loop.sample_rate_hz, loop.quantity, loop.unit, loop.channels
 
 
 @lru_cache(maxsize=8)
-def _compute_onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
-    """Compute the gains of the tracking problem over `samples` steps; cached, because this takes longer than all other
-    steps of an onset."""
+def _compute_onset_gains(model: IdentifiedModel, weight: float, sample_count: int) -> StoredGains:
+    """Compute the gains of the tracking problem over sample_count steps. The last 8 results are cached, because this
+    takes longer than the rest of an onset; 8 is chosen."""
     problem = make_tracking_problem(model, TrackingWeights(weight))
-    return compute_stored_gains(problem, samples, compute_free_decay_weight(problem))
+    return compute_stored_gains(problem, sample_count, compute_free_decay_weight(problem))

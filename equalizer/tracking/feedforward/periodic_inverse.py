@@ -2,7 +2,8 @@
 
 In the steady state every spectral line is independent: with the response G from forces to outputs and the weight w, the
 forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the reference output y. Called by
-`model_equalizer`, `baselines` and `workspace.models_at_place`.
+`model_equalizer`, `baselines`, `workspace.models_at_place` and `study.evaluation.reproduction`; `feedforward` and
+`bands.narrow_and_wide_models` use the check of a reference.
 """
 
 import numpy as np
@@ -12,12 +13,12 @@ from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
-WEIGHT = 1e-4
-"""Weight w of |force|² against |acceleration error|², (m/s² per N)². It costs a thousandth of a decibel where
-the device's gain is 1 m/s² per N, and keeps the force finite at antiresonances."""
+FORCE_WEIGHT = 1e-4
+"""Weight w of |force|² against |acceleration error|², (m/s² per N)². Chosen: it lowers the response by
+0.001 dB where the device's gain is 1 m/s² per N, and keeps the force finite at antiresonances."""
 
 ROUNDING_SHARE = 1e-9
-"""Fraction of the largest spectral line below which a line counts as a rounding error and gets no force."""
+"""Fraction of the largest spectral line below which a line counts as a rounding error and gets no force. Chosen."""
 
 
 class OutsideBandError(ValueError):
@@ -25,7 +26,7 @@ class OutsideBandError(ValueError):
 
 
 def compute_regularised_inverse(
-    model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
+    model: IdentifiedModel, frequency_hz: FloatArray, weight: float = FORCE_WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> ComplexArray:
     """Compute the commands per reference output, (lines, m, p), N per unit of the output: H = (G* G + weight I)^-1 G*,
     the total force that enters the plant, less the part of it that the virtual spring supplies."""
@@ -44,9 +45,9 @@ def invert_regularised(G: ComplexArray, weight: float) -> ComplexArray:
 
 
 def compute_periodic_command(
-    model: IdentifiedModel, reference: Signal, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
+    model: IdentifiedModel, reference: Signal, weight: float = FORCE_WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> Signal:
-    """Compute one period of forces (N, m) for one period of reference outputs (N, p).
+    """Compute one period of forces (N, m), in newtons, for one period of reference outputs (N, p), N >= 1.
 
     Raises OutsideBandError where the reference has content outside the model's band, ValueError for a rate, a number of
     channels or units other than the model's.
@@ -67,16 +68,16 @@ def compute_periodic_command(
 
 
 def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
-    """Check that a model covers the frequencies of a signal. Raises OutsideBandError for frequencies that the model
-    does not cover."""
+    """Check that a model covers the frequencies of a signal. Raises OutsideBandError for a frequency outside the
+    model's band, limits included, with a relative tolerance of 1e-9 for rounding."""
     low_hz, high_hz = model.band_hz
     outside_hz = [
         line_hz for line_hz in np.atleast_1d(frequency_hz) if not low_hz * (1 - 1e-9) <= line_hz <= high_hz * (1 + 1e-9)
     ]
     if outside_hz:
-        listed = ", ".join(f"{line_hz:g}" for line_hz in outside_hz[:5]) + (" ..." if len(outside_hz) > 5 else "")
+        listed_hz = ", ".join(f"{line_hz:g}" for line_hz in outside_hz[:5]) + (" ..." if len(outside_hz) > 5 else "")
         raise OutsideBandError(
-            f"the model was made for {low_hz:g} to {high_hz:g} Hz, but {listed} Hz is wanted; identify a model of a "
+            f"the model was made for {low_hz:g} to {high_hz:g} Hz, but {listed_hz} Hz is wanted; identify a model of a "
             "wider band (hapteq identify --band)"
         )
 

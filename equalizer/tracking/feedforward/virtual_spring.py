@@ -2,7 +2,8 @@
 
 The input of an identified model is the total force f on the plant. Where the control loop adds the force f_s of the
 spring to the command u, the command is u = f - f_s with f_s = -(k x + b v), where x and v are the planned displacement
-and velocity of the handle, k is the stiffness and b the damping.
+and velocity of the handle, k is the stiffness and b the damping. Used by the equalizers that subtract the spring's
+force from the commands (`model_equalizer`, `bands`, `workspace`, `learning`) and by `study.workflows`.
 """
 
 import math
@@ -28,8 +29,8 @@ class VirtualSpring:
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
     def compute_force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Transfer function (lines,) from the handle's acceleration to the spring's force, N per m/s²: -(k + b s) / s²
-        with s = 2 pi i f. frequency_hz: (lines,), above zero."""
+        """Compute the transfer function (lines,) from the handle's acceleration to the spring's force, N per m/s²:
+        -(k + b s) / s² with s = 2 pi i f. frequency_hz: (lines,), above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
         return np.asarray(-(self.stiffness_n_per_m + self.damping_n_s_per_m * s) / s**2)
 

@@ -62,12 +62,12 @@ def predict_convergence(
             f"inverse and response have shapes {inverse.shape} and {response.shape[1:]}; both must be (lines, p, p): "
             "as many forces as responses"
         )
-    in_band = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
-    if not in_band.any():
+    is_in_band = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
+    if not is_in_band.any():
         raise ValueError(f"no line lies in the band of {band_hz[0]:g} to {band_hz[1]:g} Hz")
-    loop_response = np.asarray(response[:, in_band] @ inverse[in_band], dtype=np.complex128)
+    loop_response = np.asarray(response[:, is_in_band] @ inverse[is_in_band], dtype=np.complex128)
     remaining_shares = np.linalg.svd(np.eye(inverse.shape[1]) - beta * loop_response, compute_uv=False)[..., 0]
-    return Convergence(frequency_hz[in_band], remaining_shares.max(axis=0), beta, _compute_safe_beta(loop_response))
+    return Convergence(frequency_hz[is_in_band], remaining_shares.max(axis=0), beta, _compute_safe_beta(loop_response))
 
 
 def _compute_safe_beta(loop_response: ComplexArray) -> float:

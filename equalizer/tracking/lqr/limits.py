@@ -1,8 +1,10 @@
-"""Force limit (cap): forces above it are refused with the largest scale that is allowed, and never clipped.
+"""Force limit (cap): forces above it are refused, with the largest scale that is allowed; they are not clipped.
 
-Clipping would distort the wanted acceleration without notice. The cap (N) limits the Euclidean norm of the force vector
-of each row, so that it holds in every direction. `project_to_cap` is the projection step of ADMM in `constrained`.
-Forces are arrays (N, m) in newtons: N rows (samples), m axes.
+Clipping would distort the reference acceleration without notice. The cap (N) limits the Euclidean norm of the force
+vector of each row, so that it holds in every direction. `project_to_cap` is the projection step of the iteration in
+`constrained` (ADMM), whose result satisfies the cap. Called by the modules that compute forces
+(`feedforward.feedforward`, `bands`, `workspace`, `constrained`) and by `study.workflows.equalizer`. Forces are arrays
+(N, m) in newtons: N rows (samples), m axes.
 """
 
 from dataclasses import dataclass
@@ -26,6 +28,7 @@ class ForcePeaks:
 
     cap_n: float
     peak_n: float
+    """Largest norm (N); 0 for no rows."""
     peak_row: int
     """First row with the largest norm."""
     share_above: float
@@ -38,7 +41,7 @@ class ForcePeaks:
 
     @property
     def largest_scale(self) -> float:
-        """Largest factor on the wanted acceleration at which no force exceeds the cap; infinite for forces of 0."""
+        """Largest factor on the reference acceleration at which no force exceeds the cap; infinite for forces of 0."""
         return self.cap_n / self.peak_n if self.peak_n > 0 else float("inf")
 
 

@@ -39,7 +39,8 @@ def compute_feedforward(
     AB: FloatArray, linear_costs: FloatArray, K: FloatArray, H_inverse: FloatArray, v: FloatArray, g: FloatArray
 ) -> None:
     """Fill g (N, m), the feedforward of the forces. v: (n,), costate after the last row; overwritten by the costate at
-    the first row. AB: [A B], (n, n + m); linear_costs: r' Q [C D] of each row, (N, n + m)."""
+    the first row. AB: [A B], (n, n + m); linear_costs: r' Q [C D] of each row, (N, n + m); K: (N, m, n), feedback
+    gains; H_inverse: (N, m, m)."""
     n, m = AB.shape[0], g.shape[1]
     s = np.empty(n + m)
     for k in range(g.shape[0] - 1, -1, -1):
@@ -66,7 +67,7 @@ def simulate(
     step: FloatArray, K: FloatArray, g: FloatArray, x: FloatArray, forces: FloatArray, predicted: FloatArray
 ) -> None:
     """Fill forces (N, m), u = g - K x, and predicted (N, p). x: (n,), state at the start; overwritten by the state at
-    the end. step: [A B; C D]', (n + m, n + p)."""
+    the end. step: [A B; C D]', (n + m, n + p); K: (N, m, n); g: (N, m)."""
     m, n = K.shape[1], K.shape[2]
     z, s = np.empty(n + m), np.empty(step.shape[1])
     z[:n] = x
@@ -98,8 +99,9 @@ def simulate_tick(
 ) -> None:
     """Simulate step k of a transient: u = sum over c of direction_c g_kc - K_k x_k, zero for k >= N.
 
-    g: (N, m, c); direction: (c,); work: (2 n + m + p,), in this order: n numbers, the state, overwritten by the next
-    state; m, the force of this step; n, work space; p, the model's response at this step. step: as for `simulate`.
+    K: (N, m, n); g: (N, m, c); direction: (c,); work: (2 n + m + p,), in this order: n numbers, the state, overwritten
+    by the next state; m, the force of this step; n, work space; p, the model's response at this step. step: as for
+    `simulate`.
     """
     m, n = K.shape[1], K.shape[2]
     for i in range(m):

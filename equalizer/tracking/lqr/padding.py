@@ -4,7 +4,7 @@ A row is the sample of all channels at one time. The inverse of a device is non-
 trajectory and end after it, within the padding. Where only the rows of the trajectory are played, from rest, the forces
 before the first row are lost, and the other forces were computed for an initial motion that does not exist. No padding
 before the trajectory (`CAUSAL`) is then best: it gives the optimal forces among those that start with the first row.
-Called by `feedforward`, `contact`, `narrow_and_wide_models` and `realtime_controller`.
+Called by `feedforward`, `contact`, `narrow_and_wide_models`, `realtime_controller` and `study.workflows.equalizer`.
 """
 
 from dataclasses import dataclass
@@ -108,6 +108,6 @@ def compute_band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[fl
     of the unscaled FFT. Samples (N, channels) are zero-padded to at least twice their length, so that the end does not
     wrap around, and so that the lines are at most a quarter of the bandwidth apart."""
     fft_length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
-    line_hz = np.fft.rfftfreq(fft_length, 1 / rate_hz)
-    spectrum = np.fft.rfft(samples, fft_length, axis=0)[(line_hz >= band_hz[0]) & (line_hz <= band_hz[1])]
+    lines_hz = np.fft.rfftfreq(fft_length, 1 / rate_hz)
+    spectrum = np.fft.rfft(samples, fft_length, axis=0)[(lines_hz >= band_hz[0]) & (lines_hz <= band_hz[1])]
     return np.concatenate((spectrum.real, spectrum.imag))

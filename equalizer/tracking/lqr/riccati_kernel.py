@@ -7,8 +7,8 @@ The equations are those of `lqr`, whose W_k is F here, with the Cholesky factor 
 
 Where the forces can cancel nearly all of the cost (feedthrough without force weight), P_k is a difference of nearly
 equal numbers: rounding may leave a negative eigenvalue, which each further step multiplies by the square of the model's
-unstable zeros. `riccati.compute_backward_gains`, which updates a factor of P, is used then. All called functions are in
-this file, because numba invalidates its cache by file.
+unstable zeros. `riccati.compute_backward_gains`, which updates a factor of P, is used then. Called by `lqr`. All
+compiled functions that the recursion calls are in this file, because numba invalidates its cache by file.
 """
 
 import numpy as np
@@ -24,10 +24,10 @@ CANCELLATION_LIMIT = float(np.sqrt(np.finfo(np.float64).eps))
 
 
 @njit(types.boolean(_OUTPUT_MATRIX, types.int64), cache=True, nogil=True)
-def _eliminate(M: FloatArray, n: int) -> bool:
-    """Cholesky factorisation and forward substitution, in place: the last rows of M, [F H], become [W L] with L L' = H
-    and L W = F. Of H, only the lower triangle is read. Returns False where H is not positive definite beyond rounding.
-    """
+def _factorise_in_place(M: FloatArray, n: int) -> bool:
+    """Factorise H (Cholesky) and substitute forward, in place: the last rows of M, [F H], become [W L] with L L' = H
+    and L W = F. M: (n + m, n + m). Of H, only the lower triangle is read. Returns False where H is not positive
+    definite beyond rounding."""
     for i in range(n, M.shape[0]):
         pivot = M[i, i]
         for j in range(n, i):
@@ -48,8 +48,8 @@ def _eliminate(M: FloatArray, n: int) -> bool:
 
 
 @njit(types.void(_OUTPUT_MATRIX, types.int64, _OUTPUT_MATRIX, _OUTPUT_MATRIX), cache=True, nogil=True)
-def _solve(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
-    """Fill K = L'⁻¹ W, (m, n), and H⁻¹ = L'⁻¹ L⁻¹, (m, m), from the result of `_eliminate`."""
+def _compute_gain_and_inverse(M: FloatArray, n: int, K: FloatArray, H_inverse: FloatArray) -> None:
+    """Fill K = L'⁻¹ W, (m, n), and H⁻¹ = L'⁻¹ L⁻¹, (m, m), from the result of `_factorise_in_place`."""
     m = M.shape[0] - n
     for i in range(m):
         for c in range(m):
@@ -79,8 +79,8 @@ def _compute_cost_to_go(AB: FloatArray, stage_cost: FloatArray, P: FloatArray, M
 
 @njit(types.boolean(_OUTPUT_MATRIX, types.int64, _OUTPUT_MATRIX), cache=True, nogil=True)
 def _update_weight(M: FloatArray, n: int, P: FloatArray) -> bool:
-    """Fill P = M[:n, :n] - W' W, exactly symmetric. Returns False where a diagonal entry lost more than half of its
-    digits by cancellation."""
+    """Fill P = M[:n, :n] - W' W, (n, n), exactly symmetric; the lower triangle of M[:n, :n] is overwritten. Returns
+    False where a diagonal entry lost more than half of its digits by cancellation."""
     is_accurate = True
     for i in range(n):
         minuend = M[i, i]
@@ -103,13 +103,13 @@ def run_backward_recursion(
     AB: [A B], (n, n + m); stage_cost: (n + m, n + m). Returns False, with incomplete results, where a force has no
     effect on the cost at some step, or rounding errors matter.
     """
-    n, samples = P.shape[0], K.shape[0]
+    n, step_count = P.shape[0], K.shape[0]
     M = np.empty_like(stage_cost)
-    for k in range(samples - 1, -1, -1):
+    for k in range(step_count - 1, -1, -1):
         _compute_cost_to_go(AB, stage_cost, P, M)
-        if not _eliminate(M, n):
+        if not _factorise_in_place(M, n):
             return False
-        _solve(M, n, K[k], H_inverse[k])
+        _compute_gain_and_inverse(M, n, K[k], H_inverse[k])
         if not _update_weight(M, n, P):
             return False
     return True

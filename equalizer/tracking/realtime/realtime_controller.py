@@ -3,7 +3,8 @@
 Both are linear-quadratic trackers that give a force vector per tick. Transient: a table of accelerations that is known
 beforehand, rotated into any direction while it is played (`changing_direction`). Stream: accelerations that arrive
 while they are played, split into bands by causal filters; the model's band is tracked with limited preview (`preview`).
-Neither uses a measured signal as feedback.
+Neither uses a measured signal as feedback. Called by `study.workflows.equalizer.controller`; `controller_cases`
+computes test cases of the C code from it.
 """
 
 from dataclasses import dataclass
@@ -42,11 +43,13 @@ class RealtimeSettings:
     above zero."""
 
     weight: float = 1e-3
-    """Weight of |force|² against |acceleration error|² in the quadratic cost, (m/s² per N)²."""
+    """Weight of |force|² against |acceleration error|² in the quadratic cost, (m/s² per N)². Default as in
+    `FeedforwardSettings`; chosen."""
     preview_s: float = 0.2
-    """Preview (s): how far ahead of its playback a stream is known. Its delay is the preview, less one sample."""
+    """Preview (s): how far ahead of its playback a stream is known. Its delay is the preview, less one sample.
+    Default chosen."""
     cap_n: float = 3.0
-    """Limit of the norm of the force vector, N."""
+    """Limit of the norm of the force vector, N. Default as in `FeedforwardSettings`; chosen."""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.preview_s) and self.preview_s >= 0):
@@ -60,11 +63,15 @@ class RealtimeController:
     """Both controllers of a model: `transient`, and `tracker` with the filters `split` for streams."""
 
     tracker: PreviewTracker
+    """Preview tracker of the middle band of a stream."""
     split: CausalSplit
+    """Causal filters at the edges of the model's band."""
     transient: TurningTransient
+    """Controller of the transient, for any direction."""
     loss: PreviewLoss
     """Tracking loss of a stream by limited preview, predicted by the model; without the loss by the causal filters."""
     cap_n: float
+    """Limit (N) of the norm of the force vector, which the C code applies."""
 
     @property
     def problem(self) -> TrackingProblem:
@@ -79,8 +86,12 @@ class RealtimeController:
         """
         bands = self.split.split(reference)
         delay_rows = len(self.tracker) - 1
-        track = track_stream(self.tracker, np.pad(bands.middle, ((delay_rows, 0), (0, 0))))
-        return bands, TrackResult(track.forces[: len(reference)], track.predicted[: len(reference)], track.final_state)
+        tracked_stream = track_stream(self.tracker, np.pad(bands.middle, ((delay_rows, 0), (0, 0))))
+        return bands, TrackResult(
+            tracked_stream.forces[: len(reference)],
+            tracked_stream.predicted[: len(reference)],
+            tracked_stream.final_state,
+        )
 
 
 def make_realtime_controller(
@@ -110,11 +121,11 @@ def make_realtime_controller(
 
 
 def make_default_transient(model: IdentifiedModel) -> FloatArray:
-    """The default transient, accelerations (N, p) in m/s²: exp(-t / TRANSIENT_DECAY_S) sin(2 pi f t) at the last
+    """Make the default transient, accelerations (N, p) in m/s²: exp(-t / TRANSIENT_DECAY_S) sin(2 pi f t) at the last
     output, zero at the others; f is the centre of the model's band."""
     low_hz, high_hz = model.band_hz
     time_s = np.arange(round(TRANSIENT_S * model.sample_rate_hz)) / model.sample_rate_hz
     acceleration = np.zeros((len(time_s), model.C.shape[0]))
-    middle_hz = (low_hz + high_hz) / 2
-    acceleration[:, -1] = np.exp(-time_s / TRANSIENT_DECAY_S) * np.sin(2 * np.pi * middle_hz * time_s)
+    center_hz = (low_hz + high_hz) / 2
+    acceleration[:, -1] = np.exp(-time_s / TRANSIENT_DECAY_S) * np.sin(2 * np.pi * center_hz * time_s)
     return acceleration

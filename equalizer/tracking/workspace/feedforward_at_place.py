@@ -22,7 +22,7 @@ from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 
-def compute_feedforward_at(
+def compute_feedforward_at_place(
     place_models: ModelsAtPlace, reference: Signal, settings: FeedforwardSettings
 ) -> Feedforward:
     """Compute feedforward forces at a place: the weighted sum of the forces of all models with a weight above zero.
@@ -42,11 +42,11 @@ def compute_feedforward_at(
     forces = np.asarray(
         sum(force_weight * result.forces.samples for force_weight, result in weighted_results), dtype=np.float64
     )
-    most_weighted = max(weighted_results, key=lambda weighted_result: weighted_result[0])[1]
+    main_result = max(weighted_results, key=lambda weighted_result: weighted_result[0])[1]
     cap_losses = [result.loss for _, result in weighted_results if result.loss is not None]
     return replace(
-        most_weighted,
-        forces=replace(most_weighted.forces, samples=forces),
+        main_result,
+        forces=replace(main_result.forces, samples=forces),
         error=max(result.error for _, result in weighted_results),
         peaks=require_under_cap(forces, settings.cap_n, reference.sample_rate_hz),
         loss=max(cap_losses, key=lambda loss: loss.error_capped, default=None),
@@ -68,7 +68,7 @@ def select_used_models(place_models: ModelsAtPlace) -> tuple[tuple[float, Identi
     return tuple((force_weight, replace(model, band_hz=band_hz)) for force_weight, model in weighted_models)
 
 
-def make_inverse_at(place_models: ModelsAtPlace, weight: float) -> InverseOfLength:
+def make_inverse_at_place(place_models: ModelsAtPlace, weight: float) -> InverseOfLength:
     """Make the weighted sum of the inverse operators of all models at a place, for iterative learning control. weight:
     R = weight I, of |u|², (m/s² per N)²."""
     weighted_inverses = [

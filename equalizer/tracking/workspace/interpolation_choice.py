@@ -14,8 +14,8 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
-from equalizer.tracking.feedforward.quality import Quality, measure_quality
+from equalizer.tracking.feedforward.periodic_inverse import FORCE_WEIGHT
+from equalizer.tracking.feedforward.quality import ResponseQuality, measure_quality
 from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
@@ -45,9 +45,9 @@ class PlaceCheck:
     """Errors of both interpolations at a held-out place, by the reference response there."""
 
     place_m: Place
-    blended: Quality
+    blended: ResponseQuality
     """Quality of the equalized response with blended forces."""
-    modal: Quality | None
+    modal: ResponseQuality | None
     """Quality with modal interpolation; None where resonances could not be matched between the other places."""
     blended_error: float
     """Error with blended forces: rms over the lines of the largest singular value of T - I, with T from target to
@@ -74,7 +74,7 @@ class InterpolationChoice:
     def find_models_at(self, place_m: Place) -> ModelsAtPlace:
         """Find the models and weights for a place (m) by the chosen interpolation. A place outside the convex hull of
         the models gets those of the nearest place inside, with a remark."""
-        return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
+        return self.modal.interpolate_at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 
 def make_held_out_place(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
@@ -87,7 +87,7 @@ def make_held_out_place(model: IdentifiedModel, band_hz: tuple[float, float]) ->
 
 
 def choose_interpolation(
-    workspace: WorkspaceModels, held_out_places: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
+    workspace: WorkspaceModels, held_out_places: Sequence[HeldOutPlace] = (), weight: float = FORCE_WEIGHT
 ) -> InterpolationChoice:
     """Choose between modal and blended interpolation: by the responses at `held_out_places`; without any, by leaving
     out in turn each model that lies between the others, which tests a coarser grid than the grid in use. Blended forces
@@ -104,7 +104,7 @@ def choose_interpolation(
     checks = tuple(
         [_check_place(workspace, modal, place, weight) for place in held_out_places]
         if held_out_places
-        else [_check_place(*fold, weight) for fold in _leave_one_out(workspace)]
+        else [_check_place(*fold, weight) for fold in _list_leave_one_out_folds(workspace)]
     )
     return _choose_by_checks(workspace, modal, checks)
 
@@ -142,7 +142,9 @@ def _check_distances(workspace: WorkspaceModels, held_out_places: Sequence[HeldO
             )
 
 
-def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
+def _list_leave_one_out_folds(
+    workspace: WorkspaceModels,
+) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
     """List the folds of the cross-validation, one per model inside the convex hull of the others: the others, their
     modal interpolation (None where modes do not match), and the model as reference. Empty for fewer than three
     models."""
@@ -171,7 +173,7 @@ def _check_place(
         return PlaceCheck(
             place.place_m, measure_quality(blended_response), None, _compute_rms_error(blended_response), None
         )
-    modal_response = _compute_equalized_response(modal.at(place.place_m), place, weight)
+    modal_response = _compute_equalized_response(modal.interpolate_at(place.place_m), place, weight)
     return PlaceCheck(
         place.place_m,
         measure_quality(blended_response),

@@ -25,7 +25,7 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
 """Density of the fixed real poles that describe the smooth remainder. Chosen by hand; the error of the fit is tested
-against `LARGEST_SILENT_ERROR` for every place."""
+against `REMARK_THRESHOLD` for every place."""
 LOWEST_POLE_RATIO, HIGHEST_POLE_RATIO = 0.3, 4.5
 """Frequency of the lowest and the highest of these poles, relative to the lower and the upper end of the band.
 Chosen by hand."""
@@ -33,9 +33,9 @@ RANK_TOLERANCE = 0.1
 """Singular values below this share of the largest are not counted in the rank of a residue matrix. The interpolated
 residue is truncated to the largest rank of the models' residues, because a sum of matrices has a higher rank. Chosen by
 hand."""
-LARGEST_SILENT_ERROR = 0.02
-"""Largest error of the fit of the remainder, relative to the total response of the line, for which the user gets no
-remark. Chosen by hand."""
+REMARK_THRESHOLD = 0.02
+"""Error of the fit of the remainder, relative to the total response of the line, above which the user gets a remark.
+Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,16 +50,18 @@ class ModalInterpolation:
     remainders: ComplexArray
     """(models, lines, p, m), m/s² per N: responses without the matched resonances."""
 
-    def at(self, place_m: Place) -> ModelsAtPlace:
+    def interpolate_at(self, place_m: Place) -> ModelsAtPlace:
         """Interpolate a single model for a place (m), valid in the models' common band. Remarks state a place outside
-        the convex hull of the models, and a fit of the remainder whose error exceeds `LARGEST_SILENT_ERROR`."""
+        the convex hull of the models, and a fit of the remainder whose error exceeds `REMARK_THRESHOLD`."""
         weights = compute_place_weights(self.workspace.places_m, place_m)
         modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
-        total = remainder + sum((mode.compute_response(self.lines.z) for mode in modes), np.zeros_like(remainder))
-        model, fit_error = _assemble_model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
+        total_response = remainder + sum(
+            (mode.compute_response(self.lines.z) for mode in modes), np.zeros_like(remainder)
+        )
+        model, fit_error = _assemble_model(self, modes, remainder, np.linalg.norm(total_response, axis=(1, 2)))
         remarks = [weights.remark] if weights.remark else []
-        if fit_error > LARGEST_SILENT_ERROR:
+        if fit_error > REMARK_THRESHOLD:
             remarks.append(f"the model between the given ones is {100 * fit_error:.1f} % off where it is worst")
         placed_model = replace(model, place_m=place_m)
         return ModelsAtPlace(place_m, (placed_model,), (1.0,), tuple(remarks))
@@ -85,14 +87,14 @@ def build_modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
 def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
     """Match the modes of each resonance from neighbour to neighbour along the minimum spanning tree of the places.
     Returns tuples (resonances, models) without resonances that are missing in a model. modes: per model."""
-    places = workspace.places_m
-    distances_m = np.linalg.norm(places[:, None] - places[None], axis=2)
-    tree = minimum_spanning_tree(distances_m)
-    order, predecessors = breadth_first_order(tree, 0, directed=False)
+    places_m = workspace.places_m
+    distances_m = np.linalg.norm(places_m[:, None] - places_m[None], axis=2)
+    spanning_tree = minimum_spanning_tree(distances_m)
+    visiting_order, predecessors = breadth_first_order(spanning_tree, 0, directed=False)
     mode_indices_by_track: dict[int, dict[int, int]] = {
         mode_index: {0: mode_index} for mode_index in range(len(modes[0]))
     }
-    for node in order[1:]:
+    for node in visiting_order[1:]:
         parent = int(predecessors[node])
         try:
             pairs = dict(match_modes(modes[parent], modes[node], workspace.band_hz))
@@ -137,39 +139,45 @@ def _assemble_model(
     first_model, lines = interpolation.workspace.models[0], interpolation.lines
     poles = _choose_remainder_poles(interpolation.workspace.band_hz, first_model.sample_rate_hz)
     basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / total_norm[:, None]
-    target = remainder.reshape(len(total_norm), -1) / total_norm[:, None]
+    scaled_remainder = remainder.reshape(len(total_norm), -1) / total_norm[:, None]
     real_basis = np.vstack([basis.real, basis.imag])
-    scale = np.linalg.norm(real_basis, axis=0)
+    column_norms = np.linalg.norm(real_basis, axis=0)
     coefficients = (
-        np.linalg.lstsq(real_basis / scale, np.vstack([target.real, target.imag]), rcond=1e-7)[0] / scale[:, None]
+        np.linalg.lstsq(
+            real_basis / column_norms, np.vstack([scaled_remainder.real, scaled_remainder.imag]), rcond=1e-7
+        )[0]
+        / column_norms[:, None]
     )
-    error = float(np.linalg.norm(basis @ coefficients - target, axis=1).max())
+    fit_error = float(np.linalg.norm(basis @ coefficients - scaled_remainder, axis=1).max())
     p, m = remainder.shape[1:]
     gains = coefficients.reshape(len(poles) + 1, p, m)
-    blocks = [_realise_mode(mode) for mode in modes]
-    A = block_diag(*(block[0] for block in blocks), np.kron(np.diag(poles), np.eye(m)))
+    mode_matrices = [_realise_mode(mode) for mode in modes]
+    A = block_diag(*(matrices[0] for matrices in mode_matrices), np.kron(np.diag(poles), np.eye(m)))
     B = np.vstack(
-        [*(block[1] for block in blocks), np.tile(np.eye(m), (len(poles), 1)) * np.repeat(1 - poles, m)[:, None]]
+        [
+            *(matrices[1] for matrices in mode_matrices),
+            np.tile(np.eye(m), (len(poles), 1)) * np.repeat(1 - poles, m)[:, None],
+        ]
     )
-    C = np.hstack([*(block[2] for block in blocks), *gains[:-1]])
+    C = np.hstack([*(matrices[2] for matrices in mode_matrices), *gains[:-1]])
     provenance = {
         "method": "modal interpolation",
         "places_m": interpolation.workspace.places_m.tolist(),
         "resonances_hz": [mode.natural_hz for mode in modes],
-        "worst_relative_error": error,
+        "worst_relative_error": fit_error,
     }
     band_hz = interpolation.workspace.band_hz
     return replace(
         first_model, A=A, B=B, C=C, D=gains[-1], band_hz=band_hz, covariance=None, samples=None, provenance=provenance
-    ), error
+    ), fit_error
 
 
 def _choose_remainder_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
     """Choose the discrete real poles, (poles,), at least four, logarithmically spaced from below the band to above it,
     at most 0.4 of the sample rate, which is below half of it. Chosen by hand."""
     lowest_hz, highest_hz = LOWEST_POLE_RATIO * band_hz[0], min(HIGHEST_POLE_RATIO * band_hz[1], 0.4 * rate_hz)
-    count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
-    return np.asarray(np.exp(-2 * np.pi * np.geomspace(lowest_hz, highest_hz, count) / rate_hz))
+    pole_count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
+    return np.asarray(np.exp(-2 * np.pi * np.geomspace(lowest_hz, highest_hz, pole_count) / rate_hz))
 
 
 def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -180,7 +188,7 @@ def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
     pole = mode.pole
     rotation = np.array([[pole.real, pole.imag], [-pole.imag, pole.real]])
     A = np.kron(np.eye(rank), rotation)
-    shapes, inputs = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * v[:rank]
-    B = np.concatenate([np.stack([2 * row.real, -2 * row.imag]) for row in inputs])
-    C = np.hstack([np.column_stack([column.real, column.imag]) for column in shapes.T])
+    output_shapes, input_shapes = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * v[:rank]
+    B = np.concatenate([np.stack([2 * row.real, -2 * row.imag]) for row in input_shapes])
+    C = np.hstack([np.column_stack([column.real, column.imag]) for column in output_shapes.T])
     return A, B, C

@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, compute_regularised_inverse
+from equalizer.tracking.feedforward.periodic_inverse import FORCE_WEIGHT, compute_regularised_inverse
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.workspace.workspace_models import Place
 
@@ -31,7 +31,7 @@ class ModelsAtPlace:
     """Sentences for the user, for example that the place is outside the identified places."""
 
     def compute_inverse(
-        self, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
+        self, frequency_hz: FloatArray, weight: float = FORCE_WEIGHT, spring: VirtualSpring = NO_SPRING
     ) -> ComplexArray:
         """Compute the weighted sum of the models' regularised inverses (`compute_regularised_inverse`), (lines, m, p),
         N per m/s², at frequency_hz (lines,). weight: of |force|², (m/s² per N)²; spring: virtual spring whose force is

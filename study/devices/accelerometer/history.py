@@ -22,7 +22,7 @@ class RowBuffer:
     dropped at the beginning."""
 
     def __init__(self, columns: int) -> None:
-        """columns: number of columns. The capacity begins with 1024 rows; chosen."""
+        """columns: number of columns. The capacity begins with 1024 rows, chosen: half a second of samples at 2 kHz."""
         self._rows, self._start, self._end = np.zeros((1024, columns)), 0, 0
 
     @property
@@ -65,14 +65,14 @@ class ArrivedSamples:
 
 
 class SampleHistory:
-    """Samples of the last `BUFFER_S` seconds, or somewhat more, and their arrivals; all times in seconds. A lock lets
-    one thread add while others read."""
+    """Samples of at least the last `BUFFER_S` seconds, and their arrivals; all times in seconds. A lock lets one thread
+    add while others read."""
 
     def __init__(self) -> None:
         self._samples, self._arrivals = RowBuffer(5), RowBuffer(7)
         """Columns of a sample: device time (s), restarts, three raw values. Columns of an arrival: host time (s),
         number of all samples up to it, newest device time (s), and the four numbers of `PacketCounts`."""
-        self._dropped = 0
+        self._dropped_count = 0
         """Number of samples that were dropped."""
         self._lock = threading.Lock()
 
@@ -82,7 +82,7 @@ class SampleHistory:
         rows = np.column_stack((device_s, samples.restarts, samples.raw))
         with self._lock:
             self._samples.append(rows)
-            sample_count = self._dropped + len(self._samples.rows)
+            sample_count = self._dropped_count + len(self._samples.rows)
             arrival = (
                 arrived_s,
                 sample_count,
@@ -112,8 +112,8 @@ class SampleHistory:
         with self._lock:
             arrivals = self._arrivals.rows
             first_arrival, end_arrival = np.searchsorted(arrivals[:, 0], (from_s, until_s))
-            first_sample = int(arrivals[first_arrival - 1, 1]) - self._dropped if first_arrival else 0
-            end_sample = int(arrivals[end_arrival - 1, 1]) - self._dropped if end_arrival else 0
+            first_sample = int(arrivals[first_arrival - 1, 1]) - self._dropped_count if first_arrival else 0
+            end_sample = int(arrivals[end_arrival - 1, 1]) - self._dropped_count if end_arrival else 0
             samples, arrivals = (
                 self._samples.rows[first_sample:end_sample].copy(),
                 arrivals[first_arrival:end_arrival].copy(),
@@ -123,13 +123,13 @@ class SampleHistory:
         )
 
     def _drop_outdated(self, before_s: float) -> None:
-        """Drop arrivals before `before_s` (s) and their samples, once they exceed a tenth of all arrivals, so that rows
-        are seldom moved. The last arrival before that time is kept, without its samples: it gives the index of the next
-        arrival's first sample."""
+        """Drop arrivals before `before_s` (s) and their samples, once they exceed a tenth of all arrivals (chosen), so
+        that most calls return at once. The last arrival before that time is kept, without its samples: it gives the
+        index of the next arrival's first sample."""
         arrivals = self._arrivals.rows
         outdated_count = int(np.searchsorted(arrivals[:, 0], before_s)) - 1
         if outdated_count > 0.1 * len(arrivals):
-            outdated_samples = int(arrivals[outdated_count, 1]) - self._dropped
+            outdated_samples = int(arrivals[outdated_count, 1]) - self._dropped_count
             self._samples.drop(outdated_samples)
             self._arrivals.drop(outdated_count)
-            self._dropped += outdated_samples
+            self._dropped_count += outdated_samples

@@ -19,7 +19,8 @@ thread waits to be scheduled on a busy computer."""
 
 SAMPLE_COUNT, REST_MPS2, RING_SIZE = 0, 1, 16
 """Columns of the first row of `NewestSample.rows`: number of samples so far; first of three for the acceleration at
-rest (m/s²). RING_SIZE: number of further rows, which hold the samples."""
+rest (m/s²). RING_SIZE: number of further rows, which hold the samples. Chosen: a reader repeats its copy only where 15
+samples (7 ms at 2 kHz) arrive during it."""
 ARRIVAL_S, SENSED_MPS2, IS_CLIPPED, COLUMN_COUNT = 0, 1, 4, 5
 """Columns of a sample: time of arrival by the monotonic clock (s), first of three for the acceleration (m/s²), 1 where
 a channel was at its limit. COLUMN_COUNT: number of columns."""
@@ -36,17 +37,17 @@ class NewestSample:
     def add_sample(self, arrival_s: float, acceleration: FloatArray, clipped: bool) -> None:
         """Add a sample. arrival_s: time of arrival by `time.monotonic`; acceleration: (3,), m/s², as sensed;
         clipped: whether a channel is at its limit."""
-        count = self.rows[0, SAMPLE_COUNT]
+        sample_count = self.rows[0, SAMPLE_COUNT]
         with self._barrier:
-            self.rows[1 + int(count) % RING_SIZE] = arrival_s, *acceleration, clipped
-        self.rows[0, SAMPLE_COUNT] = count + 1.0
+            self.rows[1 + int(sample_count) % RING_SIZE] = arrival_s, *acceleration, clipped
+        self.rows[0, SAMPLE_COUNT] = sample_count + 1.0
 
     def _copy_newest_row(self) -> FloatArray | None:
         """Copy the newest row (COLUMN_COUNT,): as sensed, of any age. None before the first sample."""
-        while count := int(self.rows[0, SAMPLE_COUNT]):
-            row: FloatArray = self.rows[1 + (count - 1) % RING_SIZE].copy()
+        while sample_count := int(self.rows[0, SAMPLE_COUNT]):
+            row: FloatArray = self.rows[1 + (sample_count - 1) % RING_SIZE].copy()
             # The writer may be filling the next row: this row is intact while fewer than RING_SIZE - 1 more were added.
-            if self.rows[0, SAMPLE_COUNT] - count < RING_SIZE - 1:
+            if self.rows[0, SAMPLE_COUNT] - sample_count < RING_SIZE - 1:
                 return row
         return None
 

@@ -25,7 +25,7 @@ from study.session.facts.sensor_facts import SensorFacts
 
 ZEROING_S = 0.5
 """Duration (s) of the measurement at rest when the sensor is opened. Its mean is subtracted from all readings: gravity,
-and the drift of the bias since the calibration."""
+and the drift of the bias since the calibration. Chosen: 1000 samples at 2 kHz."""
 
 CLOCK_FIT_S = 120.0
 """Time (s) before a recording from which sample arrivals are included in the fit of the sensor's clock, besides those
@@ -33,7 +33,7 @@ of the recording itself: long enough for 1 ppm, and short enough that the rate o
 
 LATENESS_S = 0.05
 """Wait (s) after the last tick for samples that are still on their way, in addition to half the length of the low-pass
-filter."""
+filter. Chosen: the longest delay of a packet that `sensor_findings.MAX_DELAY_S` accepts."""
 
 
 class Accelerometer:
@@ -46,8 +46,8 @@ class Accelerometer:
         self._history = SampleHistory()
         self._newest = NewestSample()
         self._rest_mps2 = np.zeros(3)
-        self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._read, name="accelerometer", daemon=True)
+        self._close_requested = threading.Event()
+        self._thread = threading.Thread(target=self._run_reading_loop, name="accelerometer", daemon=True)
         self._thread.start()
 
     @property
@@ -68,18 +68,18 @@ class Accelerometer:
 
     @property
     def samples(self) -> FloatArray:
-        """Array (`NewestSample.rows`) from which compiled code reads what `read_latest` returns."""
+        """Array `NewestSample.rows`, from which compiled code reads what `read_latest` returns."""
         return self._newest.rows
 
     def read_latest(self) -> tuple[FloatArray, bool]:
-        """Newest acceleration, (3,), m/s², less the reading at rest, NaN without a sample younger than
+        """Read the newest acceleration, (3,), m/s², less the reading at rest, NaN without a sample younger than
         `newest_sample.MAX_AGE_S`; and whether a channel is at its limit. May be called from any thread."""
         return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
-        """Accelerations at the ticks of a recording, as `study.devices.rig.AsynchronousAccelerometer` defines it. Waits
-        until the samples after the last tick have arrived. Without ticks: no accelerations, and facts about the samples
-        since since_s."""
+        """Compute the accelerations at the ticks of a recording, as `study.devices.rig.AsynchronousAccelerometer`
+        defines it. Waits until the samples after the last tick have arrived. Without ticks: no accelerations, and facts
+        about the samples since since_s."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_LENGTH_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         resampled = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else ResampledValues(np.zeros((0, 3)), None)
@@ -87,39 +87,42 @@ class Accelerometer:
         return SensedAcceleration(resampled.values, _make_sensor_facts(packet_counts, resampled.values, resampled.fit))
 
     def measure_rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
-        """Facts about the last `seconds`, during which the sensor was at rest; standard deviation of each axis (3,),
-        m/s², NaN without samples; samples per second. Called by `sensor_findings`."""
+        """Measure the last `seconds`, during which the sensor was at rest. Returns facts; the standard deviation of
+        each axis (3,), m/s², NaN without samples; samples per second. The clock is fitted as for a tick at this moment.
+        Called by `sensor_findings`."""
         now_s = time.monotonic()
-        interval = self._history.select_interval(now_s - seconds, now_s)
+        interval_samples = self._history.select_interval(now_s - seconds, now_s)
         noise_mps2 = (
-            self._calibration.to_acceleration(interval.raw).std(axis=0) if len(interval.raw) else np.full(3, np.nan)
+            self._calibration.to_acceleration(interval_samples.raw).std(axis=0)
+            if len(interval_samples.raw)
+            else np.full(3, np.nan)
         )
-        fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
+        clock_fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
         return (
-            _make_sensor_facts(self._history.count_since(now_s - seconds), np.zeros((0, 3)), fit),
+            _make_sensor_facts(self._history.count_since(now_s - seconds), np.zeros((0, 3)), clock_fit),
             noise_mps2,
-            len(interval.raw) / seconds,
+            len(interval_samples.raw) / seconds,
         )
 
     def close(self) -> None:
         """Stop reading and close the source. Never raises; waits at most 1 s for the reading thread."""
-        self._closed.set()
+        self._close_requested.set()
         self._thread.join(1.0)
         with contextlib.suppress(Exception):
             self._source.close()
 
     def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> ResampledValues:
-        """Accelerations at the ticks (m/s², less the reading at rest), and the fit of the clock. tick_s: at least one,
-        s, by the monotonic clock; rate_hz: of the ticks."""
-        interval = self._history.select_interval(tick_s[0] - CLOCK_FIT_S, time.monotonic())
-        accelerations_mps2 = self._calibration.to_acceleration(interval.raw) - self._rest_mps2
-        return fit_and_resample(interval, accelerations_mps2, tick_s, rate_hz)
+        """Compute the accelerations at the ticks (k, 3), m/s², less the reading at rest, and the fit of the clock.
+        tick_s: (k,), at least one, s, by the monotonic clock; rate_hz: rate of the ticks."""
+        arrived_samples = self._history.select_interval(tick_s[0] - CLOCK_FIT_S, time.monotonic())
+        accelerations_mps2 = self._calibration.to_acceleration(arrived_samples.raw) - self._rest_mps2
+        return fit_and_resample(arrived_samples, accelerations_mps2, tick_s, rate_hz)
 
-    def _read(self) -> None:
-        """Loop of the reading thread. An error of the source ends it; readers notice that by the age of the newest
-        sample."""
+    def _run_reading_loop(self) -> None:
+        """Read the source until it is closed; the body of the reading thread. An error of the source ends it; readers
+        detect that by the age of the newest sample."""
         with contextlib.suppress(Exception):
-            while not self._closed.is_set():
+            while not self._close_requested.is_set():
                 samples, arrived_s = self._source.read()
                 if len(samples):
                     clipped = bool(
@@ -132,8 +135,8 @@ class Accelerometer:
 
 
 def make_silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
-    """Error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of bytes received that
-    belong to no packet."""
+    """Make the error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of received
+    bytes that belong to no packet. Also called by `six_positions`."""
     return DeviceError(
         "The accelerometer is silent",
         f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that belong to none).",
@@ -143,9 +146,9 @@ def make_silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
     )
 
 
-def _make_sensor_facts(counts: PacketCounts, resampled: FloatArray, fit: ClockFit | None) -> SensorFacts:
-    """Facts for the log. counts: of the source; resampled: accelerations at the ticks, (k, 3), NaN where unknown; fit:
-    of the sensor's clock."""
+def _make_sensor_facts(counts: PacketCounts, resampled: FloatArray, clock_fit: ClockFit | None) -> SensorFacts:
+    """Make the facts for the log. counts: of the source; resampled: accelerations at the ticks, (k, 3), NaN where
+    unknown; clock_fit: fit of the sensor's clock, None where none was possible."""
     return SensorFacts(
         packets=counts.packets,
         lost=counts.lost,
@@ -153,6 +156,6 @@ def _make_sensor_facts(counts: PacketCounts, resampled: FloatArray, fit: ClockFi
         restarts=counts.restarts,
         ticks=len(resampled),
         unplaced_ticks=int(np.isnan(resampled).any(axis=1).sum()),
-        drift_ppm=fit.drift_ppm if fit is not None else None,
-        longest_delay_s=fit.longest_delay_s if fit is not None else None,
+        drift_ppm=clock_fit.drift_ppm if clock_fit is not None else None,
+        longest_delay_s=clock_fit.longest_delay_s if clock_fit is not None else None,
     )

@@ -11,11 +11,11 @@ from study.devices.accelerometer.parser import PacketParser
 from study.devices.accelerometer.samples import PacketCounts, Samples
 from study.errors import DeviceError
 
-READ_BYTES = 4096
-"""Maximum number of bytes per read: 256 packets of 16 bytes, 0.13 s at 2 kHz."""
+MAX_READ_BYTES = 4096
+"""Maximum number of bytes per read: 256 packets of 16 bytes, 0.13 s at 2 kHz. Chosen."""
 
-WAIT_S = 0.01
-"""Timeout (s) of a read on a silent line; the reading thread notices `close` no later than this."""
+READ_TIMEOUT_S = 0.01
+"""Timeout (s) of a read on a silent line; the reading thread detects `close` no later than this. Chosen."""
 
 
 class Port(Protocol):
@@ -31,7 +31,7 @@ class Port(Protocol):
 
 
 class SerialSource:
-    """A `Source` that reads packets from an open serial line. Closing the source closes the line."""
+    """A `SampleSource` that reads packets from an open serial line. Closing the source closes the line."""
 
     def __init__(self, port: Port) -> None:
         self._port, self._parser = port, PacketParser()
@@ -42,10 +42,10 @@ class SerialSource:
         return self._parser.counts
 
     def read(self) -> tuple[Samples, float]:
-        """New samples, and their time of arrival by `time.monotonic` (s)."""
-        data = self._port.read(READ_BYTES)
+        """Read new samples, and their time of arrival by `time.monotonic` (s); no samples on a silent line."""
+        received_bytes = self._port.read(MAX_READ_BYTES)
         arrival_s = time.monotonic()
-        return self._parser.feed(data), arrival_s
+        return self._parser.feed(received_bytes), arrival_s
 
     def close(self) -> None:
         """Close the serial line; may raise. Called once."""
@@ -64,7 +64,7 @@ def open_serial(path: str, baud: int) -> SerialSource:
             "Install hapteq with its hardware extra: pip install '.[hardware]'.",
         ) from error
     try:
-        return SerialSource(_SerialPort(serial.Serial(path, baud, timeout=WAIT_S, exclusive=True)))
+        return SerialSource(_SerialPort(serial.Serial(path, baud, timeout=READ_TIMEOUT_S, exclusive=True)))
     except (OSError, ValueError) as error:
         raise DeviceError(
             "The accelerometer cannot be opened",
@@ -81,9 +81,11 @@ class _SerialPort:
         self._serial_port = serial_port
 
     def read(self, size: int) -> bytes:
+        """Read at most `size` bytes (`Port.read`)."""
         first_byte: bytes = self._serial_port.read(1)
         buffered_bytes = min(size - 1, self._serial_port.in_waiting)
         return first_byte + self._serial_port.read(buffered_bytes) if first_byte and buffered_bytes else first_byte
 
     def close(self) -> None:
+        """Close the line (`Port.close`)."""
         self._serial_port.close()

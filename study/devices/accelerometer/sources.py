@@ -53,7 +53,7 @@ def has_volt_samples(port: str) -> bool:
 
 
 class ScanCounter:
-    """Assigns numbers and times to the scans of a device that supplies neither, and counts the lost ones."""
+    """Numbers and times of the scans of a device that supplies neither. `counts`: scans received and lost so far."""
 
     def __init__(self, rate_hz: float) -> None:
         """rate_hz: sample rate that the device reports, from which the times are computed."""
@@ -66,11 +66,13 @@ class ScanCounter:
         numbers = self._next_number + np.arange(len(volts))
         self._next_number += len(volts)
         is_received = (volts != LOST_SCAN_V).all(axis=1)
-        previous, received = self.counts, int(is_received.sum())
-        self.counts = PacketCounts(previous.packets + received, previous.lost + len(volts) - received)
+        previous_counts, received_count = self.counts, int(is_received.sum())
+        self.counts = PacketCounts(
+            previous_counts.packets + received_count, previous_counts.lost + len(volts) - received_count
+        )
         numbers = numbers[is_received]
         time_us = np.round(1e6 * numbers / self._rate_hz).astype(np.int64)
-        return Samples(numbers, time_us, volts[is_received], np.zeros(received, dtype=np.int64))
+        return Samples(numbers, time_us, volts[is_received], np.zeros(received_count, dtype=np.int64))
 
 
 class NiSource:
@@ -78,6 +80,7 @@ class NiSource:
     on; the constructor raises ImportError without the package."""
 
     def __init__(self, device: str) -> None:
+        """device: name in the driver, such as Dev1."""
         nidaqmx, constants = import_module("nidaqmx"), import_module("nidaqmx.constants")
         self._read_all = constants.READ_ALL_AVAILABLE
         self._task: Any = nidaqmx.Task()
@@ -92,15 +95,16 @@ class NiSource:
 
     @property
     def counts(self) -> PacketCounts:
+        """Scans received and lost since the device was opened."""
         return self._scans.counts
 
     def read(self) -> tuple[Samples, float]:
         """Wait for `READ_INTERVAL_S`, then return the scans since the last call and the time after reading (s,
         `time.monotonic`)."""
         time.sleep(READ_INTERVAL_S)
-        channels = self._task.read(number_of_samples_per_channel=self._read_all)
+        volts_by_channel = self._task.read(number_of_samples_per_channel=self._read_all)
         arrived_s = time.monotonic()
-        return self._scans.convert_scans(np.array(channels, dtype=np.float64).reshape(3, -1).T), arrived_s
+        return self._scans.convert_scans(np.array(volts_by_channel, dtype=np.float64).reshape(3, -1).T), arrived_s
 
     def close(self) -> None:
         """End the task of the device."""
@@ -112,6 +116,7 @@ class LabJackSource:
     without the package."""
 
     def __init__(self, identifier: str) -> None:
+        """identifier: serial number or name; empty or ANY = any device."""
         self._ljm: Any = import_module("labjack.ljm")
         self._handle = self._ljm.openS("ANY", "ANY", identifier or "ANY")
         try:
@@ -124,6 +129,7 @@ class LabJackSource:
 
     @property
     def counts(self) -> PacketCounts:
+        """Scans received and lost since the device was opened."""
         return self._scans.counts
 
     def read(self) -> tuple[Samples, float]:
@@ -144,8 +150,8 @@ class LabJackSource:
 def _open_acquisition_device(
     open_device: Callable[[], SampleSource], port: str, package: str, extra: str, driver: str
 ) -> SampleSource:
-    """Open a data-acquisition device. Raises `DeviceError`, with a remedy, where package, driver or device is
-    missing."""
+    """Open a data-acquisition device. Raises `DeviceError`, with a remedy, where package, driver or device is missing.
+    extra: extra of hapteq that installs the package; driver: vendor's driver, with its origin, for the message."""
     try:
         return open_device()
     except ImportError as error:

@@ -14,7 +14,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import IDLE, LATE, LATEST_S, PHASE, READING_TIME_S
-from study.devices.governor.compiling import fingerprint, njit_inline
+from study.devices.governor.compiling import compute_fingerprint, njit_inline
 from study.devices.governor.govern import (
     MATRIX_TYPE,
     MISSED_TICKS_SIGNATURE,
@@ -200,5 +200,5 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
 
 _DEVICES_FOLDER = Path(__file__).parents[1]
 run_due, attend = _compile_entry_points(
-    fingerprint(_DEVICES_FOLDER / "governor", _DEVICES_FOLDER / "rig.py", _DEVICES_FOLDER / "native.py")
+    compute_fingerprint(_DEVICES_FOLDER / "governor", _DEVICES_FOLDER / "rig.py", _DEVICES_FOLDER / "native.py")
 )

@@ -39,9 +39,9 @@ RECORD_MISSED_POINTER = FunctionPointer(govern.record_missed_ticks, RECORD_MISSE
 
 
 class CompiledTicks:
-    """Runs the ticks of a rig by the compiled loop, and returns its newest reading. loop_state: shape
-    (LOOP_STATE_SIZE,), the cells listed in `compiled_drive`, shared with the drive. The constructor compiles the
-    loop."""
+    """Control ticks of a rig by the compiled loop, and its newest reading. loop_state: shape (LOOP_STATE_SIZE,), the
+    cells listed in `compiled_drive`, shared with the drive. The constructor compiles the loop. `error`: function that
+    makes the exception for a driver's error code, as in `CompiledIo`."""
 
     def __init__(self, compiled_io: CompiledIo, governor: Governor, loop_state: FloatArray) -> None:
         self._compiled_io = compiled_io
@@ -55,7 +55,7 @@ class CompiledTicks:
         self._readings: FloatArray = np.zeros((READING_ROWS, READING_SIZE))
         self._loop_arrays = loop_state, np.zeros(READING_SIZE), self._readings
         self._loop_state = loop_state
-        self._running = False
+        self._is_running = False
         self.error = compiled_io.error
         self.run(0)  # compiles the loop now, not when a stimulus is due
 
@@ -66,20 +66,20 @@ class CompiledTicks:
         return bool(self._compiled_io.calls[SLEEP] != 0)
 
     def run(self, ticks: int) -> int:
-        """Run at most `ticks` ticks without waiting, fewer if the force is off for good before or a tick fails. Returns
+        """Run at most `ticks` ticks without waiting, fewer where the force stays off or a tick fails. Returns
         `RUNNING`, `FINISHED`, or the driver's error code, > 0, for `error`."""
-        self._loop_state[READING_COUNT], self._running = 0.0, True
+        self._loop_state[READING_COUNT], self._is_running = 0.0, True
         try:
             return int(
                 run_due(*self._pointers, self._rig_arrays, self._list_governor_arrays(), self._loop_arrays, ticks)
             )
         finally:
-            self._running = False
+            self._is_running = False
 
     def attend(self) -> int:
-        """Run ticks as they become due, until the force is off for good, a tick fails, or the loop's thread is needed.
+        """Run ticks as they become due, until the force stays off, a tick fails, or the loop's thread is needed.
         Returns as `run`, or `GAP`. To be called only where `can_attend`."""
-        self._loop_state[READING_COUNT], self._running = 0.0, True
+        self._loop_state[READING_COUNT], self._is_running = 0.0, True
         try:
             return int(
                 attend(
@@ -91,12 +91,12 @@ class CompiledTicks:
                 )
             )
         finally:
-            self._running = False
+            self._is_running = False
 
     def get_running_reading(self) -> FloatArray | None:
         """Get the newest reading, shape (READING_SIZE,), of a call of `run` or `attend` in progress; None without a
         call or before its first reading."""
-        return self.get_last_reading() if self._running else None
+        return self.get_last_reading() if self._is_running else None
 
     def get_last_reading(self) -> FloatArray | None:
         """Get the last reading, shape (READING_SIZE,), of the current or else the last call, without that of a tick
@@ -109,8 +109,8 @@ class CompiledTicks:
         return None
 
     def _list_governor_arrays(self) -> tuple[FloatArray, ...]:
-        """List the governor's arrays in the order of `compiled_drive._GOVERNOR_TYPE`, at each call anew: the governor
-        replaces some for each stimulus."""
+        """List the governor's arrays in the order of `compiled_drive._GOVERNOR_TYPE`. Not stored, because the governor
+        replaces some of them for each stimulus."""
         governor = self._governor
         return (
             governor.state,

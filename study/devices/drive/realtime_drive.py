@@ -39,7 +39,7 @@ from study.devices.drive.compiled_drive import (
     STARTED_S,
     THREAD_NEEDED,
 )
-from study.devices.drive.real_time_class import real_time_class
+from study.devices.drive.real_time_class import request_real_time_class
 from study.devices.drive.runner import Runner
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import count_due_ticks
@@ -257,7 +257,7 @@ class RealtimeDrive:
 
     def _run_ticks(self) -> None:
         """Main function of the thread."""
-        with real_time_class() if self._in_realtime_class else contextlib.nullcontext():
+        with request_real_time_class() if self._in_realtime_class else contextlib.nullcontext():
             self._attend_until_closed()
 
     def _attend_until_closed(self) -> None:

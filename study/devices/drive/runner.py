@@ -2,9 +2,9 @@
 
 A tick reads the sensors (sense), decides the force (govern) and applies it (advance). `CompiledRunner` runs whole
 blocks of ticks of a simulated device without Python; `stepped_runner` drives real devices. The drives (`virtual_drive`,
-`realtime_drive`) call a runner. The parts of a tick are passed as function pointers, not inlined: one loop is compiled
-for all rigs, its machine code can be cached on disk, and it never contains an outdated copy of a part.
-"""
+`realtime_drive`) call a runner, which `study.devices.safe` makes. The parts of a tick are passed as function pointers,
+not inlined: one loop is compiled for all rigs, its machine code can be cached on disk, and it never contains an
+outdated copy of a part."""
 
 from typing import Any, Protocol
 
@@ -19,16 +19,16 @@ from study.devices.governor.govern import MATRIX_TYPE, PUBLISH_SIGNATURE, TICK_S
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig
 
-_NOISE = types.uint64[::1]
+_NOISE_TYPE = types.uint64[::1]
 """State of a sensor's random numbers, `CompiledRig.noise`."""
-_SENSE = types.FunctionType(types.void(VECTOR_TYPE, VECTOR_TYPE, _NOISE, VECTOR_TYPE))
+_SENSE_TYPE = types.FunctionType(types.void(VECTOR_TYPE, VECTOR_TYPE, _NOISE_TYPE, VECTOR_TYPE))
 """Type of the pointer to `CompiledRig.sense`; the other parts of a tick follow."""
-_TICK = types.FunctionType(TICK_SIGNATURE)
-_PUBLISH = types.FunctionType(PUBLISH_SIGNATURE)
-_ADVANCE = types.FunctionType(types.void(VECTOR_TYPE, VECTOR_TYPE, VECTOR_TYPE))
-_RIG = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, _NOISE, VECTOR_TYPE))  # type: ignore[no-untyped-call]
+_TICK_TYPE = types.FunctionType(TICK_SIGNATURE)
+_PUBLISH_TYPE = types.FunctionType(PUBLISH_SIGNATURE)
+_ADVANCE_TYPE = types.FunctionType(types.void(VECTOR_TYPE, VECTOR_TYPE, VECTOR_TYPE))
+_RIG_TYPE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, _NOISE_TYPE, VECTOR_TYPE))  # type: ignore[no-untyped-call]
 """Type of the argument `rig` of `run_block`."""
-_GOVERNOR = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
+_GOVERNOR_TYPE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
 """Type of the argument `governor` of `run_block`."""
 
 
@@ -54,20 +54,26 @@ class FunctionPointer(types.WrapperAddressProtocol):
 
 def make_tick_pointers(sense: Any, advance: Any) -> tuple[FunctionPointer, FunctionPointer, FunctionPointer]:
     """Make the pointers to sense, `govern.tick` and advance of a rig, the first three arguments of `run_block`."""
-    return FunctionPointer(sense, _SENSE), FunctionPointer(tick, _TICK), FunctionPointer(advance, _ADVANCE)
+    return (
+        FunctionPointer(sense, _SENSE_TYPE),
+        FunctionPointer(tick, _TICK_TYPE),
+        FunctionPointer(advance, _ADVANCE_TYPE),
+    )
 
 
-PUBLISH_POINTER = FunctionPointer(publish, _PUBLISH)
+PUBLISH_POINTER = FunctionPointer(publish, _PUBLISH_TYPE)
 """Pointer to the part that writes a tick into the telemetry ring, the same for every rig."""
-_BLOCK = types.void(_SENSE, _TICK, _ADVANCE, _PUBLISH, _RIG, _GOVERNOR, types.int64)
+_BLOCK_SIGNATURE = types.void(
+    _SENSE_TYPE, _TICK_TYPE, _ADVANCE_TYPE, _PUBLISH_TYPE, _RIG_TYPE, _GOVERNOR_TYPE, types.int64
+)
 """Signature of `run_block`."""
 
 
-@njit(_BLOCK, cache=True, nogil=True, error_model="numpy")
+@njit(_BLOCK_SIGNATURE, cache=True, nogil=True, error_model="numpy")
 def run_block(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, govern: Any, advance: Any, publish: Any, rig: Any, governor: Any, ticks: int
 ) -> None:
-    """Run at most `ticks` ticks, fewer if the force is off for good before. rig = (state, parameters, noise) of the
+    """Run at most `ticks` ticks, fewer if the stimulus ends within them. rig = (state, parameters, noise) of the
     CompiledRig, and an array for the reading; governor = (state, settings, loop, buffer, force) of
     `study.devices.governor.govern.tick`, and the telemetry ring. sense, govern, advance: from `make_tick_pointers`;
     publish: `PUBLISH_POINTER`. All arrays are changed in place."""
@@ -101,7 +107,7 @@ class Runner(Protocol):
         ...
 
     @property
-    def seen(self) -> LastReading | None:
+    def last_reading(self) -> LastReading | None:
         """The last reading of `run` or `read_sensors`; None before the first, after a failed `read_sensors`, and when
         the rig can no longer be used. May be read from any thread."""
         ...
@@ -116,8 +122,8 @@ class Runner(Protocol):
         ...
 
     def run(self, ticks: int) -> None:
-        """Run at most this many ticks, fewer if the force is off for good before. Never raises for a failing rig, which
-        is reported in `failure`."""
+        """Run at most this many ticks, fewer if the stimulus ends within them. Never raises for a failing rig, whose
+        exception is then in `failure`."""
         ...
 
     def drop(self, fault: Fault) -> None:
@@ -154,7 +160,7 @@ class CompiledRunner:
         self._rig_arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
         # Separate random numbers: the number of calls of `read_sensors` must not change what is recorded.
         self._idle_noise = ~rig.noise
-        self._seen: LastReading | None = None
+        self._last_reading: LastReading | None = None
         self._governor = governor
         self._block_ticks = block_ticks
         self.failure: BaseException | None = None
@@ -165,33 +171,34 @@ class CompiledRunner:
         return self._governor.moving
 
     @property
-    def seen(self) -> LastReading | None:
-        return self._seen if self.failure is None else None
+    def last_reading(self) -> LastReading | None:
+        return self._last_reading if self.failure is None else None
 
     def prepare(self) -> None:
-        """Tell the rig what will be played (`CompiledRig.prepare`): rows, whether they repeat, and wait (ticks)."""
+        """Pass the stimulus to the rig (`CompiledRig.prepare`): its rows (n, 3), N, whether they repeat, and the number
+        of ticks before the first."""
         state = self._governor.state
         repeats, wait_ticks = bool(np.isinf(state[cells.LENGTH])), int(state[cells.ONSET_TICKS] - state[cells.TICK])
         self._rig.prepare(self._governor.steady, repeats, wait_ticks)
 
     def read_sensors(self) -> None:
-        """Read the sensors with separate random numbers, so that the number of calls changes no recording."""
+        """Read the sensors; if that raises, `last_reading` is None."""
         rig, reading = self._rig, np.zeros(READING_SIZE)
         try:
             rig.sense(rig.state, rig.parameters, self._idle_noise, reading)
-            self._seen = LastReading(reading, rig.buttons())
-        except Exception:  # noqa: BLE001 - no reading, and `seen` is None
-            self._seen = None
+            self._last_reading = LastReading(reading, rig.buttons())
+        except Exception:  # noqa: BLE001 - no reading, and `last_reading` is None
+            self._last_reading = None
 
     def run(self, ticks: int) -> None:
-        """Run ticks in blocks of `block_ticks`; after each, the reading is stored for `seen`."""
+        """Run ticks in blocks of `block_ticks`; after each, the reading is stored for `last_reading`."""
         try:
             for first_tick in range(0, ticks, self._block_ticks):
                 self._run_block(min(self._block_ticks, ticks - first_tick))
-                self._seen = LastReading(self._rig_arrays[-1].copy(), self._rig.buttons())
+                self._last_reading = LastReading(self._rig_arrays[-1].copy(), self._rig.buttons())
                 if not self._governor.moving:
                     break
-        except Exception as error:  # noqa: BLE001 - any error: the force goes off, and the next call says why
+        except Exception as error:  # noqa: BLE001 - any error: the force goes off, and the next call reports it
             self.give_up(error)
 
     def drop(self, fault: Fault) -> None:
@@ -205,7 +212,7 @@ class CompiledRunner:
         self._governor.abandon(Fault.LOST)
 
     def cut(self) -> None:
-        """Nothing to do: blocks are short, and the governor obeys a stop at each tick of a block."""
+        """Nothing to do: the tick checks the governor's stop request, also within a block."""
 
     def disconnect(self) -> None:
         """End a stimulus that is in progress with the fault LOST."""
@@ -213,7 +220,7 @@ class CompiledRunner:
             self._governor.abandon(Fault.LOST)
 
     def _run_block(self, ticks: int) -> None:
-        """Run a block of ticks with the present arrays of the governor."""
+        """Run a block of at most this many ticks; the governor's arrays are new for each stimulus."""
         governor = self._governor
         governor_arrays = (
             governor.state,

@@ -1,5 +1,5 @@
-"""Runner of a real device's control ticks, with timeouts for a driver that hangs or fails. Made by
-`study.devices.safe`.
+"""Runner of a device that is driven tick by tick (`Rig`), with timeouts for a driver that hangs or fails. Made by
+`study.devices.safe`; called by the drives (`realtime_drive`, `virtual_drive`).
 
 Ticks of rigs with compiled input and output run in compiled code (`compiled_drive`), others from Python, with equal
 results.
@@ -26,7 +26,7 @@ from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, Rig
 
 
-class Standby:
+class StandbyThread:
     """A thread that runs an action on request. It is started in advance, because no thread can be started while the
     interpreter shuts down."""
 
@@ -38,10 +38,10 @@ class Standby:
     def run(self, timeout_s: float) -> bool:
         """Run the action. Returns whether it ended within timeout_s (s), without an exception and with another result
         than False. The action continues after the timeout, and if the caller is interrupted."""
-        answer: SimpleQueue[bool] = SimpleQueue()
-        self._requests.put(answer)
+        result_queue: SimpleQueue[bool] = SimpleQueue()
+        self._requests.put(result_queue)
         try:
-            return answer.get(timeout=timeout_s)
+            return result_queue.get(timeout=timeout_s)
         except Empty:
             return False
 
@@ -50,24 +50,25 @@ class Standby:
         self._requests.put(None)
 
     def _run_thread(self) -> None:
-        while (answer := self._requests.get()) is not None:
+        """Run the action for each request, until `end`; the function of the thread."""
+        while (result_queue := self._requests.get()) is not None:
             try:
-                answer.put(self._action() is not False)
+                result_queue.put(self._action() is not False)
             except BaseException:  # noqa: BLE001 - reported to the caller; the thread must survive for the next request
-                answer.put(False)
+                result_queue.put(False)
 
 
 ZERO_TIMEOUT_S = 0.1
 """Longest wait for a zero force to be written (s): a hundred times the duration of a normal write."""
 
-CLOSE_TIMEOUT_S = 1.0
-"""Longest wait for the driver to close its device (s)."""
+DEVICE_CLOSE_TIMEOUT_S = 1.0
+"""Longest wait for the driver to close its device (s). Chosen: ends an orderly close soon if the driver hangs."""
 
 
 class SteppedRunner:
-    """Runner of a real device (`drive.runner.Runner`). now_s: clock for the time stamps of readings, in real time;
-    without it, readings are a tick apart. monotonic: whether that is the system's monotonic clock, which compiled code
-    can read. catches_up: as in `Runner`."""
+    """Implements `drive.runner.Runner` for a `Rig`. loop_state: cells of the loop (`compiled_drive`). now_s: clock for
+    the time stamps of readings, in real time; without it, readings are a tick apart. monotonic: whether that is the
+    system's monotonic clock, which compiled code can read. catches_up: as in `Runner`."""
 
     def __init__(
         self,
@@ -83,14 +84,14 @@ class SteppedRunner:
         self.catches_up = catches_up
         self.failure: BaseException | None = None
         self.force_off = self.disconnected = True
-        self._seen: LastReading | None = None
+        self._last_reading: LastReading | None = None
         self.loop_state: FloatArray = np.zeros(LOOP_STATE_SIZE)
         compiled_io = get_compiled_io(rig) if now_s is None or monotonic else None
         self._compiled = CompiledTicks(compiled_io, governor, self.loop_state) if compiled_io is not None else None
         self.loop_state[STAMPS] = now_s is not None
-        self._closed = self._ended = False
-        self._zero_writer = Standby(lambda: rig.write(np.zeros(3)), "force off")
-        self._device_closer = Standby(rig.close, "disconnect")
+        self._close_requested = self._disconnect_finished = False
+        self._zero_writer = StandbyThread(lambda: rig.write(np.zeros(3)), "force off")
+        self._device_closer = StandbyThread(rig.close, "disconnect")
 
     @property
     def moving(self) -> bool:
@@ -98,12 +99,12 @@ class SteppedRunner:
         return self._governor.moving or bool(self.loop_state[DECIDING])
 
     @property
-    def seen(self) -> LastReading | None:
+    def last_reading(self) -> LastReading | None:
         """The newest reading, also of a compiled call in progress; None when the rig is gone."""
         if self._is_rig_gone:
             return None
         reading = self._compiled.get_running_reading() if self._compiled is not None else None
-        return self._seen if reading is None else LastReading(reading, self._rig.buttons())
+        return self._last_reading if reading is None else LastReading(reading, self._rig.buttons())
 
     @property
     def can_attend(self) -> bool:
@@ -123,19 +124,19 @@ class SteppedRunner:
         if self._is_rig_gone:
             return
         try:
-            self._seen = LastReading(self._read(), self._rig.buttons())
+            self._last_reading = LastReading(self._take_reading(), self._rig.buttons())
         except Exception:  # noqa: BLE001 - no reading; the next tick reports the error
-            self._seen = None
+            self._last_reading = None
 
     def run(self, ticks: int) -> None:
-        """Run at most this many ticks, in compiled code where the rig has compiled halves, else from Python. Never
-        raises for a failing rig."""
+        """Run at most this many ticks, in compiled code where the rig has compiled functions (`CompiledIo`), else
+        from Python; fewer if the stimulus ends within them. Never raises for a failing rig."""
         if self._is_rig_gone:
             self._governor.abandon(Fault.LOST)
             return
         with self._handle_failures():
             if self._compiled is not None:
-                self._conclude(self._compiled.run(ticks))
+                self._finish_compiled_ticks(self._compiled.run(ticks))
                 return
             for _ in range(ticks):
                 if self._run_tick() or self._is_rig_gone:
@@ -151,7 +152,7 @@ class SteppedRunner:
             return code
         with self._handle_failures():
             code = self._compiled.attend()
-            self._conclude(code)
+            self._finish_compiled_ticks(code)
         return code
 
     @contextlib.contextmanager
@@ -169,11 +170,11 @@ class SteppedRunner:
             if self._is_rig_gone:
                 self._repeat_zero_force()
 
-    def _conclude(self, code: int) -> None:
-        """Store the last reading of compiled ticks for `seen`; raise the rig's error for a code above zero."""
+    def _finish_compiled_ticks(self, code: int) -> None:
+        """Store the last reading of compiled ticks for `last_reading`; raise the rig's error for a code above zero."""
         assert self._compiled is not None
         if (reading := self._compiled.get_last_reading()) is not None:
-            self._seen = LastReading(reading, self._rig.buttons())
+            self._last_reading = LastReading(reading, self._rig.buttons())
         if code > 0:
             raise self._compiled.error(code)
 
@@ -195,16 +196,16 @@ class SteppedRunner:
 
     def disconnect(self) -> None:
         """Write zero force, then call the driver's `close`, each in a separate thread and with a timeout
-        (`ZERO_TIMEOUT_S`, `CLOSE_TIMEOUT_S`)."""
-        if self._ended:
+        (`ZERO_TIMEOUT_S`, `DEVICE_CLOSE_TIMEOUT_S`)."""
+        if self._disconnect_finished:
             return
         self.loop_state[RIG_GONE] = 1.0
         try:
             self._stop_with_zero_force(Fault.LOST if self.moving else Fault.NONE)
         finally:
-            self._closed = True
-            self.disconnected = self._device_closer.run(CLOSE_TIMEOUT_S)
-        self._ended = True
+            self._close_requested = True
+            self.disconnected = self._device_closer.run(DEVICE_CLOSE_TIMEOUT_S)
+        self._disconnect_finished = True
         self._zero_writer.end()
         self._device_closer.end()
 
@@ -212,7 +213,7 @@ class SteppedRunner:
         """Run a tick from Python, in the order of `compiled_drive._run_tick`. Returns whether the force is off and
         stays off, or the rig is gone."""
         governor = self._governor
-        reading = self._read()
+        reading = self._take_reading()
         if self._is_rig_gone:
             return True
         if self._now_s is not None:
@@ -229,10 +230,10 @@ class SteppedRunner:
         self.loop_state[DECIDING] = 0.0
         govern.publish(governor.state, governor.settings, governor.ring, reading)
         if not is_finished:
-            self._seen = LastReading(reading, self._rig.buttons())
+            self._last_reading = LastReading(reading, self._rig.buttons())
         return bool(is_finished)
 
-    def _read(self) -> FloatArray:
+    def _take_reading(self) -> FloatArray:
         """Reading (READING_SIZE,) of the rig. Raises ValueError for another shape, and what the driver raises."""
         reading = np.array(self._rig.sense(), dtype=np.float64)
         if reading.shape != (READING_SIZE,):
@@ -244,17 +245,17 @@ class SteppedRunner:
 
         Where zero force could not be written in time, the rig is marked as gone and the fault is FORCE_LEFT.
         """
-        zero_written = False
+        is_zero_written = False
         try:
-            zero_written = (
+            is_zero_written = (
                 self._zero_writer.run(ZERO_TIMEOUT_S) and not self.loop_state[WRITING]
             )  # a write that still hangs may take effect after the zero
         finally:
-            self.force_off = zero_written
-            if not zero_written:
+            self.force_off = is_zero_written
+            if not is_zero_written:
                 self.loop_state[RIG_GONE] = 1.0
                 self.failure = self.failure or TimeoutError("it took no zero force")
-            self._governor.abandon(fault if zero_written else Fault.FORCE_LEFT)
+            self._governor.abandon(fault if is_zero_written else Fault.FORCE_LEFT)
             self.loop_state[DECIDING] = 0.0
 
     def _repeat_zero_force(self) -> None:
@@ -266,6 +267,6 @@ class SteppedRunner:
             self.force_off = True
         except Exception:  # noqa: BLE001 - the rig is gone already; only its force matters
             self._governor.abandon(Fault.FORCE_LEFT)
-        if self._closed:
+        if self._close_requested:
             with contextlib.suppress(Exception):
                 self._rig.close()

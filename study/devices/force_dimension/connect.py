@@ -24,8 +24,8 @@ WATCHDOG_S = 0.03
 late by 10 ms on a busy computer; a force that remains for 30 ms moves a handle without a hand by a few millimetres."""
 
 MAX_DEVICES = 16
-"""Largest number of devices that are opened in the search for a model. Where the library counts more, the error for a
-device that was not found states both numbers."""
+"""Largest number of devices that are opened in the search for a model: limits the search where the library returns a
+wrong count. Chosen. Where the library counts more, the error for a device that was not found states both numbers."""
 
 CALIBRATION_ADVICE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
@@ -83,7 +83,7 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
     try:
         _check_power_and_calibration(handle, model)
         handle.disable_time_guard()
-        drops_after_s = handle.arm_watchdog(WATCHDOG_S)
+        watchdog_s = handle.arm_watchdog(WATCHDOG_S)
         handle.limit_force(cap_n)
         handle.compensate_gravity(effector_mass_kg if effector_mass_kg is not None else model.effector_mass_kg)
         handle.enable_force()
@@ -96,7 +96,7 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
             )
     except LibraryError as error:
         raise make_device_error(model.name, error) from error
-    return drops_after_s
+    return watchdog_s
 
 
 def make_device_error(name: str, error: LibraryError) -> DeviceError:

@@ -1,4 +1,5 @@
-"""Findings of `hapteq doctor` about a Force Dimension device before a study day. Commands only zero forces.
+"""Findings of `hapteq doctor` about a Force Dimension device before a study day, and its calibration by hand (`doctor
+--calibrate`). Commands only zero forces.
 
 In this order: library, USB, real-time rights, accelerometer, connection, power, calibration, watchdog, masses, gravity
 compensation. Each finding that is not fine states a remedy. Called by `study.devices.opening`.
@@ -20,7 +21,7 @@ from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
 from study.session.views.participant_views import DeviceFinding
 
-CAP_N = 1.0
+EXAMINATION_CAP_N = 1.0
 """Force cap (N) set in the library during the examination. Only zero forces are sent; the cap protects against an error
 of this program. Chosen by hand."""
 
@@ -165,7 +166,7 @@ def _examine_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> lis
     findings = [power_finding, DeviceFinding("Calibration", calibration_text, is_calibrated, calibration_advice)]
     if not (status.powered and is_calibrated):
         return findings
-    watchdog_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
+    watchdog_s = make_ready(handle, model, EXAMINATION_CAP_N, lab.effector_mass_kg)
     release_s = check_watchdog(handle, watchdog_s, time.monotonic, time.sleep)
     watchdog_text = (
         f"set to {1000 * watchdog_s:.1f} ms; without forces the device let go within {1000 * release_s:.0f} ms"
@@ -192,8 +193,8 @@ def _report_masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
 
 def _check_gravity(handle: Handle) -> list[DeviceFinding]:
     """Check the vertical drift of the handle (z is up) by its positions, and whether the library's velocity agrees with
-    it within `DRIFT_LIMIT_MPS` plus half of it; NaN does not agree. Empty where positions cannot be read, which another
-    finding reports. Raises `LibraryError`."""
+    it within `DRIFT_LIMIT_MPS` plus half of it; NaN does not agree. Empty where positions cannot be read: the caller of
+    `examine`, `examine_setup`, then opens the device and reports that. Raises `LibraryError`."""
     _send_zero_forces(handle, FREE_MOTION_S)
     try:
         start_s, start_height_m = time.monotonic(), handle.read_position_m()[2]

@@ -1,8 +1,9 @@
 """Acceptance test of the force limit of a real device, with no hand on the handle. Called by
 `study.devices.opening.accept_device`.
 
-1. More than the cap is commanded, first of the safety layer's ticks, then directly of the vendor's library. The device
-   must report no force above the cap (`check_cap_holds`).
+1. A stimulus above the cap must be refused. Then more than the cap is commanded, first through the safety layer's
+   ticks, then directly through the vendor's library: the device must report no force above the cap
+   (`check_cap_holds`).
 2. A small constant force is held, and its commands stop on purpose. The device's watchdog must switch it off in time
    (`check_force_vanishes`).
 """
@@ -94,11 +95,11 @@ REQUIRED_METHODS = ("given_n", "given_past_this_n", "withhold", "force_on")
 
 def require_testable(rig: object) -> None:
     """Raise `DeviceError` for a driver without the methods that this test needs, such as a laboratory's own driver."""
-    missing = [name for name in REQUIRED_METHODS if not hasattr(rig, name)]
-    if missing:
+    missing_methods = [name for name in REQUIRED_METHODS if not hasattr(rig, name)]
+    if missing_methods:
         raise DeviceError(
             "The device was not accepted",
-            f"Its force limit cannot be tested: its driver has no {', '.join(missing)}.",
+            f"Its force limit cannot be tested: its driver has no {', '.join(missing_methods)}.",
             "Write these methods, as `ForceReporting` and `CommandPausing` of "
             "study/devices/force_dimension/force_limit_check.py define them. Until then no hand may hold the device.",
         )
@@ -107,8 +108,8 @@ def require_testable(rig: object) -> None:
 def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
     """Part 1: command more than the cap of each layer in turn. Returns the largest force that the device reported (N).
 
-    device: opened without a spring and with caps of TEST_FORCE_N. Raises `DeviceError` where the cap was exceeded,
-    or where the force was too small for the test to be valid.
+    device: opened without a spring and with caps of TEST_FORCE_N. Raises `DeviceError` where the stimulus was not
+    refused, the cap was exceeded, or the force was too small or ended too early for the test to be valid.
     """
     oscillation = _make_oscillation(device.info.sample_rate_hz)
     try:
@@ -119,20 +120,20 @@ def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
         device.release()
         raise _make_acceptance_error("A stimulus above its cap was not refused.")
     device.hold_unchecked(oscillation)
-    ticks_force_n = _measure_largest_n(device, rig)
+    tick_capped_n = _measure_largest_n(device, rig)
     device.release()
-    _check_reported_force("at each tick", ticks_force_n)
+    _check_reported_force("at each tick", tick_capped_n)
     if device.fault() is not Fault.NONE:
         raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
-    library_force_n = rig.given_past_this_n(COMMAND_TO_CAP_RATIO * TEST_FORCE_N)
-    _check_reported_force("of the library", library_force_n)
-    return max(ticks_force_n, library_force_n)
+    library_capped_n = rig.given_past_this_n(COMMAND_TO_CAP_RATIO * TEST_FORCE_N)
+    _check_reported_force("of the library", library_capped_n)
+    return max(tick_capped_n, library_capped_n)
 
 
 def _measure_largest_n(device: CappedDevice, rig: ForceReporting) -> float:
     """The largest force (N) that the device reports during `OSCILLATION_DURATION_S`."""
-    largest_n, until_s = 0.0, time.monotonic() + OSCILLATION_DURATION_S
-    while time.monotonic() < until_s:
+    largest_n, end_s = 0.0, time.monotonic() + OSCILLATION_DURATION_S
+    while time.monotonic() < end_s:
         largest_n = max(largest_n, rig.given_n())
         device.keep_alive()
         time.sleep(POLL_INTERVAL_S)
@@ -156,7 +157,7 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
     as off.
 
     device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
-    `DeviceError` where the force remained, or where there was none before.
+    `DeviceError` where the force remained, or was too small or off before the commands stopped.
     """
     device.hold(_make_constant_force(device.info.sample_rate_hz))
     _keep_alive_for(device, HOLD_DURATION_S)
@@ -178,7 +179,8 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
 
 
 def _make_constant_force(rate_hz: float) -> HeldStimulus:
-    """A constant force of `TEST_FORCE_N` along x, towards the operator. rate_hz: sample rate of the device (Hz)."""
+    """A constant force of `TEST_FORCE_N` along x, towards the operator, repeated from a row of 0.05 s. rate_hz: sample
+    rate of the device (Hz)."""
     samples = np.tile([[TEST_FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
@@ -191,10 +193,11 @@ def _make_oscillation(rate_hz: float) -> HeldStimulus:
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
-def _keep_alive_for(device: Device, seconds: float) -> None:
-    """Restart the safety layer's watchdog every 20 ms for this time (s), so that the force is not faded out."""
-    until_s = time.monotonic() + seconds
-    while time.monotonic() < until_s:
+def _keep_alive_for(device: Device, duration_s: float) -> None:
+    """Restart the safety layer's watchdog every 20 ms for this time (s), so that the force is not faded out; its
+    timeout is several times longer."""
+    end_s = time.monotonic() + duration_s
+    while time.monotonic() < end_s:
         time.sleep(0.02)
         device.keep_alive()
 

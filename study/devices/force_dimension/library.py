@@ -2,8 +2,8 @@
 
 A negative return value becomes a `LibraryError` with the library's own text. The library keeps its last error per
 thread, so that the text must be fetched at once, in the thread whose call failed. Loaded by `connect.load_library`;
-`connect`, `handle` and `linkage` call the functions. Names, types and codes are those of the vendor's `dhdc.h`.
-"""
+`connect`, `handle` and `linkage` call the functions, `rig` passes the addresses of some to its compiled ticks. Names,
+types and codes are those of the vendor's `dhdc.h`."""
 
 import ctypes
 from collections.abc import Callable
@@ -92,11 +92,12 @@ class LibraryError(Exception):
 
 
 class Library:
-    """The loaded library. Raises `DeviceError` where it cannot be loaded, lacks a required function or is too old."""
+    """The loaded library; path: its file, version: major, minor, release, revision. The constructor raises
+    `DeviceError` where it cannot be loaded, lacks a required function or is too old."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._functions = _bind_functions(_load(path), path)
+        self._functions = _bind_functions(_load_shared_library(path), path)
         self.version = self._read_version()
         if self.version[:3] < OLDEST_SDK:
             raise _make_outdated_error(f"{path} is version {_format_version(self.version)}")
@@ -146,7 +147,7 @@ class Library:
         return major, minor, release, revision
 
 
-def _load(path: Path) -> ctypes.CDLL:
+def _load_shared_library(path: Path) -> ctypes.CDLL:
     """Load the library from a file. Raises `DeviceError` where the system cannot load it."""
     try:
         # Windows searches a library's own folder for the libraries it depends on only if its full path is given.
@@ -163,12 +164,12 @@ def _load(path: Path) -> ctypes.CDLL:
 def _bind_functions(shared_library: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
     """Bind the library's functions, by name, with their types set. Raises `DeviceError` where a function of
     `SIGNATURES` is missing; those of `LINKAGE_SIGNATURES` may be missing."""
-    missing = [name for name in SIGNATURES if not hasattr(shared_library, name)]
-    if missing:
-        raise _make_outdated_error(f"{path} has no {', '.join(missing)}")
+    missing_functions = [name for name in SIGNATURES if not hasattr(shared_library, name)]
+    if missing_functions:
+        raise _make_outdated_error(f"{path} has no {', '.join(missing_functions)}")
     functions: dict[str, Callable[..., Any]] = {}
-    available_linkage = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(shared_library, name)}
-    for name, (result_type, argument_types) in (SIGNATURES | available_linkage).items():
+    linkage_signatures = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(shared_library, name)}
+    for name, (result_type, argument_types) in (SIGNATURES | linkage_signatures).items():
         function = getattr(shared_library, name)
         function.restype, function.argtypes = result_type, list(argument_types)
         functions[name] = function

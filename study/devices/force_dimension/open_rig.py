@@ -1,4 +1,5 @@
-"""Opens a Force Dimension device by name and makes it ready for a study. Called by `study.devices.rigs_by_name`.
+"""Open a Force Dimension device by name and make it ready for a study. Called by `study.devices.rigs_by_name`;
+`findings` and `linkage` use `read_info`.
 
 Order: load the vendor's library, open the accelerometer and the device, check its identity and its acceptance, set
 force limit, gravity compensation and watchdog, test the watchdog. After a failure everything is closed again.
@@ -21,8 +22,8 @@ from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
 
-RATE_HZ = 1000.0
-"""Rate of the force loop (Hz), and of its samples."""
+LOOP_RATE_HZ = 1000.0
+"""Rate of the force loop (Hz), and of its samples. Chosen: the usual rate of haptic control."""
 
 
 def open_force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
@@ -55,11 +56,10 @@ def _make_rig(
         if settings.hand_on_handle:
             check_accepted(info, datetime.now(UTC).date())
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
-        drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
-        # drops_after_s is the timeout (s) of the device's watchdog, and 0 without a watchdog.
-        if drops_after_s > 0:
-            check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
-        return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
+        watchdog_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
+        if watchdog_s > 0:  # 0: the device has no watchdog
+            check_watchdog(handle, watchdog_s, time.monotonic, time.sleep)
+        return ForceDimensionRig(handle, info, watchdog_s, cap_n, sensor)
     except LibraryError as error:
         handle.disconnect()
         raise make_device_error(model.name, error) from error
@@ -80,7 +80,7 @@ def read_info(handle: Handle, library: Library, model: DeviceModel, effective_ma
     return DeviceInfo(
         name=model.name,
         simulated=False,
-        sample_rate_hz=RATE_HZ,
+        sample_rate_hz=LOOP_RATE_HZ,
         max_force_n=model.max_force_n,
         effective_mass_kg=effective_mass_kg or model.effective_mass_kg,
         details=f"serial {serial}, firmware {firmware:g}, SDK {library.version_text}",
@@ -89,8 +89,7 @@ def read_info(handle: Handle, library: Library, model: DeviceModel, effective_ma
 
 def _make_unknown_property_error(model: DeviceModel, property_name: str, library_answer: str) -> DeviceError:
     """Make the error for a property that the device does not report. property_name: such as "firmware";
-    library_answer: what the library returned
-    instead, as a predicate."""
+    library_answer: predicate of "Its library" that states what it returned instead."""
     return DeviceError(
         f"The {model.name} does not report its {property_name}",
         f"Its library {library_answer}, so no acceptance can be known to hold for it. Nothing has moved.",

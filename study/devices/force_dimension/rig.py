@@ -17,7 +17,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
-from study.devices.drive.real_time_class import real_time_class
+from study.devices.drive.real_time_class import request_real_time_class
 from study.devices.force_dimension import loop_cells, tick_io
 from study.devices.force_dimension.handle import Handle, describe_off_cause
 from study.devices.force_dimension.library import LibraryError
@@ -72,10 +72,10 @@ class ForceDimensionRig:
         self._accelerometer = accelerometer
         self._send_lock = SharedLock()
         self._calls = np.concatenate(
-            [collect_system_calls(self._send_lock), handle.library.find_addresses(loop_cells.LIBRARY)]
+            [collect_system_calls(self._send_lock), handle.library.find_addresses(loop_cells.VENDOR_CALLS)]
         )
         self._cells: FloatArray = np.zeros(loop_cells.CELLS_SIZE)
-        self._cells[loop_cells.NUMBER] = handle.number
+        self._cells[loop_cells.DEVICE_NUMBER] = handle.number
         self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
         self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
         # The time of the last zero is unknown, so that the first force checks the status of the device.
@@ -191,7 +191,7 @@ class ForceDimensionRig:
         real-time priority of the control loop: if it were interrupted while it holds the lock, the loop's next force
         would wait."""
         interval_s, zero_force = ZERO_INTERVAL_SHARE * self.drops_force_after_s, np.zeros(3)
-        with real_time_class():
+        with request_real_time_class():
             while not self._closed.wait(interval_s) and self._cells[loop_cells.FAILED] == 0.0:
                 code = tick_io.repeat_zero_once(self._calls, self._cells, interval_s, zero_force)
                 if code:
@@ -213,8 +213,8 @@ class ForceDimensionRig:
         """Describe a failure, without a full stop. code: as in `loop_cells`; LIBRARY_ERROR plus the index of a
         function for an error of the library."""
         function_index = code - loop_cells.LIBRARY_ERROR
-        if 0 <= function_index < len(loop_cells.LIBRARY):
-            return f"The library says: {self._handle.library.fetch_last_error(loop_cells.LIBRARY[function_index])}"
+        if 0 <= function_index < len(loop_cells.VENDOR_CALLS):
+            return f"The library says: {self._handle.library.fetch_last_error(loop_cells.VENDOR_CALLS[function_index])}"
         cap_n, refused_n = self._cells[loop_cells.CAP_N], self._cells[loop_cells.REFUSED_N]
         return {
             loop_cells.STALE_READINGS: "It repeatedly reports the same position",

@@ -29,6 +29,7 @@ from study.devices.force_dimension.loop_cells import (
     CAP_N,
     CLOSED,
     DEVICE_CLOSED,
+    DEVICE_NUMBER,
     DROPS_AFTER_S,
     ENABLE,
     FAILED,
@@ -37,7 +38,6 @@ from study.devices.force_dimension.loop_cells import (
     FORCE_REFUSED,
     FORCE_SCALED_DOWN,
     FORCES_OFF,
-    NUMBER,
     POSITION,
     READ_COUNT,
     REFUSED_N,
@@ -58,7 +58,7 @@ from study.devices.force_dimension.loop_cells import (
     record_library_failure,
     record_sent_force,
 )
-from study.devices.governor.compiling import fingerprint, njit_inline
+from study.devices.governor.compiling import compute_fingerprint, njit_inline
 from study.devices.governor.govern import VECTOR_TYPE
 from study.devices.native import Addresses, acquire, call_int, read_clock_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
@@ -109,7 +109,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     for i in range(READING_SIZE):
         reading[i] = math.nan
     address = reading.ctypes.data
-    arguments = (np.int64(address), np.int64(address + 8), np.int64(address + 16), np.int32(cells[NUMBER]))
+    arguments = (np.int64(address), np.int64(address + 8), np.int64(address + 16), np.int32(cells[DEVICE_NUMBER]))
     return_value = call_int(calls[POSITION], arguments)
     if not is_success(return_value):
         return record_library_failure(cells, POSITION)
@@ -136,7 +136,7 @@ def _is_watchdog_expired(calls: Addresses, cells: FloatArray) -> bool:
 @njit_inline
 def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float) -> int:
     """Call dhdSetForce (N). Returns its return value."""
-    return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[NUMBER]))))
+    return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[DEVICE_NUMBER]))))
 
 
 @njit_inline
@@ -149,7 +149,7 @@ def _reenable_forces(calls: Addresses, cells: FloatArray) -> int:
         return code
     if cells[CLOSED] != 0.0:
         return record_failure(cells, DEVICE_CLOSED)
-    number = np.int32(cells[NUMBER])
+    number = np.int32(cells[DEVICE_NUMBER])
     if not is_success(call_int(calls[BRAKES], (np.int32(0), number))):
         return record_library_failure(cells, BRAKES)
     if cells[CLOSED] == 0.0 and not is_success(call_int(calls[ENABLE], (np.int32(1), number))):
@@ -163,7 +163,7 @@ def _reenable_forces(calls: Addresses, cells: FloatArray) -> int:
 @njit_inline
 def _brake(calls: Addresses, cells: FloatArray) -> None:
     """Switch forces off and brakes on; the answers of the library are ignored."""
-    number = np.int32(cells[NUMBER])
+    number = np.int32(cells[DEVICE_NUMBER])
     call_int(calls[ENABLE], (np.int32(0), number))
     call_int(calls[BRAKES], (np.int32(1), number))
 
@@ -287,7 +287,7 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any, Any]:
 
 _DEVICES_FOLDER = Path(__file__).parents[1]
 sense_once, write_once, repeat_zero_once = _compile_entry_points(
-    fingerprint(
+    compute_fingerprint(
         Path(__file__).parent,
         *(
             _DEVICES_FOLDER / name

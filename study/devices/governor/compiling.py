@@ -1,4 +1,5 @@
-"""Compilation of the safety layer with numba, and invalidation of its cached machine code.
+"""Compilation of the control tick with numba, and invalidation of cached machine code. Used by the safety layer
+(`governor`), the loops (`drive`), and the compiled drivers and simulations.
 
 numba reuses cached code of a function while the file of that function is unchanged; it ignores changes in the files of
 the functions that it calls. It also compares the values that a closure captures. Entry points therefore capture the
@@ -17,9 +18,9 @@ Division by zero gives inf or NaN, which `confine` handles, instead of an except
 duration of a tick."""
 
 
-def fingerprint(folder: Path, *further_sources: Path) -> int:
-    """Checksum (the first 32 bits of SHA-256) of all Python sources in the folder, and of further files whose code or
-    constants are compiled into an entry point. The result is captured by an entry point's closure."""
+def compute_fingerprint(folder: Path, *further_sources: Path) -> int:
+    """Compute the checksum (first 32 bits of SHA-256) of all Python sources in the folder itself, and of further files
+    whose code or constants are compiled into an entry point, whose closure captures the result."""
     digest = hashlib.sha256()
     for source in (*sorted(folder.glob("*.py")), *further_sources):
         digest.update(source.read_bytes())

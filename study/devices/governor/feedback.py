@@ -3,7 +3,8 @@
     F = -K (x - centre) - B v,        v: low-pass filtered velocity
 
 K (STIFFNESS) in N/m, B (DAMPING) in N s/m. Spring, damper and their sum are each limited to FEEDBACK_CAP, separately
-from the cap of the stimulus: a wrong reading that no plausibility check detects then exerts at most this force.
+from the cap of the stimulus: a wrong reading that no plausibility check detects then exerts at most this force. Called
+by `govern` at each tick.
 """
 
 import math
@@ -31,21 +32,24 @@ from study.devices.governor.confine import EXCESS_FACTOR, compute_limiting_facto
 
 
 @njit_inline
-def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
-    """First-order low-pass filter of the velocity (m/s): v += share (dx/dt - v) per tick. It uses the time that
-    actually passed since the last tick, so that its corner frequency stays the same when ticks are late."""
-    elapsed = state[ELAPSED_TICKS]
-    share = settings[VELOCITY_SMOOTHING]
-    if elapsed != 1.0:
-        share = 1.0 - (1.0 - share) ** elapsed
+def _filter_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
+    """First-order low-pass filter of the velocity (m/s): v += c (dx/dt - v) per tick, dx/dt = 0 at the first reading. A
+    reading k ticks after the last by their time stamps (ELAPSED_TICKS) is weighted with 1 - (1 - c)^k instead of c, so
+    that late or missed ticks do not change the corner frequency."""
+    elapsed_ticks = state[ELAPSED_TICKS]
+    coefficient = settings[VELOCITY_SMOOTHING]
+    if elapsed_ticks != 1.0:
+        coefficient = 1.0 - (1.0 - coefficient) ** elapsed_ticks
     for i in range(3):
-        last = state[LAST_POSITION + i]
-        speed = 0.0 if math.isnan(last) else (reading[i] - last) / (elapsed * settings[TICK_S])
-        state[VELOCITY + i] += share * (speed - state[VELOCITY + i])
+        last_position = state[LAST_POSITION + i]
+        velocity = (
+            0.0 if math.isnan(last_position) else (reading[i] - last_position) / (elapsed_ticks * settings[TICK_S])
+        )
+        state[VELOCITY + i] += coefficient * (velocity - state[VELOCITY + i])
 
 
 @njit_inline
-def _ease_feedback(state: FloatArray, settings: FloatArray) -> None:
+def _reduce_feedback(state: FloatArray, settings: FloatArray) -> None:
     """Reduce the feedback force slowly while the position reading does not change (UNCHANGED_TICKS, by `plausibility`).
 
     A handle that dry friction holds at rest looks like a frozen encoder. With the force reduced, a real handle moves
@@ -59,8 +63,8 @@ def _ease_feedback(state: FloatArray, settings: FloatArray) -> None:
 @njit_inline
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
     """Add spring and damper to `force` (3,), N, each and their sum limited to FEEDBACK_CAP. gain: 0 to 1, the ramp at
-    the start and end of a hold. FEEDBACK_FORCE (N) is their magnitude before `_ease_feedback` reduces it."""
-    _track_velocity(state, settings, reading)
+    the start and end of a hold. FEEDBACK_FORCE (N) is their magnitude before `_reduce_feedback` reduces it."""
+    _filter_velocity(state, settings, reading)
     cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
     x = stiffness * (reading[0] - settings[CENTRE_X])
     y = stiffness * (reading[1] - settings[CENTRE_X + 1])
@@ -76,9 +80,9 @@ def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, g
     total_norm = compute_norm(x, y, z)
     total_factor = compute_limiting_factor(total_norm, cap)
     state[FEEDBACK_FORCE] = abs(gain) * total_factor * total_norm
-    _ease_feedback(state, settings)
-    share = gain * (1.0 - state[FEEDBACK_REDUCTION])
-    force[0] -= share * (total_factor * x)
-    force[1] -= share * (total_factor * y)
-    force[2] -= share * (total_factor * z)
+    _reduce_feedback(state, settings)
+    reduced_gain = gain * (1.0 - state[FEEDBACK_REDUCTION])
+    force[0] -= reduced_gain * (total_factor * x)
+    force[1] -= reduced_gain * (total_factor * y)
+    force[2] -= reduced_gain * (total_factor * z)
     state[FEEDBACK_CLIPPED] += max(spring_norm, damper_norm, total_norm) > cap * EXCESS_FACTOR

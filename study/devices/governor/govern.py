@@ -19,7 +19,7 @@ from typing import Any
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices.governor.compiling import fingerprint, njit_inline
+from study.devices.governor.compiling import compute_fingerprint, njit_inline
 from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear_force, compute_norm, confine, is_bounded
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import find_reading_fault
@@ -266,7 +266,7 @@ def _compile_tick(sources_fingerprint: int) -> tuple[Any, Any]:
     return tick, record_missed_ticks
 
 
-_SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
+_SOURCES = compute_fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 """Fingerprint of all files whose code is compiled into the entry points."""
 tick, record_missed_ticks = _compile_tick(_SOURCES)
 publish = _compile_publish(_SOURCES)

@@ -19,21 +19,25 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 
 VELOCITY_CUTOFF_HZ = 50.0
 """Cutoff frequency (Hz) of the velocity low-pass of the damper: far above the natural frequency of the spring, far
-below the encoders' quantization noise."""
+below the encoders' quantization noise. Chosen."""
 
 ACCELERATION_TIME_CONSTANT_S = 0.02
-"""Time constant (s) of the low-pass for the acceleration of the position readings, a plausibility check."""
+"""Time constant (s) of the low-pass for the acceleration of the position readings, a plausibility check. Chosen: 20
+ticks at 1 kHz."""
 
 SETTLE_S = 0.5
 """Time (s) before the first command of `begin_play`: half for the fade-in of the spring, half for the handle to come to
-rest."""
+rest. Chosen."""
 
 FAULTS = tuple(Fault)
 """Faults in the order of their codes in `cells`."""
 
 
 class Governor:
-    """Settings, state, stimulus and recording ring of one device.
+    """Settings, state, stimulus and recording ring of one device: the arrays of `govern.tick` and their access.
+
+    settings, state: cells by the indices of `cells`; loop: the stimulus (n, 3), N; buffer: the recording ring (rows,
+    ROW_SIZE); ring: the telemetry ring (rows, RING_WIDTH); force: the command of the last tick (3,), N.
 
     Requests (`request_*`, `restart_watchdog`) and queries may be made from any thread at any time, `begin_*` and
     `copy_rows` only while nothing moves.
@@ -147,14 +151,15 @@ class Governor:
         """Record this number of missed ticks: the device held its last force, and its sensors were not read."""
         govern.record_missed_ticks(self.state, self.buffer, self.missed_reading, ticks)
 
-    def count_lateness(self, late: bool, after_s: float) -> None:
-        """Record whether the latest tick ended after the next was due, and the time from its due time to its end
-        (s)."""
-        self.state[cells.LATE] += late
-        self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], after_s)
+    def count_lateness(self, is_late: bool, end_after_due_s: float) -> None:
+        """Count the latest tick as late if it ended after the next was due (`is_late`), and keep the longest time from
+        a tick's due time to its end (s)."""
+        self.state[cells.LATE] += is_late
+        self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], end_after_due_s)
 
     def collect_health(self) -> Health:
-        """Counters since `begin_hold` or `begin_play`; without the facts about an accelerometer with its own clock."""
+        """Collect the counters since `begin_hold` or `begin_play`; without the facts about an accelerometer with its
+        own clock."""
         state = self.state
         return Health(
             fault=self.fault,
@@ -177,7 +182,7 @@ class Governor:
         return self.buffer[np.arange(recorded_count - row_count, recorded_count) % ring_rows]
 
     def compute_row_times(self) -> FloatArray:
-        """Times at which the ticks of `copy_rows` were due, (n,), s, by the clock of `set_begin_time`."""
+        """Compute the times at which the ticks of `copy_rows` were due, (n,), s, by the clock of `set_begin_time`."""
         state, row_count = self.state, len(self.copy_rows())
         last_tick = state[cells.RECORD_FROM] + state[cells.RECORDED_ROWS] - 1.0
         ticks = last_tick - np.arange(row_count)[::-1]
@@ -196,20 +201,20 @@ class Governor:
         """The repeated part of the stimulus, (n, 3), N, without its onset."""
         return self.loop[int(self.state[cells.ONSET_TICKS]) :]
 
-    def _reset_run(self, stimulus_n: FloatArray, rows: int) -> None:
+    def _reset_run(self, stimulus_n: FloatArray, row_count: int) -> None:
         """Reset the state for a stimulus (n, 3), N, and a recording ring of this many rows."""
         self.loop = np.array(stimulus_n, order="C")
-        self.buffer = np.full((max(rows, 1), cells.ROW_SIZE), np.nan)
+        self.buffer = np.full((max(row_count, 1), cells.ROW_SIZE), np.nan)
         # Never clear the stop request, not even briefly: another thread may be setting it at this moment.
         self.state[cells.STOP_REQUEST + 1 :] = 0.0
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan
         self.state[cells.LAST_STEP] = np.nan
 
     def _count_recorded_rows(self, loop_rows: int) -> int:
-        """Rows recorded of a loop of loop_rows rows: as many whole loops as fit in `keep_s`, or `keep_s` of a longer
-        loop."""
-        kept_rows = self._count_ticks(self._keep_s)
-        return kept_rows // loop_rows * loop_rows if loop_rows <= kept_rows else kept_rows
+        """Number of rows that the ring keeps of a loop of loop_rows rows: as many whole loops as fit in `keep_s`, or
+        `keep_s` of a longer loop."""
+        max_rows = self._count_ticks(self._keep_s)
+        return max_rows // loop_rows * loop_rows if loop_rows <= max_rows else max_rows
 
     def _count_ticks(self, seconds: float) -> int:
         """Number of ticks nearest to a time (s)."""
@@ -217,7 +222,7 @@ class Governor:
 
 
 NEVER_TICKS = 1e15
-"""Number of ticks that is never reached, for a limit that does not apply."""
+"""Number of ticks that is never reached (30 000 years at 1 kHz), for a limit that does not apply."""
 
 
 def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:

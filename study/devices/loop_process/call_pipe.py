@@ -24,15 +24,15 @@ else:
     PipeEnd = Connection
 
 PIPE_NAMES = ("work", "signs", "look", "stop", "close")
-"""Names of the pipes, one per group of methods: neither a long `release`, `play` or `close` nor a reading that hangs
-delays a sign of life or a stop."""
+"""Names of the pipes, one per group of methods: `hold`, `release` and `play`; `keep_alive`, `fault` and `health`;
+`look`; `stop`; `close`. So neither a long call nor a reading that hangs delays a keep-alive or a stop."""
 
 VALUE, ERROR, PROGRESS = range(3)
 """Kinds of messages from the process: result of the method, exception that it raised, share done (0 to 1). After
 PROGRESS the process waits for a bool: whether to continue."""
 
 
-GRACE_S = 0.5
+ANSWER_GRACE_S = 0.5
 """Additional wait (s) after a timeout: after a suspension of this process an answer is late without a fault. Chosen."""
 
 CLOSE_TIMEOUT_S = 6.0
@@ -67,7 +67,7 @@ class Call:
         return self._final_message is not None
 
     def receive(self, message: tuple[int, Any]) -> None:
-        """Take a message of the process: progress, or the answer that ends the call. Called by the thread of the
+        """Store a message of the process: progress, or the answer that ends the call. Called by the thread of the
         pipe."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
@@ -83,9 +83,9 @@ class Call:
         sending_s: float = 0.0,
     ) -> Any:
         """Wait for the answer and return it. timeout_s: timeout (s) for each message. grace_s: additional wait (s),
-        None = `GRACE_S`. on_progress(share): called for each progress, 0 to 1. sending_s: time (s) added to the timeout
-        before the first progress and after a progress of 1, when a request or a recording is sent. Raises what the
-        method raised, `LoopGoneError`, and what `on_progress` raises. May be called again after an interruption."""
+        None = `ANSWER_GRACE_S`. on_progress(share): called for each progress, 0 to 1. sending_s: time (s) added to the
+        timeout before the first progress and after a progress of 1, when a request or a recording is sent. Raises what
+        the method raised, `LoopGoneError`, and what `on_progress` raises. May be called again after an interruption."""
         share: float | None = 1.0
         while (share := self._wait_for_progress(timeout_s + sending_s * (share == 1.0), grace_s)) is not None:
             if on_progress is not None:
@@ -109,7 +109,7 @@ class Call:
     def _wait_for_progress(self, timeout_s: float, grace_s: float | None = None) -> float | None:
         """Wait for the next progress and return it (0 to 1); None when the call is over. Without a message within
         timeout_s and then grace_s, the call ends with `LoopGoneError`."""
-        for wait_s in (timeout_s, GRACE_S if grace_s is None else grace_s):
+        for wait_s in (timeout_s, ANSWER_GRACE_S if grace_s is None else grace_s):
             self._message_arrived.clear()
             if self._final_message is None and self._progress.empty():
                 self._message_arrived.wait(wait_s)
@@ -141,7 +141,7 @@ class CallPipe:
         return call
 
     def close_after_calls(self) -> None:
-        """Close the pipe after the calls that were queued before."""
+        """Close the pipe when the calls queued so far are over."""
         self._calls.put(None)
 
     def _run_thread(self) -> None:
@@ -158,7 +158,7 @@ class CallPipe:
             self._fail_queued_calls()
 
     def _fail_queued_calls(self) -> None:
-        """End the calls that are queued after the pipe was closed with `LoopGoneError`."""
+        """End all queued calls with `LoopGoneError`, once the pipe is closed."""
         with contextlib.suppress(Empty):
             while True:
                 if (call := self._calls.get_nowait()) is not None:

@@ -36,7 +36,7 @@ to be faded out then. Chosen."""
 
 EXIT_GRACE_S = CLOSE_TIMEOUT_S + 3.0
 """Time (s) in addition to the fade after which a process that does not end is terminated: it hangs, in the driver or in
-an exit handler."""
+an exit handler. Chosen: 3 s more than the caller waits for an orderly end."""
 
 
 class PlaybackCancelledError(Exception):
@@ -49,11 +49,11 @@ class DeviceServer:
     def __init__(
         self,
         device: Device,
-        ends: tuple[PipeEnd, ...],
+        pipe_ends: tuple[PipeEnd, ...],
         after_stimulus: Callable[[], object] = lambda: None,
         raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: this process's ends of the pipes, in the order of `PIPE_NAMES`. after_stimulus: called after each
+        """pipe_ends: this process's ends of the pipes, in the order of `PIPE_NAMES`. after_stimulus: called after each
         stimulus. raise_thread_priority: context in which the threads for stop and keep-alive calls run."""
         self._device = device
         self._after_stimulus = after_stimulus
@@ -61,7 +61,7 @@ class DeviceServer:
         self._closed = threading.Event()
         self.ended = threading.Event()
         """Set when the caller is gone or has asked to close the device."""
-        playback_end, keep_alive_end, look_end, stop_end, close_end = ends
+        playback_end, keep_alive_end, look_end, stop_end, close_end = pipe_ends
         method_tables: tuple[tuple[PipeEnd, dict[str, Callable[..., Any]]], ...] = (
             (
                 playback_end,
@@ -90,17 +90,17 @@ class DeviceServer:
         """Close the device with a fade, then answer the caller's call of `close`, if any. Never raises."""
         self._device.close()
         self._closed.set()
-        self._threads[-1].join(LAST_ANSWER_TIMEOUT_S)
+        self._threads[-1].join(LAST_ANSWER_TIMEOUT_S)  # the thread of the pipe for `close`
 
-    def _serve(self, end: PipeEnd, methods: dict[str, Callable[..., Any]]) -> None:
+    def _serve(self, pipe_end: PipeEnd, methods: dict[str, Callable[..., Any]]) -> None:
         """Receive the calls of a pipe, execute them and send the answers, until the caller is gone or the device is
         closed; the function of the pipe's thread. methods: by the name that a call states."""
         is_urgent = "stop" in methods or "keep_alive" in methods
         try:
             with self._raise_priority() if is_urgent else contextlib.nullcontext():
                 while not self._closed.is_set():
-                    name, arguments = end.recv()
-                    end.send(_call_function(methods[name], arguments))
+                    name, arguments = pipe_end.recv()
+                    pipe_end.send(_call_function(methods[name], arguments))
                     if name in ("release", "play"):
                         self._after_stimulus()
         except (EOFError, OSError):
@@ -108,17 +108,17 @@ class DeviceServer:
         finally:
             self.ended.set()
 
-    def _play_commands(self, end: PipeEnd, commands: Signal) -> PlaybackResult:
+    def _play_commands(self, pipe_end: PipeEnd, commands: Signal) -> PlaybackResult:
         """Play commands; after each progress message, continue only if the caller answers True. Raises
         PlaybackCancelledError if it answers False."""
 
-        def await_consent(share: float) -> None:
+        def request_continuation(share: float) -> None:
             """Send the share that was played (0 to 1), and wait for the answer of the caller."""
-            end.send((PROGRESS, share))
-            if not end.recv():
+            pipe_end.send((PROGRESS, share))
+            if not pipe_end.recv():
                 raise PlaybackCancelledError
 
-        return self._device.play(commands, await_consent)
+        return self._device.play(commands, request_continuation)
 
     def _await_closed(self) -> Any:
         """Ask the main thread to close the device, and wait until it is closed. Returns the final counters."""
@@ -134,9 +134,9 @@ def run(caller_pid: int, *handles: int) -> None:
     _install_signal_handlers(received_signals)
     watchdog = CallerWatchdog(caller_pid, received_signals)
     threading.Thread(target=watchdog.watch, name="lifetime", daemon=True).start()
-    ends = tuple(PipeEnd(handle) for handle in handles)
-    with contextlib.suppress(EOFError, OSError):  # the caller is gone: the device is closed all the same
-        _open_and_serve(watchdog, ends)
+    pipe_ends = tuple(PipeEnd(handle) for handle in handles)
+    with contextlib.suppress(EOFError, OSError):  # the caller has ended; an opened device is already closed
+        _open_and_serve(watchdog, pipe_ends)
 
 
 class CallerWatchdog:
@@ -158,20 +158,20 @@ class CallerWatchdog:
         watchdog of the device's hardware then switches the force off. The function of a daemon thread."""
         while not self.must_exit():
             time.sleep(POLL_INTERVAL_S)
-        end_due_s = time.monotonic()
-        while time.monotonic() < end_due_s + self.exit_timeout_s:
+        exit_requested_s = time.monotonic()
+        while time.monotonic() < exit_requested_s + self.exit_timeout_s:
             time.sleep(POLL_INTERVAL_S)
         os._exit(1)
 
 
-def _open_and_serve(watchdog: CallerWatchdog, ends: tuple[PipeEnd, ...]) -> None:
+def _open_and_serve(watchdog: CallerWatchdog, pipe_ends: tuple[PipeEnd, ...]) -> None:
     """Open the device that the first message names, execute calls until the caller is gone, `close` is called or the
     process must exit, and close the device with a fade. An error while opening is sent to the caller."""
-    name, settings, seed, telemetry = ends[0].recv()[1]
+    name, settings, seed, telemetry = pipe_ends[0].recv()[1]
     try:
         device = open_device(name, settings, RealClock(), seed, own_process=False, telemetry=telemetry)
     except BaseException as error:  # noqa: BLE001 - the caller raises it
-        ends[0].send((ERROR, _make_sendable(error)))
+        pipe_ends[0].send((ERROR, _make_sendable(error)))
         return
     watchdog.exit_timeout_s = settings.limits.release_s + settings.limits.watchdog_s + EXIT_GRACE_S
     with contextlib.closing(device):
@@ -180,8 +180,8 @@ def _open_and_serve(watchdog: CallerWatchdog, ends: tuple[PipeEnd, ...]) -> None
         gc.collect()
         gc.freeze()
         gc.disable()
-        ends[0].send((VALUE, device.info))
-        server = DeviceServer(device, ends, after_stimulus=gc.collect, raise_thread_priority=raise_thread_priority)
+        pipe_ends[0].send((VALUE, device.info))
+        server = DeviceServer(device, pipe_ends, after_stimulus=gc.collect, raise_thread_priority=raise_thread_priority)
         server.start()
         while not (server.ended.wait(POLL_INTERVAL_S) or watchdog.must_exit()):
             pass
@@ -217,7 +217,7 @@ def _make_sendable(error: BaseException) -> Exception:
     """Return the exception itself if it can be pickled and restored, else a RuntimeError with its type and text."""
     if isinstance(error, Exception):
         with contextlib.suppress(Exception):
-            copy = pickle.loads(pickle.dumps(error))
-            if isinstance(copy, type(error)):
+            restored_error = pickle.loads(pickle.dumps(error))
+            if isinstance(restored_error, type(error)):
                 return error
     return RuntimeError(f"{type(error).__name__}: {error}")

@@ -15,9 +15,9 @@ from numba import njit, types
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
-from study.devices.device import REPLAY, DeviceInfo
+from study.devices.device import REPLAY_PREFIX, DeviceInfo
 from study.devices.force_dimension.device_models import MODELS
-from study.devices.governor.compiling import fingerprint
+from study.devices.governor.compiling import compute_fingerprint
 from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPPED, TRUE_ACCELERATION, CompiledRig
 from study.errors import DeviceError, StudyError
 from study.store.formats.recording_file import read_recording
@@ -86,7 +86,7 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     return sense, advance
 
 
-sense, advance = _compile_entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
+sense, advance = _compile_entry_points(compute_fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
 
 
 def make_replay_rig(path: Path) -> CompiledRig:
@@ -179,5 +179,5 @@ def _select_excitation(recording: Recording, path: Path) -> FloatArray:
 def _make_replay_error(reason: str) -> DeviceError:
     """Make the error for a file that cannot be replayed. reason: a sentence."""
     return DeviceError(
-        "This cannot be replayed", reason, f"Give a recording of `hapteq record`, as --device {REPLAY}FILE.h5."
+        "This cannot be replayed", reason, f"Give a recording of `hapteq record`, as --device {REPLAY_PREFIX}FILE.h5."
     )

@@ -13,7 +13,7 @@ from numba import njit, types
 from numpy import uint64
 
 from equalizer.signals.signal import FloatArray
-from study.devices.governor.compiling import fingerprint
+from study.devices.governor.compiling import compute_fingerprint
 from study.devices.simulated.dynamics import integrate_tick
 from study.devices.simulated.linkage import solve_inverse_kinematics
 from study.devices.simulated.sensors import read_sensors
@@ -50,7 +50,7 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any, Any]:
 
 
 sense, advance, solve_pose = _compile_entry_points(
-    fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
+    compute_fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 )
 """`sense` and `advance` with the arguments that `study.devices.rig.CompiledRig` states; `solve_pose`: joint
 angles and inverse Jacobian at a position, see `linkage.solve_inverse_kinematics`."""

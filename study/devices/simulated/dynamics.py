@@ -44,7 +44,7 @@ from study.devices.simulated.linkage import solve_inverse_kinematics
 
 
 @inlined
-def add_stops(state: FloatArray, parameters: FloatArray, generalised_force: FloatArray) -> None:
+def _add_stop_force(state: FloatArray, parameters: FloatArray, generalised_force: FloatArray) -> None:
     """Add the force (N) of the end stop to generalised_force[:3]: a spring and a damper beyond a sphere about the
     origin. The damper acts on outward motion only, so that the force never points outwards."""
     x, y, z = state[HANDLE_POSITION], state[HANDLE_POSITION + 1], state[HANDLE_POSITION + 2]
@@ -149,7 +149,7 @@ def _compute_accelerations(
         generalised_force[axis] = force[axis] + quantities.centrifugal[axis]
         for drive in range(3):
             generalised_force[axis] += quantities.jacobian[drive, axis] * cable_torques[drive]
-    add_stops(state, parameters, generalised_force)
+    _add_stop_force(state, parameters, generalised_force)
     for mode in range(MOUNT_MODES):
         generalised_force[3 + mode] = -(
             parameters[MOUNT_STIFFNESS + mode] * state[MOUNT_DISPLACEMENT + mode]

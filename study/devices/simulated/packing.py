@@ -1,4 +1,4 @@
-"""Writes the named parameters of the simulated omega.3 into the flat array that its compiled functions read.
+"""Write the named parameters of the simulated omega.3 into the flat array that its compiled functions read.
 
 Called by `omega3` (a device) and `simulated_linkage`; `layout` defines the elements of the array. Derived quantities
 are computed here: modal stiffness m w² and damping 2 zeta m w from frequency and damping ratio, the coefficients of
@@ -16,7 +16,8 @@ from study.devices.simulated.parameters import GRAVITY_MPS2, Linkage, Omega3Para
 
 
 def compute_isotropic_depth_m(linkage: Linkage) -> float:
-    """Distance from the base plane to the isotropic point on the axis, where the inertia is the same in all directions.
+    """Compute the distance from the base plane to the isotropic point on the axis, where the inertia is the same in all
+    directions.
 
     On the axis each Jacobian row is parallel to its forearm. Three rows at 120 degrees give J^T J a multiple of the
     identity when the forearm's radial part is sqrt(2) times its axial part. Raises ValueError where the arms are too
@@ -29,14 +30,14 @@ def compute_isotropic_depth_m(linkage: Linkage) -> float:
     return linkage.forearm_m / math.sqrt(3) + linkage.upper_arm_m * math.sqrt(1 - cos_upper_arm**2)
 
 
-def pack_parameters(parameters: Omega3Parameters, hand: bool, place_m: Vector) -> FloatArray:
-    """The parameters as an array (layout.PARAMETERS_SIZE,). hand: whether a hand holds the handle. place_m: position at
-    which the hand's spring is relaxed. Raises ValueError as `compute_isotropic_depth_m`."""
+def pack_parameters(parameters: Omega3Parameters, has_hand: bool, place_m: Vector) -> FloatArray:
+    """Pack the parameters into an array (layout.PARAMETERS_SIZE,). has_hand: whether a hand holds the handle. place_m:
+    position at which the hand's spring is relaxed. Raises ValueError as `compute_isotropic_depth_m`."""
     packed = np.zeros(layout.PARAMETERS_SIZE)
     _pack_linkage(packed, parameters)
     _pack_drives(packed, parameters)
     _pack_mount(packed, parameters)
-    _pack_handle(packed, parameters, hand)
+    _pack_handle(packed, parameters, has_hand)
     _pack_sensor(packed, parameters)
     _write_elements(packed, layout.HAND_REST, place_m)
     stops = parameters.stops
@@ -45,7 +46,7 @@ def pack_parameters(parameters: Omega3Parameters, hand: bool, place_m: Vector) -
 
 
 def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
-    """The state (layout.STATE_SIZE,) at rest: the handle at place_m, the motors at the corresponding joint angles,
+    """Make the state (layout.STATE_SIZE,) at rest: the handle at place_m, the motors at the corresponding joint angles,
     cables and modes without load. packed: the result of `pack_parameters`."""
     state = np.zeros(layout.STATE_SIZE)
     _write_elements(state, layout.HANDLE_POSITION, place_m)
@@ -56,9 +57,9 @@ def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
 
 
 def compute_effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float:
-    """Effective mass at the origin without a hand, averaged over directions: m + I trace(J^T J) / 3, with the mass m of
-    handle and forearms, the inertia I of an arm with its drive, and the Jacobian J from velocity to joint speeds. At
-    the isotropic point it is the same in all directions."""
+    """Compute the effective mass at the origin without a hand, averaged over directions: m + I trace(J^T J) / 3, with
+    the mass m of handle and forearms, the inertia I of an arm with its drive, and the Jacobian J from velocity to joint
+    speeds. At the isotropic point it is the same in all directions."""
     jacobian = np.empty((3, 3))
     solve_pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses
@@ -68,12 +69,12 @@ def compute_effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) 
 
 def _write_elements(packed: FloatArray, start: int, values: tuple[float, ...] | FloatArray) -> None:
     """Write values of any shape, row by row, from the index `start` on."""
-    flat = np.ravel(np.asarray(values, dtype=float))
-    packed[start : start + flat.size] = flat
+    flat_values = np.ravel(np.asarray(values, dtype=float))
+    packed[start : start + flat_values.size] = flat_values
 
 
-def _normalise(directions: tuple[Vector, ...]) -> FloatArray:
-    """(directions, 3): unit vectors."""
+def _compute_unit_vectors(directions: tuple[Vector, ...]) -> FloatArray:
+    """Unit vectors (directions, 3) along the given vectors."""
     rows = np.array(directions, dtype=float)
     unit_vectors: FloatArray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
     return unit_vectors
@@ -85,6 +86,8 @@ def _compute_low_pass_coefficient(frequency_hz: float) -> float:
 
 
 def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
+    """Pack lengths (m), azimuths (as cosine and sine) and inertias (kg m²) of the linkage; without a given depth of the
+    platform, that of the isotropic point."""
     linkage = parameters.linkage
     packed[layout.UPPER_ARM_LENGTH] = linkage.upper_arm_m
     packed[layout.FOREARM_LENGTH] = linkage.forearm_m
@@ -99,6 +102,7 @@ def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
 
 
 def _pack_drives(packed: FloatArray, parameters: Omega3Parameters) -> None:
+    """Pack amplifier, friction, encoders and cables of the drives; cable damping 2 zeta sqrt(k I) from its ratio."""
     drives = parameters.drives
     packed[layout.AMPLIFIER_COEFFICIENT] = _compute_low_pass_coefficient(drives.amplifier_hz)
     packed[layout.COULOMB_FRICTION] = drives.friction_n_m
@@ -112,18 +116,20 @@ def _pack_drives(packed: FloatArray, parameters: Omega3Parameters) -> None:
 
 
 def _pack_mount(packed: FloatArray, parameters: Omega3Parameters) -> None:
+    """Pack modal mass, stiffness, damping and direction of the rocking modes of the base."""
     mount = parameters.mount
     masses, natural_rad_per_s = np.array(mount.masses_kg), 2 * math.pi * np.array(mount.frequencies_hz)
     _write_elements(packed, layout.MOUNT_MASS, masses)
     _write_elements(packed, layout.MOUNT_STIFFNESS, masses * natural_rad_per_s**2)
     _write_elements(packed, layout.MOUNT_DAMPING, 2 * np.array(mount.damping_ratios) * masses * natural_rad_per_s)
-    _write_elements(packed, layout.MOUNT_DIRECTION, _normalise(mount.directions))
+    _write_elements(packed, layout.MOUNT_DIRECTION, _compute_unit_vectors(mount.directions))
 
 
-def _pack_handle(packed: FloatArray, parameters: Omega3Parameters, hand: bool) -> None:
+def _pack_handle(packed: FloatArray, parameters: Omega3Parameters, has_hand: bool) -> None:
+    """Pack the modes of the handle, the mass matrix of the platform (kg) and, with a hand, its impedance."""
     modes = parameters.handle_modes
     masses, natural_rad_per_s = np.array(modes.masses_kg), 2 * math.pi * np.array(modes.frequencies_hz)
-    directions = _normalise(modes.directions)
+    directions = _compute_unit_vectors(modes.directions)
     _write_elements(packed, layout.MODE_MASS, masses)
     _write_elements(packed, layout.MODE_STIFFNESS, masses * natural_rad_per_s**2)
     _write_elements(packed, layout.MODE_DAMPING, 2 * np.array(modes.damping_ratios) * masses * natural_rad_per_s)
@@ -133,7 +139,7 @@ def _pack_handle(packed: FloatArray, parameters: Omega3Parameters, hand: bool) -
     moving_mass_kg = parameters.masses.handle_kg + parameters.masses.forearm_kg
     # The modes' masses are part of the handle, so that its mass at low frequency is the same in all directions.
     platform_mass = moving_mass_kg * np.eye(3) - np.einsum("m,mi,mj->ij", masses, directions, directions)
-    if hand:
+    if has_hand:
         platform_mass += np.diag(parameters.hand.mass_kg)
         _write_elements(packed, layout.HAND_DAMPING, parameters.hand.damping_n_s_per_m)
         _write_elements(packed, layout.HAND_STIFFNESS, parameters.hand.stiffness_n_per_m)

@@ -30,7 +30,8 @@ from study.store.disk.text_file import read_text, write_text
 CHALLENGE_PACKAGE = "study.evaluation.challenge"
 """Package that makes the cases: while cases are answered, it cannot be imported, and its files cannot be opened."""
 FILE_EVENTS = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
-"""Python's audit events when files or folders are opened, listed, renamed, linked or copied."""
+"""Python's audit events when files or folders are opened, listed, entered, renamed, linked or copied; their first
+argument is the path that is checked."""
 PROCESS_EVENTS = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
 """Python's audit events when a program is started. HDF5 opens files in C without any audit event, but only gets paths
 that this module has built."""
@@ -62,7 +63,7 @@ def isolate_process(open_folder: Path) -> None:
         return path == folder or path.startswith(f"{folder}{os.sep}")
 
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
-        """Raises PermissionError for an event that would break the blindness of the test."""
+        """Raise PermissionError for an event that would break the blindness of the test."""
         if event in PROCESS_EVENTS:
             raise PermissionError(f"a diagnosis must not start a program ({event})")
         if event not in FILE_EVENTS or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
@@ -77,7 +78,7 @@ def isolate_process(open_folder: Path) -> None:
 
 
 def hash_other_recordings(case_folder: Path) -> dict[str, str]:
-    """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `case_folder`."""
+    """Compute the SHA-256 of every recording of a case but the first, by its path relative to `case_folder`."""
     paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING_FILE]
     return {str(path.relative_to(case_folder)): compute_sha256(path) for path in paths}
 
@@ -114,8 +115,8 @@ def is_challenge_loaded() -> bool:
 
 
 def compute_engine_digest() -> str:
-    """Hash of the source code on which an answer depends: first 16 hex digits of SHA-256 over `analysis.diagnosis`
-    and `equalizer`."""
+    """Compute the hash of the source code on which an answer depends: first 16 hex digits of SHA-256 over the Python
+    files of `analysis.diagnosis` and `equalizer`."""
     digest = hashlib.sha256()
     for package in (analysis.diagnosis, equalizer):
         package_folder = Path(package.__path__[0])
@@ -132,7 +133,7 @@ def _make_time_budget(processor_s: float | None) -> Callable[[], bool]:
 
 
 def _diagnose_case(case_folder: Path) -> dict[str, Any]:
-    """Diagnose the recordings in `case_folder` with the settings of the case; the answer as JSON values."""
+    """Diagnose the recordings in `case_folder` with the settings of the case. Returns the answer as JSON values."""
     from analysis.diagnosis.diagnose import diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
     from analysis.diagnosis.document import diagnosis_to_json

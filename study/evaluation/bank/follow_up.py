@@ -60,7 +60,7 @@ def follow_up(
     on_done: Callable[[int, int], None],
 ) -> tuple[FollowUp, ...]:
     """Seal, diagnose and evaluate follow-up cases of all cases with a single concealed effect for which the diagnosis
-    named an effect and returned more than it named; () without such cases.
+    named an effect and returned more than it named; an empty tuple where there is no such case.
 
     folder: the bank of the first cases; options: the workers, and whether to keep recordings after they are answered;
     on_done: called with the numbers of answered and of all follow-up cases. After an interruption the same call
@@ -103,17 +103,19 @@ def _seal_follow_up_cases(
         best_words = proposal["best"]
         # A single text in answers of older versions, None without a proposed experiment.
         proposed_words = [best_words] if isinstance(best_words, str) else best_words or ()
-        proposed = [experiment for experiment in menu if experiment.words in proposed_words]
+        proposed_experiments = [experiment for experiment in menu if experiment.words in proposed_words]
         random_order = np.random.default_rng([plan.seed, undecided_case.number, NOISE_SEED]).permutation(len(menu))
-        random_experiments = [menu[menu_index] for menu_index in random_order[: max(len(proposed), 1)]]
-        experiments_by_key = {RANDOM_KEY: random_experiments} | ({PROPOSED_KEY: proposed} if proposed else {})
+        random_experiments = [menu[menu_index] for menu_index in random_order[: max(len(proposed_experiments), 1)]]
+        experiments_by_key = {RANDOM_KEY: random_experiments} | (
+            {PROPOSED_KEY: proposed_experiments} if proposed_experiments else {}
+        )
         label |= {
-            key: _write_case(follow_up_bank, plan, (first_label, first_folder), experiments)
-            for key, experiments in experiments_by_key.items()
+            case_key: _write_case(follow_up_bank, plan, (first_label, first_folder), experiments)
+            for case_key, experiments in experiments_by_key.items()
         }
     write_text(follow_up_bank.get_label_file(undecided_case.number), json.dumps(label, indent=1) + "\n")
-    for key in {PROPOSED_KEY, RANDOM_KEY} & label.keys():
-        publish_case(follow_up_bank, follow_up_bank.unfinished / label[key]["name"])
+    for case_key in {PROPOSED_KEY, RANDOM_KEY} & label.keys():
+        publish_case(follow_up_bank, follow_up_bank.unfinished / label[case_key]["name"])
 
 
 def _write_case(
@@ -149,7 +151,8 @@ def _read_follow_up(follow_up_bank: ProofFolder, undecided_case: Outcome, label:
     """Read the effects that are returned after the proposed and after the random experiments; none for a failed
     diagnosis. Raises StudyError for a broken seal."""
 
-    def read_description_and_effects(key: str) -> tuple[str, tuple[str, ...]]:
+    def read_words_and_effects(key: str) -> tuple[str, tuple[str, ...]]:
+        """Read the description of the experiments of a follow-up case, and the effects returned after them."""
         if key not in label:
             return "", ()
         answer = read_answer(follow_up_bank.open / label[key]["name"])
@@ -158,14 +161,14 @@ def _read_follow_up(follow_up_bank: ProofFolder, undecided_case: Outcome, label:
         returned_effects = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
         return label[key]["words"], returned_effects
 
-    proposed_words, after_proposed = read_description_and_effects(PROPOSED_KEY)
-    random_words, after_random = read_description_and_effects(RANDOM_KEY)
+    proposed_words, effects_after_proposed = read_words_and_effects(PROPOSED_KEY)
+    random_words, effects_after_random = read_words_and_effects(RANDOM_KEY)
     return FollowUp(
         undecided_case.number,
         undecided_case.names[0],
         undecided_case.returned,
         proposed_words,
-        after_proposed,
+        effects_after_proposed,
         random_words,
-        after_random,
+        effects_after_random,
     )

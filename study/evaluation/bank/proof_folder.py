@@ -2,9 +2,9 @@
 
 Layout: bank.json (settings of the bank), open/CASE/ (all that the diagnosis gets, and its answer), sealed/NUMBER.json
 (labels), labels.sha256 (seals), engine.log, and begun/ while cases are written. The random name of a case does not
-reveal its number, so that the diagnosis cannot find its label. Used by all modules of this folder, in particular
-`seal_cases` (writes cases), `ask_engine` (diagnoses them) and `prove`.
-"""
+reveal its number, so that the diagnosis cannot find its label. next/ and controls/SEED/ are the banks of follow-up
+cases and of controls, with the same layout; a bank of laws has the test motions of each case beside its label. Used by
+all modules of this folder, in particular `seal_cases` (writes cases), `ask_engine` (diagnoses them) and `prove`."""
 
 import json
 from dataclasses import dataclass

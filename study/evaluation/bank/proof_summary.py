@@ -21,7 +21,8 @@ from study.evaluation.bank.prove import BlindTest
 
 def format_blind_test(result: BlindTest) -> Iterator[str]:
     """Format the summary as lines for the terminal: every miss, failed controls, each share with its 95 % confidence
-    interval, the expected calibration error of the probabilities, remarks, and the seal of the labels (SHA-256)."""
+    interval (names padded to 52 characters), the expected calibration error of the probabilities, remarks, and the seal
+    of the labels (SHA-256)."""
     score = result.score
     yield f"{len(score.misses)} misses in {len(result.outcomes)} cases"
     for miss in score.misses:

@@ -81,19 +81,19 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
     step, the number done and the total. Raises StudyError where the folder belongs to another bank, a sealed file has
     changed, or the run is interrupted."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
-    numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
+    case_numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
     with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
-        seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
-        names = read_case_names(folder, numbers)
-        _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
+        seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(case_numbers)))
+        case_names = read_case_names(folder, case_numbers)
+        _answer_cases(folder, plan, options, dict(zip(case_names, case_numbers, strict=True)), on_progress)
         outcomes = reveal_bank(folder, plan.cases, make_outcome)
         follow_ups = follow_up(
             folder, plan, outcomes, (options.diagnosis_workers, options.keep), partial(on_progress, "following up")
         )
         controls = _run_all_controls(path, plan, options, on_progress)
     return BlindTest(
-        folder, plan, seal, outcomes, compute_score(outcomes, follow_ups), list_engine_digests(folder, names),
-        _collect_other_digests(path), controls, follow_ups, plan.cases - len(numbers),
+        folder, plan, seal, outcomes, compute_score(outcomes, follow_ups), list_engine_digests(folder, case_names),
+        _collect_other_digests(path), controls, follow_ups, plan.cases - len(case_numbers),
     )  # fmt: skip
 
 
@@ -112,14 +112,15 @@ def _collect_other_digests(path: Path) -> tuple[str, ...]:
 
 
 def _answer_cases(
-    folder: ProofFolder, plan: BankPlan, options: BankOptions, numbers: Mapping[str, int], on_progress: Progress
+    folder: ProofFolder, plan: BankPlan, options: BankOptions, numbers_by_name: Mapping[str, int], on_progress: Progress
 ) -> None:
-    """Diagnose the cases that have no answer yet; a deleted recording is drawn again. numbers: case number by name."""
-    for name, number in numbers.items():
+    """Diagnose the cases that have no answer yet; a deleted recording is drawn again. numbers_by_name: number of
+    each case by its name."""
+    for name, number in numbers_by_name.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING_FILE).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.get_label_file(number)))
     diagnose_and_count(
-        folder, tuple(numbers), options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
+        folder, tuple(numbers_by_name), options.diagnosis_workers, partial(on_progress, "diagnosing"), keep=options.keep
     )
 
 

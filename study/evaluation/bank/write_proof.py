@@ -1,10 +1,10 @@
 """Write the results of a blind test of the diagnosis, in which effects are concealed in simulated recordings.
 
-`write_proof` writes into the folder of the test: `proof.json` (all figures), `proof.csv` (one row per case) and
-`report.html`. `write_table` writes the figures and the misses as small CSV tables that can be kept under version
-control. Both state the commit and the digests of the code that answered, so that figures can be traced to it. Called by
-`hapteq prove`; `write_law_proof` uses `FigureRow` and `read_current_commit`.
-"""
+`write_proof` writes into the folder of the test: `proof.json` (all figures), `proof.csv` (one row per case),
+`report.html`, and its pictures in figures/. A figure is a number, such as the share of correct answers. `write_table`
+writes the figures and the misses as small CSV tables that can be kept under version control. Both state the commit and
+the digests of the code that answered, so that figures can be traced to it. Called by `hapteq prove`; `write_law_proof`
+uses `FigureRow` and `read_current_commit`."""
 
 import json
 import subprocess
@@ -16,7 +16,7 @@ import analysis.diagnosis
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import compute_main_error
 from analysis.figures.blind_test_pictures import make_blind_test_pictures
-from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
+from analysis.reports.blind_test_report import BlindTestMetadata, render_blind_test_report
 from study.evaluation.bank.answer_cases import compute_engine_digest
 from study.evaluation.bank.proof_summary import list_remarks
 from study.evaluation.bank.prove import BlindTest
@@ -59,7 +59,7 @@ class CaseRow:
     adds: float
     """Rms change of the readings by the concealed effects, over the rms noise, in the worst channel."""
     detectable: bool
-    """Whether the effects change the readings enough to be detected, by the limit of `outcome.DETECTABLE`."""
+    """Whether the effects change the readings enough to be detected, by the limit of `outcome.DETECTABLE_ERROR`."""
     verdict: str
     """Verdict of the diagnosis."""
     named: str
@@ -120,7 +120,7 @@ def write_proof(result: BlindTest) -> None:
     write_text(folder / TABLE, format_csv_table(rows, CaseRow), overwrite=True)
     pictures = make_blind_test_pictures(result.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
-    facts = BlindTestFacts(
+    metadata = BlindTestMetadata(
         format_seed_range(result),
         result.seal,
         commit_hash,
@@ -130,7 +130,7 @@ def write_proof(result: BlindTest) -> None:
         result.follow_ups,
     )
     source = {"command": " ".join(anonymise_arguments(sys.argv))}
-    page = render_blind_test_report(result.outcomes, score, pictures, facts, source, format_local_now())
+    page = render_blind_test_report(result.outcomes, score, pictures, metadata, source, format_local_now())
     write_text(folder / PAGE, page, overwrite=True)
 
 
@@ -176,9 +176,9 @@ def read_answering_commit(result: BlindTest) -> str:
     commit, where the current code gave the answers or none were given; else "unknown: …"."""
     document = result.folder.path / DOCUMENT
     if document.exists():
-        earlier = read_json(document, FORMAT, VERSION)
-        if earlier.get("engines") == list(result.engines) and isinstance(earlier.get("commit"), str):
-            return str(earlier["commit"])
+        earlier_document = read_json(document, FORMAT, VERSION)
+        if earlier_document.get("engines") == list(result.engines) and isinstance(earlier_document.get("commit"), str):
+            return str(earlier_document["commit"])
     return (
         read_current_commit()
         if result.engines in ((), (compute_engine_digest(),))

@@ -2,7 +2,7 @@
 
 Negative controls (shuffled, silent, model of another device) must not be explained by an effect. Symmetry controls
 (axes exchanged, signs mirrored, names changed) must give the corresponding answer. The claims are judged in
-`analysis.evaluation.blind_test.control_claims`.
+`analysis.evaluation.blind_test.control_claims`. Called by `study.evaluation.bank.run_controls`.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -19,7 +19,8 @@ from study.evaluation.challenge.draw_case import Case, draw_case
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 CONTROL_EFFECT, CONTROL_STRENGTH = "force_saturation", 0.9
-"""Effect and strength of most control cases; the effect acts on a single axis, and no other effect resembles it."""
+"""Effect and strength (0 to 1) of most control cases: it acts on a single axis, and no other effect resembles it.
+Chosen."""
 MIRRORED_EFFECT = "constant_force"
 """Effect of the control whose signs are mirrored."""
 WRONG_EFFECT = "mains_hum"
@@ -66,8 +67,10 @@ def _draw_intact_input(seed: int, settings: CaseSettings) -> tuple[ControlInput,
 def _shuffle_samples(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """Response and position in a random order of the samples, the same for both; the command is unchanged."""
     case = _draw_control_case(seed, settings)
-    order = np.random.default_rng(seed).permutation(len(case.recording))
-    return (ControlInput(_map_samples(case.recording, lambda samples: samples[order], command=False), case.model),)
+    sample_order = np.random.default_rng(seed).permutation(len(case.recording))
+    return (
+        ControlInput(_map_samples(case.recording, lambda samples: samples[sample_order], command=False), case.model),
+    )
 
 
 def _exchange_models(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
@@ -91,9 +94,10 @@ def _draw_sensor_noise(seed: int, settings: CaseSettings) -> tuple[ControlInput,
 
 
 def _permute_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """Channels of command, response and position in reverse order; each keeps its name."""
-    two_axes = replace(settings, axes=(0, 1))
-    case = _draw_control_case(seed, two_axes)
+    """Two axes, with the channels of command, response and position in reverse order, each with its name; no inputs
+    where the case has no position."""
+    two_axis_settings = replace(settings, axes=(0, 1))
+    case = _draw_control_case(seed, two_axis_settings)
     recording, model = case.recording, case.model
     if recording.position is None:
         return ()
@@ -109,8 +113,8 @@ def _permute_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, 
 
 def _exchange_axes(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
     """The readings of two axes exchange their names, in command, response, position and model."""
-    two_axes = replace(settings, axes=(0, 1))
-    case = _draw_control_case(seed, two_axes)
+    two_axis_settings = replace(settings, axes=(0, 1))
+    case = _draw_control_case(seed, two_axis_settings)
     exchanged = _map_samples(case.recording, lambda samples: samples[:, ::-1])
     exchanged_model = replace(case.model, input=case.model.input[:, ::-1], output=case.model.output[::-1])
     return ControlInput(case.recording, case.model), ControlInput(exchanged, exchanged_model)
@@ -127,8 +131,8 @@ def _add_irrelevant_hypotheses(seed: int, settings: CaseSettings) -> tuple[Contr
     """The same input, first with all hypotheses about the sensor excluded, then with all hypotheses; the concealed
     effect is not among those of the sensor."""
     case = _draw_control_case(seed, settings)
-    irrelevant = tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.place == "sensor")
-    return ControlInput(case.recording, case.model, irrelevant), ControlInput(case.recording, case.model)
+    sensor_effects = tuple(entry.name for entry in EFFECT_ENTRIES if entry.place == "sensor")
+    return ControlInput(case.recording, case.model, sensor_effects), ControlInput(case.recording, case.model)
 
 
 def _rename_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
@@ -152,7 +156,7 @@ def _allow_wrong_effect_only(seed: int, settings: CaseSettings) -> tuple[Control
         ControlInput(
             case.recording,
             case.model,
-            tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.name != WRONG_EFFECT),
+            tuple(entry.name for entry in EFFECT_ENTRIES if entry.name != WRONG_EFFECT),
         ),
     )
 

@@ -3,7 +3,7 @@
 A block of forty cases has ten with nothing missing, eighteen with one effect, four with two, four with an effect
 outside the catalogue, and four where the diagnosis may not name the true effect. Five of the forty have larger
 nuisance effects, and five come from a second physics engine. The order within a block is random. All counts
-and shares are chosen. Called by `study.evaluation.bank.seal_cases`.
+and shares are chosen. Called by `study.evaluation.bank.seal_cases`; `laws.draw_law` uses two constants.
 
 The random streams of a bank's seed have the keys 1 (order of a block), 2 (a case) and 3 (order of the effects).
 """
@@ -82,15 +82,16 @@ class CaseDraw:
 
 def draw_case_plan(seed: int, number: int, short_periods: bool = False) -> CaseDraw:
     """Draw the design of a case. The same seed and number give the same case in a bank of any size. short_periods: 1000
-    samples per period in place of 2000, for tests. A multisine has three periods with short periods or fewer than three
-    axes, else four."""
-    block, position = divmod(number, len(CASE_BLOCK))
-    block_order = np.random.default_rng([seed, 1, block]).permutation(len(CASE_BLOCK))
-    kind, bank = CASE_BLOCK[block_order[position]]
+    samples per period in place of 2000, for tests. The model is calibrated or retuned with equal probability, but
+    always calibrated with a concealed hand. A multisine has three periods with short periods or fewer than three axes,
+    else four."""
+    block_number, position_in_block = divmod(number, len(CASE_BLOCK))
+    block_order = np.random.default_rng([seed, 1, block_number]).permutation(len(CASE_BLOCK))
+    kind, bank = CASE_BLOCK[block_order[position_in_block]]
     random = np.random.default_rng([seed, 2, number])
     # Number of earlier cases of this kind and bank: all effects are used in turn, each with evenly spread strengths.
-    earlier_cases = block * CASE_BLOCK.count((kind, bank)) + sum(
-        CASE_BLOCK[case_index] == (kind, bank) for case_index in block_order[:position]
+    earlier_cases = block_number * CASE_BLOCK.count((kind, bank)) + sum(
+        CASE_BLOCK[case_index] == (kind, bank) for case_index in block_order[:position_in_block]
     )
     effects, strengths = _draw_effects(seed, kind, bank, earlier_cases, random)
     axes = _draw_axes(effects, random)
@@ -121,18 +122,18 @@ def _draw_effects(
     """Draw effects and strengths of a case. earlier_cases: number of earlier cases of the same kind and bank. The cases
     pass through all effects in the same random order; the strength of an effect advances by `GOLDEN_STEP` at each
     pass. Pairs are drawn independently."""
-    lowest = LOWEST_STRENGTHS[kind]
+    lowest_strength = LOWEST_STRENGTHS[kind]
     if kind == "nothing":
         return (), ()
     if kind == "pair":
-        return _draw_pair(random), tuple(float(value) for value in random.uniform(lowest, 1.0, 2))
-    names = tuple(DECOYS if kind == "outside" else mujoco_access.EFFECTS if bank == "engine" else EFFECTS)
+        return _draw_pair(random), tuple(float(value) for value in random.uniform(lowest_strength, 1.0, 2))
+    effect_names = tuple(DECOYS if kind == "outside" else mujoco_access.EFFECTS if bank == "engine" else EFFECTS)
     stream_seed = [seed, 3, sorted(LOWEST_STRENGTHS).index(kind), sorted(NUISANCE_SIZES).index(bank)]
-    effect_order = np.random.default_rng(stream_seed).permutation(len(names))
-    pass_number, position = divmod(earlier_cases, len(names))
-    effect_index = int(effect_order[position])
+    effect_order = np.random.default_rng(stream_seed).permutation(len(effect_names))
+    pass_number, order_position = divmod(earlier_cases, len(effect_names))
+    effect_index = int(effect_order[order_position])
     strength_share = (np.random.default_rng([*stream_seed, effect_index]).random() + pass_number * GOLDEN_STEP) % 1.0
-    return (names[effect_index],), (float(lowest + (1.0 - lowest) * strength_share),)
+    return (effect_names[effect_index],), (float(lowest_strength + (1.0 - lowest_strength) * strength_share),)
 
 
 def _draw_pair(random: np.random.Generator) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Draws a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
+"""Draw a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
 
 Steps: draw bench and excitation, add nuisance effects (`nuisance_effects`), draw and build in the concealed effects,
 simulate and measure, make the model that a laboratory would have (`nominal_models`). Called by `draw_bank` and
@@ -112,11 +112,11 @@ def draw_case(
     model = as_model(device_name, nominal, tolerance, settings.axes)
     recording = make_recording(device_name, plan, response, position, settings)
 
-    def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:
+    def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:  # `RecordAgain`
         drive = make_further_plan(command, kind, settings)
-        loaded = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
+        heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
         readings = read_sensor(
-            device.sensor, *simulate_motion(loaded, drive.command), RATE_HZ, np.random.default_rng([seed, noise_seed])
+            device.sensor, *simulate_motion(heavier, drive.command), RATE_HZ, np.random.default_rng([seed, noise_seed])
         )
         return replace(make_recording(device_name, drive, *readings, settings), meta=describe_added_mass(added_kg))
 

@@ -39,17 +39,17 @@ class Sensor:
     drift_mps2: FloatArray = field(default_factory=lambda: np.zeros(3))
     """Drift (m/s^2) at the end of the recording; it grows linearly from 0."""
     offset_mps2: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """Constant error of the acceleration."""
+    """Constant error of the acceleration (m/s^2)."""
     delay_s: float = 0.0
     """Delay of the recorded acceleration relative to the commands; negative: it is early."""
     hum_mps2: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
-    """Amplitudes of the mains hum, (sine and cosine, channels)."""
+    """Amplitudes of the mains hum (m/s^2), (sine and cosine, channels)."""
     hum_hz: float = 50.0
-    """Frequency of the hum."""
+    """Frequency of the hum (Hz)."""
     range_mps2: FloatArray = field(default_factory=lambda: np.full(3, RANGE_MPS2))
-    """Magnitude at which the acceleration is clipped."""
+    """Magnitude at which the acceleration is clipped (m/s^2)."""
     resolution_mps2: float = 0.0
-    """Quantization step of the acceleration; 0: not quantized."""
+    """Quantization step of the acceleration (m/s^2); 0: not quantized."""
     clock_error_ppm: float = 0.0
     """Relative error e of the sampling clock, in 1e-6: a sample with the time stamp t was taken at t (1 + 1e-6 e)."""
     lost_fraction: float = 0.0
@@ -57,7 +57,7 @@ class Sensor:
     inverse_saturation: float = 0.0
     """s of the saturating characteristic tanh(s a) / s, 1/(m/s^2): inverse of its largest output; 0: none."""
     play_half_width_mps2: float = 0.0
-    """Half of the width of the play hysteresis; 0: none."""
+    """Half of the width of the play hysteresis (m/s^2); 0: none."""
     static_law: Callable[[FloatArray], FloatArray] | None = None
     """Additional static characteristic: maps accelerations (samples, 3) to accelerations; None: the identity."""
 

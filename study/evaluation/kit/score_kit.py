@@ -12,9 +12,9 @@ from pathlib import Path
 from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.lab_kit import (
-    MISSING,
+    NO_DIAGNOSIS,
     Label,
-    Scored,
+    ScoredLabel,
     compute_kit_figures,
     score_label,
     score_unanswered,
@@ -34,7 +34,7 @@ NOTHING_SCORED = "Nothing was scored, and nothing written."
 class KitScore:
     """Diagnoses of a lab's recordings compared with the sealed labels."""
 
-    rows: tuple[Scored, ...]
+    rows: tuple[ScoredLabel, ...]
     """One row per label, including labels without a diagnosis."""
     figures: tuple[IntervalEstimate, ...]
     """Rates with their 95 % confidence intervals."""
@@ -57,7 +57,7 @@ def score_kit(path: Path, diagnoses: Path, scores_path: Path, seal: str | None =
         score_unanswered(label) if diagnosis is None else score_label(label, diagnosis)
         for label, diagnosis in zip(labels, label_diagnoses, strict=True)
     )
-    write_text(scores_path, format_csv_table(scored_labels, Scored))
+    write_text(scores_path, format_csv_table(scored_labels, ScoredLabel))
     return KitScore(scored_labels, compute_kit_figures(scored_labels), digest, compared_with)
 
 
@@ -76,9 +76,9 @@ def _format_figure(figure: IntervalEstimate) -> str:
     return f"{figure.name}: {figure.hits} of {figure.of}, {100 * figure.value:.0f} % {interval}"
 
 
-def _format_missed_label(scored_label: Scored) -> str:
+def _format_missed_label(scored_label: ScoredLabel) -> str:
     """Format the line of a label that was missed by its diagnosis, or has none."""
-    if scored_label.verdict == MISSING:
+    if scored_label.verdict == NO_DIAGNOSIS:
         return f"Missing: {scored_label.recording}, {scored_label.change}: no diagnosis; it counts as not right."
     return (
         f"Missed: {scored_label.recording}, {scored_label.change}: {scored_label.verdict.replace('_', ' ')}, "

@@ -240,10 +240,10 @@ def _test_on_further(test_map: FoundMap, real_recording: RealRecording, findings
     error_without, error_with = (
         errors.with_gain if has_free_gain else errors.without_gain for errors in (retuned_error, improved_error)
     )
-    error_label = improved_error.error + (", one factor fitted" if has_free_gain else "")
+    error_label = improved_error.measure_name + (", one factor fitted" if has_free_gain else "")
     stretches = (
         ()
-        if has_free_gain or improved_error.error == "predicted force"
+        if has_free_gain or improved_error.measure_name == "predicted force"
         else _make_full_record_stretches(test_map.name, recording, retuned_error, improved_error)
     )
     return FurtherTest(test_map.name, title, error_label, error_without, error_with, stretches)

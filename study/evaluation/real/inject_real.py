@@ -49,17 +49,18 @@ from study.store.formats.mechanical_model_file import read_mechanical_model, wri
 from study.store.formats.recording_file import write_recording
 
 NO_FAULT_SHARE = 0.5
-"""Probability that a case has no fault: these cases count false alarms."""
+"""Probability that a case has no fault: these cases count false alarms. Chosen."""
 TWO_FAULTS_SHARE = 0.15
-"""Probability that a case with faults has two of them instead of one."""
+"""Probability that a case with faults has two of them instead of one. Chosen."""
 PROCESSOR_S = 180.0
-"""Limit of the processor time (s) of the search in a case: real recordings take longer than simulated ones."""
+"""Limit of the processor time (s) of the search in a case: real recordings take longer than simulated ones.
+Chosen."""
 KEPT_METADATA = ("feedback", "imposed", "parts")
 """Keys of the metadata that a diagnosis uses; all others are removed, because they may reveal the device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Carrier:
+class InjectableRecording:
     """A real recording into which faults can be injected."""
 
     name: str
@@ -68,13 +69,13 @@ class Carrier:
     recording: Recording
 
 
-def load_carriers(
+def load_injectable_recordings(
     diagnosis_folder: Path, recordings: Sequence[RealRecording], answers: Sequence[RealAnswer]
-) -> tuple[Carrier, ...]:
-    """The recordings whose diagnosis was not refused, each with the improved model that its diagnosis wrote into
+) -> tuple[InjectableRecording, ...]:
+    """Load the recordings whose diagnosis was not refused, each with the improved model that its diagnosis wrote into
     `diagnosis_folder`. answers: in the order of `recordings`."""
     return tuple(
-        Carrier(
+        InjectableRecording(
             real_recording.name,
             read_mechanical_model(diagnosis_folder / real_recording.folder.name / real_recording.name / MODEL_NAME),
             import_real_recording(real_recording.found_map),
@@ -84,10 +85,12 @@ def load_carriers(
     )
 
 
-def seal_injections(folder: ProofFolder, carriers: Sequence[Carrier], count: int, seed: int) -> tuple[str, ...]:
-    """Draw, write and seal the cases that do not exist yet; returns the names of all `count` cases in order. Raises
-    StudyError where there is no carrier."""
-    if not carriers:
+def seal_injections(
+    folder: ProofFolder, injectable_recordings: Sequence[InjectableRecording], count: int, seed: int
+) -> tuple[str, ...]:
+    """Draw, write and seal the cases that do not exist yet; returns the names of all `count` cases in order. The
+    recordings are used in turn. Raises StudyError where there is none."""
+    if not injectable_recordings:
         raise StudyError(
             "There is nothing to inject faults into",
             "None of the recordings was diagnosed by its motion, by a model that explains some of it.",
@@ -95,39 +98,39 @@ def seal_injections(folder: ProofFolder, carriers: Sequence[Carrier], count: int
             saved="The diagnoses are written.",
         )
     with finish_begun_cases(folder):
-        names = [_write_injection(folder, carriers, number, seed) for number in range(count)]
+        case_names = [_write_injection(folder, injectable_recordings, number, seed) for number in range(count)]
     seal(folder)
-    return tuple(names)
+    return tuple(case_names)
 
 
-def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: int, seed: int) -> str:
-    """Draw one case, and write its files and its label, to be sealed by `seal`; returns its name. An existing case is
-    kept."""
+def _write_injection(folder: ProofFolder, recordings: Sequence[InjectableRecording], number: int, seed: int) -> str:
+    """Draw one case, with the same strength for all its faults, and write its files and its label, to be sealed by
+    `seal`; returns its name. An existing case is kept."""
     label_path = folder.get_label_file(number)
     if label_path.exists():
         return str(read_label(label_path)["name"])
     generator = np.random.default_rng([seed, number])
-    carrier = carriers[number % len(carriers)]
-    intact, faultless = draw_halves(carrier.recording, generator)
+    source = recordings[number % len(recordings)]
+    clean, faultless = draw_halves(source.recording, generator)
     effects = () if generator.random() < NO_FAULT_SHARE else _draw_effects(faultless, generator)
     strength = float(generator.random())
     faulty, values = faultless, dict[str, float]()
     for effect in effects:
         injected = inject(faulty, effect, strength, generator)
         faulty, values = injected.recording, values | injected.values
-    intact, faultless, faulty = (_remove_origin(blank_lead_responses(half)) for half in (intact, faultless, faulty))
-    change = compute_held_out_change(intact, faultless, faulty) if effects else 1.0
+    clean, faultless, faulty = (_remove_origin(blank_lead_responses(half)) for half in (clean, faultless, faulty))
+    change = compute_held_out_change(clean, faultless, faulty) if effects else 1.0
     case_folder = begin_case(folder)
     (case_folder / CLEAN_FOLDER).mkdir()
     write_recording(case_folder / RECORDING_FILE, faulty, precision="float64")
-    write_recording(case_folder / CLEAN_FOLDER / RECORDING_FILE, intact, precision="float64")
-    write_mechanical_model(case_folder / MODEL_FILE, carrier.model)
+    write_recording(case_folder / CLEAN_FOLDER / RECORDING_FILE, clean, precision="float64")
+    write_mechanical_model(case_folder / MODEL_FILE, source.model)
     write_text(case_folder / SETTINGS_FILE, format_settings((), PROCESSOR_S))
     label_values = {
         "name": case_folder.name,
         "number": number,
         "seed": seed,
-        "recording": carrier.name,
+        "recording": source.name,
         "effects": list(effects),
         "places": [find_place(effect) for effect in effects],
         "strength": strength if effects else 0.0,
@@ -144,22 +147,22 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
 
 
 def _draw_effects(recording: Recording, generator: np.random.Generator) -> tuple[str, ...]:
-    """Names of one or two faults that the recording allows, in the order in which they are injected."""
-    applicable = list_applicable_injections(recording)
+    """Draw one or two faults that the recording allows; their names in the order in which they are injected."""
+    applicable_effects = list_applicable_injections(recording)
     count = 2 if generator.random() < TWO_FAULTS_SHARE else 1
-    effects = [str(effect) for effect in generator.choice(applicable, count, replace=False)]
+    effects = [str(effect) for effect in generator.choice(applicable_effects, count, replace=False)]
     # A sensor reads the motion that all other faults have changed: its fault is injected last.
     return tuple(sorted(effects, key=lambda effect: find_place(effect) == "sensor"))
 
 
 def _remove_origin(recording: Recording) -> Recording:
-    """The recording with the metadata of `KEPT_METADATA` alone."""
+    """Remove all metadata but those of `KEPT_METADATA`."""
     return replace(recording, meta={key: recording.meta[key] for key in KEPT_METADATA if key in recording.meta})
 
 
 def run_injections(
     path: Path,
-    carriers: Sequence[Carrier],
+    injectable_recordings: Sequence[InjectableRecording],
     count_and_seed: tuple[int, int],
     on_done: Callable[[int, int], None],
     workers: Workers = 2,
@@ -171,18 +174,19 @@ def run_injections(
     """
     count, seed = count_and_seed
     folder = open_proof_folder(path, seed, False)
-    names = seal_injections(folder, carriers, count, seed)
-    answered = sum(is_answered(folder.open / name) for name in names)
-    on_done(answered, count)
+    case_names = seal_injections(folder, injectable_recordings, count, seed)
+    answered_count = sum(is_answered(folder.open / name) for name in case_names)
+    on_done(answered_count, count)
 
     def count_answer(name: str) -> None:
-        nonlocal answered
-        answered += 1
-        on_done(answered, count)
+        """Report one more diagnosed case."""
+        nonlocal answered_count
+        answered_count += 1
+        on_done(answered_count, count)
 
-    diagnose_cases(folder, names, workers, count_answer)
-    labels = [read_label(folder.get_label_file(number)) for number in range(len(names))]
-    answers = [read_answer(folder.open / name) for name in names]
+    diagnose_cases(folder, case_names, workers, count_answer)
+    labels = [read_label(folder.get_label_file(number)) for number in range(len(case_names))]
+    answers = [read_answer(folder.open / name) for name in case_names]
     if broken_names := [
         label["name"]
         for label, answer in zip(labels, answers, strict=True)

@@ -3,7 +3,7 @@
 `diagnose_folder` lists the recordings, reuses the answers of an earlier run whose inputs are unchanged, diagnoses the
 other recordings in this process or on the workers of an executor, injects faults if `RealPlan.inject` is above 0, and
 writes page and table. Each answer is written as soon as it is known, so that an interrupted run can be resumed. The
-last 2 % of the progress are for page and table.
+last 2 % of the progress are for page and table. Called by `study.cli.real`.
 """
 
 import errno
@@ -24,7 +24,7 @@ from study.devices.clock import Clock, RealClock
 from study.errors import StudyError, UserInterruptError, WrongUseError, convert_interrupts
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, make_crash_result
-from study.evaluation.real.inject_real import load_carriers, run_injections
+from study.evaluation.real.inject_real import load_injectable_recordings, run_injections
 from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
 from study.evaluation.real.reuse_answers import (
     ANSWER_NAME,
@@ -95,14 +95,14 @@ def diagnose_folder(
         )
     real_folder = _list_recordings(plan)
     used_clock = clock or RealClock()
-    reused = find_reusable_answers(plan.out, real_folder.recordings, plan.seconds)
+    reused_answers = find_reusable_answers(plan.out, real_folder.recordings, plan.seconds)
     _create_output_folder(plan.out)
-    saved = f"What was answered so far is in {plan.out}."
-    with convert_interrupts("Not all recordings were diagnosed.", saved, further_types=(UserInterruptError,)):
+    saved_text = f"What was answered so far is in {plan.out}."
+    with convert_interrupts("Not all recordings were diagnosed.", saved_text, further_types=(UserInterruptError,)):
         if executor is None:
-            answers = _diagnose_here(plan, real_folder, reused, on_progress, used_clock)
+            answers = _diagnose_in_process(plan, real_folder, reused_answers, on_progress, used_clock)
         else:
-            answers = _diagnose_on_executor(plan, real_folder, reused, on_progress, executor)
+            answers = _diagnose_on_executor(plan, real_folder, reused_answers, on_progress, executor)
         injected = _inject_faults(plan, real_folder, answers, on_progress, executor or 2)
         on_progress("writing the page", 0.98)
         return write_real_results(
@@ -122,12 +122,12 @@ def _list_recordings(plan: RealPlan) -> RealFolder:
             "Give a number of 1 or more, such as 180, or leave it out.",
             saved="Nothing was written.",
         )
-    inventory = read_real_folder(plan.folder)
-    if inventory.recordings:
-        return inventory
+    real_folder = read_real_folder(plan.folder)
+    if real_folder.recordings:
+        return real_folder
     raise StudyError(
         "There is no recording to diagnose",
-        " ".join(f"{trouble.location}: {trouble.reason}" for trouble in inventory.troubles),
+        " ".join(f"{trouble.location}: {trouble.reason}" for trouble in real_folder.troubles),
         "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
         saved="Nothing was written.",
     )
@@ -144,37 +144,43 @@ def _create_output_folder(out: Path) -> None:
 
 
 def _inject_faults(
-    plan: RealPlan, inventory: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
+    plan: RealPlan, real_folder: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
 ) -> tuple[InjectedOutcome, ...]:
     """Inject `plan.inject` faults into diagnosed recordings and diagnose these; empty where it is 0."""
     if plan.inject == 0:
         return ()
     start_share = DIAGNOSIS_SHARE
     on_progress("injecting faults", start_share)
-    carriers = load_carriers(plan.out, inventory.recordings, answers)
+    injectable_recordings = load_injectable_recordings(plan.out, real_folder.recordings, answers)
 
     def report_progress(done: int, total: int) -> None:
         """Report the number of finished injections."""
         on_progress(f"injected faults, {done} of {total}", start_share + (0.98 - start_share) * done / max(total, 1))
 
-    return run_injections(plan.out / INJECTED_NAME, carriers, (plan.inject, plan.seed), report_progress, workers)
+    return run_injections(
+        plan.out / INJECTED_NAME, injectable_recordings, (plan.inject, plan.seed), report_progress, workers
+    )
 
 
-def _diagnose_here(
-    plan: RealPlan, inventory: RealFolder, reused: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
+def _diagnose_in_process(
+    plan: RealPlan,
+    real_folder: RealFolder,
+    reused_answers: Mapping[Path, RealAnswer],
+    on_progress: Progress,
+    clock: Clock,
 ) -> tuple[RealAnswer, ...]:
-    """Diagnose the recordings in order in this process, except those with an answer in `reused` (by answer folder);
-    returns all answers in order. With `plan.seconds`, the remaining time of a sub-folder is divided evenly among its
+    """Diagnose the recordings in order in this process, except those in `reused_answers` (by answer folder); returns
+    all answers in order. With `plan.seconds`, the remaining time of a sub-folder is divided evenly among its
     remaining recordings, less `OVERHEAD_S` each; each gets at least a tenth of `plan.seconds`."""
     answers, recording_count, end_share = (
         [],
-        max(len(inventory.recordings), 1),
+        max(len(real_folder.recordings), 1),
         DIAGNOSIS_SHARE if plan.inject else 0.98,
     )
     limit_s = plan.seconds or 0.0
-    remaining_s = dict.fromkeys((listed_recording.folder.name for listed_recording in inventory.recordings), limit_s)
-    for index, recording in enumerate(inventory.recordings):
-        remaining_count = sum(candidate.folder == recording.folder for candidate in inventory.recordings[index:])
+    remaining_s = dict.fromkeys((listed_recording.folder.name for listed_recording in real_folder.recordings), limit_s)
+    for index, recording in enumerate(real_folder.recordings):
+        remaining_count = sum(candidate.folder == recording.folder for candidate in real_folder.recordings[index:])
         start_s = measure_processor_s()
         budget_s = max(remaining_s[recording.folder.name] / remaining_count - OVERHEAD_S, 0.1 * limit_s)
 
@@ -186,7 +192,7 @@ def _diagnose_here(
                 end_share * (index + min(share, 1.0)) / recording_count,
             )
 
-        reused_answer = reused.get(locate_answer_folder(plan.out, recording))
+        reused_answer = reused_answers.get(locate_answer_folder(plan.out, recording))
         answers.append(reused_answer or _diagnose_and_write(plan, recording, budget_s, report_progress, clock))
         remaining_s[recording.folder.name] -= measure_processor_s() - start_s
     return tuple(answers)
@@ -194,24 +200,24 @@ def _diagnose_here(
 
 def _diagnose_on_executor(
     plan: RealPlan,
-    inventory: RealFolder,
-    reused: Mapping[Path, RealAnswer],
+    real_folder: RealFolder,
+    reused_answers: Mapping[Path, RealAnswer],
     on_progress: Progress,
     executor: Executor,
 ) -> tuple[RealAnswer, ...]:
-    """Diagnose the recordings without an answer in `reused` on the workers of the executor, which return the files of
-    the results; returns all answers in order."""
-    answer_paths = [locate_answer_folder(plan.out, real_recording) for real_recording in inventory.recordings]
+    """Diagnose the recordings without an answer in `reused_answers` on the workers of the executor, which return the
+    files of the results; returns all answers in order."""
+    answer_paths = [locate_answer_folder(plan.out, real_recording) for real_recording in real_folder.recordings]
     unanswered = [
         (answer_path, real_recording)
-        for answer_path, real_recording in zip(answer_paths, inventory.recordings, strict=True)
-        if answer_path not in reused
+        for answer_path, real_recording in zip(answer_paths, real_folder.recordings, strict=True)
+        if answer_path not in reused_answers
     ]
     tasks = (
         (answer_path, (real_recording.folder.name, real_recording.name, read_files(real_recording.folder)))
         for answer_path, real_recording in unanswered
     )
-    answers, end_share = dict(reused), DIAGNOSIS_SHARE if plan.inject else 0.98
+    answers, end_share = dict(reused_answers), DIAGNOSIS_SHARE if plan.inject else 0.98
     for answer_path, files in run_tasks(executor, diagnose_sent_recording, tasks, MAX_TASKS_IN_FLIGHT):
         with _create_folder_with_parents(answer_path) as answer_folder:
             write_files(answer_folder, files)
@@ -226,10 +232,10 @@ def diagnose_sent_recording(folder: str, name: str, files: FileContents) -> File
     with TemporaryDirectory() as temporary, without_forking():
         plan = RealPlan(Path(temporary) / "recordings", Path(temporary) / "out")
         write_files(plan.folder / folder, files)
-        inventory = read_real_folder(plan.folder)
-        real_recording = next((candidate for candidate in inventory.recordings if candidate.name == name), None)
+        real_folder = read_real_folder(plan.folder)
+        real_recording = next((candidate for candidate in real_folder.recordings if candidate.name == name), None)
         if real_recording is None:
-            reasons = " ".join(trouble.reason for trouble in inventory.troubles)
+            reasons = " ".join(trouble.reason for trouble in real_folder.troubles)
             raise StudyError(
                 "A recording did not come to its worker",
                 f"{folder}, {name}: it is not among the files that were sent. {reasons}".strip(),

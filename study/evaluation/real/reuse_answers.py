@@ -85,8 +85,8 @@ def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: f
 
 def _read_parents(provenance: Mapping[str, Any]) -> set[tuple[str, str]]:
     """Read (name, SHA-256) of all input files from a stored provenance; empty where it lists none."""
-    stored = provenance.get("parents")
-    parents = stored if isinstance(stored, list) else []
+    stored_parents = provenance.get("parents")
+    parents = stored_parents if isinstance(stored_parents, list) else []
     return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
 
 
@@ -116,12 +116,12 @@ def _format_seconds(limit_s: float | None) -> str:
     return "left out" if limit_s is None else f"{limit_s:g}"
 
 
-def _make_inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
+def _make_inputs_changed_error(out: Path, outdated_answers: Sequence[_EarlierAnswer]) -> StudyError:
     """Make the error that lists the changes of all outdated answers, and the folders to move away."""
     change_texts = (
-        f"{answer.folder.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated
+        f"{answer.folder.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated_answers
     )
-    paths_to_move = [str(answer.folder) for answer in outdated]
+    paths_to_move = [str(answer.folder) for answer in outdated_answers]
     if (injected_folder := out / INJECTED_NAME).exists():
         paths_to_move.append(f"{injected_folder}, which was computed from them")
     return StudyError(

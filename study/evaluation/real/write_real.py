@@ -29,6 +29,7 @@ class RealRow:
     measured."""
 
     folder: str
+    """Sub-folder of the recording."""
     recording: str
     verdict: str
     effects: str
@@ -53,8 +54,8 @@ class RealRow:
 
 @dataclass(frozen=True, slots=True)
 class InjectedRow:
-    """A row of the table of injected faults; the fields are those of `InjectedOutcome`. `change`: held-out error with
-    the fault, divided by that without it, of a base model fitted to the intact half."""
+    """A row of the table of injected faults; the fields are those of `InjectedOutcome`, with lists as texts separated
+    by spaces. injected: the faults joined by " + ", "nothing" without any; judged: `InjectedOutcome.answer_class`."""
 
     recording: str
     injected: str
@@ -108,7 +109,7 @@ def write_real_results(folder: Path, results: RealResults, generated: str) -> Wr
             overwrite=True,
         )
     else:
-        _remove_stale(folder / INJECTED_TABLE_NAME)
+        _delete_stale_table(folder / INJECTED_TABLE_NAME)
     page = render_real_report(
         results.answers, results.troubles, results.injected, pictures, provenance_texts, generated
     )
@@ -116,7 +117,7 @@ def write_real_results(folder: Path, results: RealResults, generated: str) -> Wr
     return WrittenReal(results, folder / PAGE_NAME, folder / TABLE_NAME)
 
 
-def _remove_stale(path: Path) -> None:
+def _delete_stale_table(path: Path) -> None:
     """Delete a table of an earlier run, if any. Raises CannotWriteError."""
     try:
         path.unlink(missing_ok=True)
@@ -126,9 +127,11 @@ def _remove_stale(path: Path) -> None:
 
 def _make_row(real_answer: RealAnswer) -> RealRow:
     """Make the row of a recording; its errors are None without held-out data."""
-    errors = real_answer.held_out
+    held_out_errors = real_answer.held_out
     error_as_given, error_retuned, error_with_effects, noise_floor = (
-        (None, None, None, None) if errors is None else (errors.before, errors.retuned, errors.after, errors.noise)
+        (None, None, None, None)
+        if held_out_errors is None
+        else (held_out_errors.before, held_out_errors.retuned, held_out_errors.after, held_out_errors.noise)
     )
     effects = " ".join(real_answer.effects)
     return RealRow(
@@ -139,7 +142,7 @@ def _make_row(real_answer: RealAnswer) -> RealRow:
 
 
 def _make_injection_row(outcome: InjectedOutcome) -> InjectedRow:
-    """Make the row of an injected fault; `injected` is "nothing" for the intact recording."""
+    """Make the row of a case; `injected` is "nothing" where no fault was injected."""
     values = " ".join(f"{name}={value:.6g}" for name, value in outcome.values.items())
     return InjectedRow(
         outcome.recording, outcome.injected or "nothing", outcome.strength, values, outcome.change,

@@ -2,7 +2,8 @@
 
 One row per combination of driver, place in the workspace, target signal and device: the rows are listed, played one by
 one (`reproduce_playback`), and split into those of the figure and those of the table only. Called by
-`reproduce_paper`; `reproduce_baselines` uses the drivers.
+`reproduce_paper`; `reproduce_baselines` uses the drivers (functions that make the forces of a playback), and
+`reproduction_results` contains the result.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,6 +29,7 @@ class PlacedModels:
     """Identified models by place and condition; all include the spring that acts during playback."""
 
     centre: IdentifiedModel
+    """Model at the centre of the workspace."""
     intermediate: tuple[IdentifiedModel, ...]
     """Models identified at `INTERMEDIATE_PLACES`, none of which is the edge."""
     frictionless: IdentifiedModel
@@ -58,9 +60,9 @@ def play_equalized(
 ) -> EqualizedPlayback:
     """Play all rows on the simulated device. on_share: called after each row with the completed fraction, 0 to 1.
     Raises DeviceError and StudyError as `play_row`."""
-    blended = blend_at(models.workspace, EDGE)
-    interpolated, remarks = _interpolate_modes(models.workspace)
-    rows = _list_rows(models, blended) | interpolated
+    blended_models = blend_at(models.workspace, EDGE)
+    modal_rows, modal_remarks = _interpolate_modes(models.workspace)
+    rows = _list_rows(models, blended_models) | modal_rows
     responses: dict[str, PlayedResponse] = {}
     for number, (key, row) in enumerate(rows.items(), start=1):
         response = play_row(plan, row)
@@ -68,19 +70,20 @@ def play_equalized(
         is_unequalized = row.driver is drive_without_equalizer
         responses[key] = replace(response, response=normalise_gain(response.response)) if is_unequalized else response
         on_share(number / len(rows))
-    return _split_rows(responses, (*blended.remarks, *remarks, *_describe_clipping(responses)))
+    return _split_rows(responses, (*blended_models.remarks, *modal_remarks, *_describe_clipping(responses)))
 
 
 def make_blending_driver(models: ModelsAtPlace) -> Driver:
     """Make the driver that plays the weighted sum of the forces of all models (`ModelsAtPlace.compute_forces`)."""
 
-    def drive(target: Signal) -> FloatArray:
+    def compute_drive_forces(target: Signal) -> FloatArray:
+        """Compute the forces (samples, axes), N, for a target signal."""
         return models.compute_forces(lambda model: compute_periodic_command(model, target).samples)
 
-    return drive
+    return compute_drive_forces
 
 
-def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
+def _list_rows(models: PlacedModels, blended_models: ModelsAtPlace) -> dict[str, PlaybackRow]:
     """List the rows to play by key: the fields of `EqualizedRows`, and further rows of the table."""
     centre_driver = make_single_model_driver(models.centre)
     frictionless_driver = make_single_model_driver(models.frictionless)
@@ -89,13 +92,16 @@ def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playba
         "equalized": PlaybackRow("Equalized, centre", centre_driver),
         "edge_unequalized": PlaybackRow("Not equalized, edge", drive_without_equalizer, EDGE),
         "edge": PlaybackRow("Edge, model of the centre", centre_driver, EDGE),
-        "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended), EDGE),
+        "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended_models), EDGE),
         "multisine_unequalized": PlaybackRow(
             "Not equalized, centre, all frequencies", drive_without_equalizer, signal="multisine"
         ),
         "multisine": PlaybackRow("Equalized, centre, all frequencies", centre_driver, signal="multisine"),
         "edge_multisine": PlaybackRow(
-            "Edge, models blended (ours), all frequencies", make_blending_driver(blended), EDGE, signal="multisine"
+            "Edge, models blended (ours), all frequencies",
+            make_blending_driver(blended_models),
+            EDGE,
+            signal="multisine",
         ),
         "frictionless_unequalized": PlaybackRow(
             "Not equalized, centre, without friction", drive_without_equalizer, device=FRICTIONLESS
@@ -120,7 +126,7 @@ def make_single_model_driver(model: IdentifiedModel) -> Driver:
 def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRow], tuple[str, ...]]:
     """Make the row with modal interpolation and its remarks; no row and a remark where the modes do not match."""
     try:
-        edge_models = build_modal_interpolation(workspace).at(EDGE)
+        edge_models = build_modal_interpolation(workspace).interpolate_at(EDGE)
     except ModesDoNotMatchError as mismatch:
         return {}, (f"No modes were interpolated: {mismatch}.",)
     row = PlaybackRow("Edge, modes interpolated (ours)", make_blending_driver(edge_models), EDGE)

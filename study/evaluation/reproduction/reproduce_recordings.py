@@ -1,7 +1,8 @@
 """Cache of the recordings for the reproduced figures: each is made once and reused by later runs.
 
-A recording is reused only where protocol, seed and position of the handle agree with the request. One that differs is
-never overwritten (StudyError); an interrupted one is removed and made again. Called by `reproduce_paper`.
+A recording is reused only where protocol, seed and position of the handle agree with the request; the device is not
+compared, because each file name stands for one device. A recording that differs is never overwritten (StudyError); an
+interrupted one is removed and made again. Called by `reproduce_paper`.
 """
 
 from collections.abc import Callable
@@ -52,28 +53,28 @@ def record_or_load(
     and StudyError where the folder contains a recording of another run under this name."""
     path = plan.recordings / f"{request.name}.h5"
     protocol = read_recording_protocol(request.protocol).protocol
-    cached = _load_cached_recording(path, plan, request, protocol)
-    if cached is None:
+    recording = _load_cached_recording(path, plan, request, protocol)
+    if recording is None:
         recording_plan = RecordingPlan(protocol, request.device, request.place_m, plan.seed, path)
         total_s = recording_plan.total_s
         record_device(recording_plan, lambda seconds: on_share(seconds / total_s))
-        cached = read_recording(path)
+        recording = read_recording(path)
     on_share(1.0)
-    return CachedRecording(path, cached, _warn_of_reduced_amplitudes(cached))
+    return CachedRecording(path, recording, _list_reduced_amplitudes(recording))
 
 
 def _load_cached_recording(
     path: Path, plan: ReproductionPlan, request: RecordingRequest, protocol: RecordingProtocol
 ) -> Recording | None:
-    """The cached recording; None where there is none, or only an interrupted one, which is removed. Raises StudyError
-    for a file that cannot be read or belongs to another run."""
+    """Load the cached recording; None where there is none, or only an interrupted one, which is removed. Raises
+    StudyError for a file that cannot be read or belongs to another run."""
     if not path.exists():
         return None
     try:
-        cached = read_recording(path)
+        recording = read_recording(path)
     except UnusableFileError as problem:
         raise _make_foreign_file_error(path, "it cannot be read") from problem
-    meta = cached.meta
+    meta = recording.meta
     provenance: dict[str, Any] = meta.get("provenance", {})
     if provenance.get("protocol_hash") != hash_protocol(protocol):
         raise _make_foreign_file_error(path, "it follows another protocol")
@@ -84,11 +85,11 @@ def _load_cached_recording(
     if meta.get("interrupted"):
         path.unlink()
         return None
-    return cached
+    return recording
 
 
-def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
-    """Sentences about segments whose amplitude (N) was lower than requested, for new and cached recordings alike."""
+def _list_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
+    """List, as sentences, the segments whose amplitude (N) was lower than requested, also for cached recordings."""
     return tuple(
         f"Played at {segment['played_amplitude_n']:.3g} N instead of {segment['requested_amplitude_n']:.3g} N along "
         f"{segment['along']}, because something was at its limit."

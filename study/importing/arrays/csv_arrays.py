@@ -1,8 +1,7 @@
 """Read the columns of a text table (CSV) as arrays; called by `read_arrays`, and `workbook_arrays` for its sheets.
 
 Encoding, delimiter, decimal sign, header and units are detected (`table_text`, `table_layout`). Empty fields are
-missing samples. A column of numbers and words is reported with line and column, but only where the column is used.
-"""
+missing samples. A column of numbers and words is reported, with line and column, only where it is used."""
 
 import io
 import re
@@ -33,7 +32,7 @@ MAX_COLUMNS = 10_000
 _MAX_LINE_CHARACTERS = 2**20
 """Longest line that is read, in characters: about a hundred for each of `MAX_COLUMNS` columns."""
 _MAX_QUOTED_CHARACTERS = 60
-"""Most characters of an invalid field that its message quotes."""
+"""Most characters of an invalid field that its message quotes. Chosen."""
 _NUMBER_FIELD = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 """Matches a line with a field that is a number, with any delimiter between its fields."""
 _GROUPED_NUMBER = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
@@ -75,49 +74,49 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     body = list(layout.body)
     _require_equal_rows(body, layout)
     comments = _find_comments(lines, layout)
-    text = "\n".join(line for _, line in body)
-    texts = {name for place, name in enumerate(layout.names) if place in layout.texts}
+    body_text = "\n".join(line for _, line in body)
+    text_names = {name for index, name in enumerate(layout.names) if index in layout.texts}
     first_fields = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
     stamp_names = {name for name, field in zip(layout.names, first_fields, strict=False) if is_stamp(field)}
-    dtypes = {name: str if name in stamp_names | texts else np.float64 for name in layout.names}
+    dtypes = {name: str if name in stamp_names | text_names else np.float64 for name in layout.names}
     try:
-        frame = _read_frame(text, layout, {"dtype": dtypes, "na_values": _MISSING_FIELDS})
+        frame = _read_frame(body_text, layout, {"dtype": dtypes, "na_values": _MISSING_FIELDS})
     except ValueError:
-        frame = _read_frame(text, layout, {"dtype": str})  # slower, but it finds the invalid field
+        frame = _read_frame(body_text, layout, {"dtype": str})  # slower, but it finds the invalid field
     if len(frame) != len(body):
-        number = next((number for number, line in body if line.count('"') % 2), body[0][0])
-        raise ValueError(f"line {number}: a quote is opened and not closed in its line; remove it, or close it")
-    table = _classify_columns({name: frame[name] for name in layout.names if name not in texts}, body, layout)
-    faulty = {name: problem for name in texts if (problem := _find_number(frame[name], name, body, layout))}
-    faulty |= {name: array.item() for name, array in table.by_name.items() if array.dtype.kind == "O"}
-    omitted = [f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in texts - {*faulty}]
-    omitted += [f"Left out: {problem}." for problem in faulty.values()]
-    by_name = {**table.by_name, **{name: np.array(problem, dtype=object) for name, problem in faulty.items()}}
-    return Table(by_name, table.clocks, (*table.notes, *omitted, *comments, *layout.notes))
+        line_number = next((line_number for line_number, line in body if line.count('"') % 2), body[0][0])
+        raise ValueError(f"line {line_number}: a quote is opened and not closed in its line; remove it, or close it")
+    table = _classify_columns({name: frame[name] for name in layout.names if name not in text_names}, body, layout)
+    faults = {name: problem for name in text_names if (problem := _find_fault(frame[name], name, body, layout))}
+    faults |= {name: array.item() for name, array in table.by_name.items() if array.dtype.kind == "O"}
+    notes = [f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in text_names - {*faults}]
+    notes += [f"Left out: {problem}." for problem in faults.values()]
+    by_name = {**table.by_name, **{name: np.array(problem, dtype=object) for name, problem in faults.items()}}
+    return Table(by_name, table.clocks, (*table.notes, *notes, *comments, *layout.notes))
 
 
 def _classify_columns(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
     """Convert columns to numbers or seconds; leave out those of words only. A column with words among its numbers is
     replaced by its problem. Raises ValueError for a number in another notation."""
-    numbers: dict[str, npt.NDArray[Any]] = {}
+    arrays: dict[str, npt.NDArray[Any]] = {}
     stamps, text_names = {}, []
     for name, column in columns.items():
         if column.dtype == np.float64:
-            numbers[name] = _reduce_to_scalar(column.to_numpy())
+            arrays[name] = _reduce_to_scalar(column.to_numpy())
         elif (stamp_column := read_stamps(column.mask(_is_missing(column)))) is not None:
             stamps[name] = stamp_column
         elif all(map(is_text, column[~_is_missing(column)].str.strip())):
             text_names.append(name)
         else:
             try:
-                numbers[name] = _reduce_to_scalar(_parse_numbers(column, name, body, layout))
+                arrays[name] = _reduce_to_scalar(_parse_numbers(column, name, body, layout))
             except ValueError as problem:
                 if not all(is_number(field, layout.decimal) or is_text(field) for field in column.str.strip()):
                     raise  # a number in another notation is an error, not a remark
-                numbers[name] = np.array(FaultyColumn(problem), dtype=object)
+                arrays[name] = np.array(FaultyColumn(problem), dtype=object)
     joined_stamps = join_stamps(stamps)
-    in_seconds = {name: _rename_in_seconds(name, columns) for name in joined_stamps}
-    all_columns = numbers | {name: _subtract_first(stamp.seconds) for name, stamp in joined_stamps.items()}
+    in_seconds = {name: _make_seconds_name(name, columns) for name in joined_stamps}
+    all_columns = arrays | {name: _subtract_first(stamp.seconds) for name, stamp in joined_stamps.items()}
     notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined_stamps.items())
     notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in text_names)
     by_name = {in_seconds.get(name, name): all_columns[name] for name in columns if name in all_columns}
@@ -125,46 +124,46 @@ def _classify_columns(columns: "Mapping[str, pd.Series[Any]]", body: list[Line],
 
 
 def _reduce_to_scalar(column: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Scalar () for a column with a value in its first row only, such as a rate; else the column (n,)."""
-    single = len(column) > 1 and not np.isnan(column[0]) and bool(np.isnan(column[1:]).all())
-    return np.asarray(column[0]) if single else column
+    """Reduce a column with a value in its first row only, such as a rate, to a scalar (); else return it (n,)."""
+    is_single = len(column) > 1 and not np.isnan(column[0]) and bool(np.isnan(column[1:]).all())
+    return np.asarray(column[0]) if is_single else column
 
 
-def _rename_in_seconds(name: str, names: Iterable[str]) -> str:
-    """Name of a column of time stamps after its conversion to seconds, different from all `names`."""
+def _make_seconds_name(name: str, used_names: Iterable[str]) -> str:
+    """Make the name of a column of time stamps that was converted to seconds, different from all `used_names`."""
     stem = split_bracketed_unit(name)[0]
-    return f"{stem} [s]" if f"{stem} [s]" not in names else f"{stem} stamp [s]"
+    return f"{stem} [s]" if f"{stem} [s]" not in used_names else f"{stem} stamp [s]"
 
 
-def _find_number(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
+def _find_fault(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
     """Find the first number in a column that was recognised as words: the problem, empty without a number."""
-    numbers = column.fillna("").map(lambda field: has_number([field.strip()], layout.decimal)).to_numpy()
-    if not numbers.any():
+    is_number_field = column.fillna("").map(lambda field: has_number([field.strip()], layout.decimal)).to_numpy()
+    if not is_number_field.any():
         return FaultyColumn()
-    number = body[int(np.argmax(numbers))][0]
-    return FaultyColumn(f"line {number}: column '{name}' holds words elsewhere; empty fields are missing samples")
+    line_number = body[int(np.argmax(is_number_field))][0]
+    return FaultyColumn(f"line {line_number}: column '{name}' holds words elsewhere; empty fields are missing samples")
 
 
 def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
+    """Whether each field (n,) stands for a missing sample."""
     return column.str.strip().str.lower().isin(MISSING)
 
 
 def convert_times(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
-    """Convert arrays of dates and clock times to seconds since the first; other arrays are unchanged. Raises ValueError
-    for stamps that do not exist or are ambiguous (`read_stamps`)."""
+    """Convert arrays of dates and clock times to seconds since the first; keep others. Raises as `read_stamps`."""
     converted, clocks, notes = {}, [], []
     for name, array in stored.items():
-        times = _convert_to_seconds(array)
-        key = name if times is None else _rename_in_seconds(name, stored)
-        converted[key] = array if times is None else times[0]
-        if times is not None:
-            clocks.append(key)
-            notes.append(f"{name}: read as seconds since {times[1]}.")
+        seconds_and_first = _convert_to_seconds(array)
+        column_name = name if seconds_and_first is None else _make_seconds_name(name, stored)
+        converted[column_name] = array if seconds_and_first is None else seconds_and_first[0]
+        if seconds_and_first is not None:
+            clocks.append(column_name)
+            notes.append(f"{name}: read as seconds since {seconds_and_first[1]}.")
     return Table(converted, tuple(clocks), tuple(notes))
 
 
 def _convert_to_seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | None:
-    """Seconds (n,) since the first of an array of dates or times, and the first as text; None for other arrays."""
+    """Convert dates or times to seconds (n,) since the first; also return the first as text. None for other arrays."""
     values = np.ravel(array)
     if len(values) < 2 or len(values) != max(array.shape) or array.dtype.kind not in "MmSU":
         return None
@@ -183,7 +182,7 @@ def _convert_to_seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64
 
 
 def _subtract_first(seconds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Seconds (n,) since the first stamp that is not missing; NaN stays NaN."""
+    """Compute the seconds (n,) since the first stamp that is not missing; NaN stays NaN."""
     return np.asarray(seconds - seconds[int(np.argmax(np.isfinite(seconds)))])
 
 
@@ -202,26 +201,26 @@ def _split_lines(text: str, settings: CsvMap) -> list[Line]:
 
 def _join_header(lines: list[Line]) -> list[Line]:
     """Join header lines within a quoted name that contains a line break; lines from the first number on are kept."""
-    first = next((index for index, (_, text) in enumerate(lines) if _NUMBER_FIELD.search(text)), 0)
+    first_index = next((index for index, (_, text) in enumerate(lines) if _NUMBER_FIELD.search(text)), 0)
     header: list[Line] = []
-    for number, text in lines[:first]:
+    for number, text in lines[:first_index]:
         if header and header[-1][1].count('"') % 2:
             header[-1] = (header[-1][0], f"{header[-1][1]} {text}")
         else:
             header.append((number, text))
     is_closed = not any(text.count('"') % 2 for _, text in header)
-    return [*header, *lines[first:]] if is_closed and len(header) < first else lines
+    return [*header, *lines[first_index:]] if is_closed and len(header) < first_index else lines
 
 
 def _find_comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
-    """Remark on the comment lines below the first row. Raises ValueError for a comment that has the fields of a row."""
-    first, width = layout.body[0][0], len(layout.names)
-    header = max((number for number, line in lines if number < first and not is_comment(line)), default=first)
-    below = [line for line in lines if line[0] > header and is_comment(line[1])]
-    omitted = [line for line in below if line[0] > first]
-    for number, line in below if layout.delimiter != " " else ():
+    """Make the remark on comments below the first row. Raises ValueError for a comment with the fields of a row."""
+    start, width = layout.body[0][0], len(layout.names)
+    header_end = max((number for number, line in lines if number < start and not is_comment(line)), default=start)
+    comments = [line for line in lines if line[0] > header_end and is_comment(line[1])]
+    omitted = [line for line in comments if line[0] > start]
+    for number, line in comments if layout.delimiter != " " else ():
         fields = split_row(line, layout.delimiter)
-        is_data = any(fields[1:]) if number > first else has_number(fields[1:], layout.decimal)
+        is_data = any(fields[1:]) if number > start else has_number(fields[1:], layout.decimal)
         if len(fields) >= width > 1 and is_data:
             raise ValueError(
                 f"line {number} begins with '{line.lstrip()[0]}' as a comment does, but has the fields of a row; "
@@ -232,35 +231,36 @@ def _find_comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
 
 
 def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
-    """Raises ValueError where a row has another number of fields than there are columns."""
-    delimiter, columns = layout.delimiter, len(layout.names)
-    for number, line in body:
+    """Raise ValueError where a row has another number of fields than there are columns."""
+    delimiter, column_count = layout.delimiter, len(layout.names)
+    for line_number, line in body:
         if '"' in line:
-            count = len(split_row(line, delimiter))
+            field_count = len(split_row(line, delimiter))
         else:
-            count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
-        if count != columns:
-            problem = f"line {number} has {count} fields, but there are {columns} columns"
-            raise ValueError(f"{problem}; {_suggest_remedy(number, line, body, delimiter)}")
+            field_count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
+        if field_count != column_count:
+            problem = f"line {line_number} has {field_count} fields, but there are {column_count} columns"
+            raise ValueError(f"{problem}; {_suggest_remedy(line_number, line, body, delimiter)}")
 
 
-def _suggest_remedy(number: int, line: str, body: list[Line], delimiter: str) -> str:
-    """Remedy for a row with the wrong number of fields, by the likely cause."""
+def _suggest_remedy(line_number: int, line: str, body: list[Line], delimiter: str) -> str:
+    """Suggest the remedy for a row with the wrong number of fields, by the likely cause."""
     if any(_GROUPED_NUMBER.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
         return NO_THOUSANDS
     if delimiter in ", " and re.search(rf"(?<![\d.])[1-9]\d{{0,2}}{delimiter}\d{{3}}(?!\d)", line):
         return f"where '{delimiter}' separates thousands, {NO_THOUSANDS}; else remove that line, or complete it"
-    if delimiter == " " and body[0][0] == number:
+    if delimiter == " " and body[0][0] == line_number:
         return "where blanks separate fields, put names that contain blanks in quotes"
-    if body[0][0] == number:
+    if body[0][0] == line_number:
         return "where the line above is no header, state skip_lines and names under [csv] in the map"
     return "remove that line, or complete it"
 
 
 def _read_frame(text: str, layout: TableLayout, options: dict[str, Any]) -> "pd.DataFrame":
+    """Read the rows by pandas with further options. Raises ValueError where it cannot parse them."""
     import pandas as pd  # imported only here, because the import takes longer than reading a file of another format
 
-    table: pd.DataFrame = pd.read_csv(
+    frame: pd.DataFrame = pd.read_csv(
         io.StringIO(text),
         sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
         names=list(layout.names),
@@ -270,7 +270,7 @@ def _read_frame(text: str, layout: TableLayout, options: dict[str, Any]) -> "pd.
         keep_default_na=False,
         **options,
     )
-    return table
+    return frame
 
 
 def _parse_numbers(
@@ -282,19 +282,19 @@ def _parse_numbers(
     fields = column.str.strip()
     if layout.decimal == ",":
         fields = fields.str.replace(".", " ", regex=False).str.replace(",", ".", regex=False)
-    missing = fields.str.lower().isin(MISSING)
-    values = pd.to_numeric(fields.where(~missing), errors="coerce")
-    unparsed = (values.isna() & ~missing).to_numpy()
-    stamps = fields.map(is_stamp).to_numpy() & unparsed if unparsed.any() else unparsed
-    invalid = np.flatnonzero(unparsed & ~stamps if (unparsed & ~stamps).any() else unparsed)
-    if len(invalid):
-        number = body[int(invalid[0])][0]
-        text = str(column.iloc[int(invalid[0])])
-        comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
-        hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
-        stamp_hint = f"; {STAMP_NOTATIONS}" if re.search(r"\d[-/:]\d", text) else ""
-        thousands = f"; {NO_THOUSANDS}" if _GROUPED_NUMBER.fullmatch(text.strip()) else ""
-        remedy = hint or stamp_hint or thousands or "; correct it, or leave it empty where the sample is missing"
-        excerpt = text if len(text) <= _MAX_QUOTED_CHARACTERS else f"{text[:_MAX_QUOTED_CHARACTERS]}…"
-        raise ValueError(f"line {number}, column '{name}': '{excerpt}' is not a number{remedy}")
+    is_empty = fields.str.lower().isin(MISSING)
+    values = pd.to_numeric(fields.where(~is_empty), errors="coerce")
+    is_unparsed = (values.isna() & ~is_empty).to_numpy()
+    is_time = fields.map(is_stamp).to_numpy() & is_unparsed if is_unparsed.any() else is_unparsed
+    invalid_rows = np.flatnonzero(is_unparsed & ~is_time if (is_unparsed & ~is_time).any() else is_unparsed)
+    if len(invalid_rows):
+        line_number = body[int(invalid_rows[0])][0]
+        field = str(column.iloc[int(invalid_rows[0])])
+        has_comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", field.strip())
+        comma_hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if has_comma else ""
+        stamp_hint = f"; {STAMP_NOTATIONS}" if re.search(r"\d[-/:]\d", field) else ""
+        thousands = f"; {NO_THOUSANDS}" if _GROUPED_NUMBER.fullmatch(field.strip()) else ""
+        remedy = comma_hint or stamp_hint or thousands or "; correct it, or leave it empty where the sample is missing"
+        excerpt = field if len(field) <= _MAX_QUOTED_CHARACTERS else f"{field[:_MAX_QUOTED_CHARACTERS]}…"
+        raise ValueError(f"line {line_number}, column '{name}': '{excerpt}' is not a number{remedy}")
     return np.asarray(values, dtype=np.float64)

@@ -2,8 +2,8 @@
 
 A field holds a date, a clock time with or without an offset from UTC, or both. Where one column holds dates and another
 clock times, they are added. In dates that do not begin with the year, day and month cannot be distinguished: they are
-accepted only where all dates are the same. Called by `csv_arrays`, `table_cells` and `table_layout`.
-"""
+accepted only where all dates are the same. The year is the part with four digits. Called by `csv_arrays`, `table_cells`
+and `table_layout`."""
 
 import math
 import re
@@ -59,28 +59,29 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
     are of the same kind (date, clock time, both). fields: texts, missing ones as NaN or None. Raises ValueError for
     dates of ambiguous order, for stamps that do not exist, and where only some have a time zone."""
     is_filled = fields.notna()
-    text = fields[is_filled].str.strip()
-    if text.empty or not text.map(is_stamp).all():
+    filled_fields = fields[is_filled].str.strip()
+    if filled_fields.empty or not filled_fields.map(is_stamp).all():
         return None
-    parts = text.str.extract(_STAMP)
+    parts = filled_fields.str.extract(_STAMP)
     has_date, has_clock = parts["date"].notna(), parts["hour"].notna()
     if has_date.any() != has_date.all() or has_clock.any() != has_clock.all():
         return None
-    filled_seconds = np.zeros(len(text))
+    filled_seconds = np.zeros(len(filled_fields))
     if has_clock.all():
-        filled_seconds += _compute_clock_s(text, parts)
+        filled_seconds += _compute_clock_s(filled_fields, parts)
     if has_date.all():
         filled_seconds += _compute_date_s(parts["date"])
     seconds = np.full(len(fields), np.nan)
     seconds[is_filled.to_numpy()] = filled_seconds
-    return StampColumn(seconds, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
+    return StampColumn(seconds, bool(has_date.all()), bool(has_clock.all()), str(filled_fields.iloc[0]))
 
 
-def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> SecondsArray:
-    """Seconds (n,) since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds above 59,
-    for hours beyond the day or half day, and where only some have a zone. text, parts: the fields and their parts."""
+def _compute_clock_s(filled_fields: "pd.Series[str]", parts: "pd.DataFrame") -> SecondsArray:
+    """Compute the seconds (n,) since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds
+    above 59, for hours beyond the day or half day, and where only some have a zone. text, parts: the fields and their
+    parts."""
     for index in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
-        raise ValueError(f"'{text.iloc[index]}' is no clock time, with more than 59 minutes or seconds")
+        raise ValueError(f"'{filled_fields.iloc[index]}' is no clock time, with more than 59 minutes or seconds")
     if parts["zone"].isna().any() != parts["zone"].isna().all():
         raise ValueError("some of its clock times have a zone, others none; write all with it, or all without")
     seconds = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
@@ -91,37 +92,41 @@ def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> SecondsAr
     # 24:00:00 is the end of a day (ISO 8601); no time comes after it.
     after_midnight = parts["date"].notna() & (hour == 24) & ((parts["minute"].astype(int) > 0) | (seconds > 0))
     for index in np.flatnonzero((hour > highest_hour) | after_midnight):
-        raise ValueError(f"'{text.iloc[index]}' is no clock time: it has hour {hour.iloc[index]:g}; correct it")
+        raise ValueError(
+            f"'{filled_fields.iloc[index]}' is no clock time: it has hour {hour.iloc[index]:g}; correct it"
+        )
     hour = hour.where(half_day == "", hour % 12) + 12.0 * (half_day == "p")
     zone_s = parts["zone"].fillna("").map({zone: _parse_zone_s(zone) for zone in parts["zone"].fillna("").unique()})
     return np.asarray(hour * HOUR_S + parts["minute"].astype(float) * 60 + seconds - zone_s, dtype=np.float64)
 
 
 def _parse_zone_s(zone: str) -> float:
-    """Offset of a zone from UTC (s), positive to the east; 0 for UTC, GMT, Z or an empty text."""
+    """Parse the offset of a zone from UTC (s), positive to the east; 0 for UTC, GMT, Z or an empty text."""
     digits = re.sub(r"\D", "", zone)
     offset_s = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60.0 if digits else 0.0
     return -offset_s if zone.startswith("-") else offset_s
 
 
 def _compute_date_s(dates: "pd.Series[str]") -> SecondsArray:
-    """Seconds (n,) from midnight of the first date to that of each date; seconds since 1970 would be resolved to 0.24
-    µs only (float64). Raises ValueError for several dates of ambiguous order, and for dates that do not exist."""
+    """Compute the seconds (n,) from midnight of the first date to that of each date; seconds since 1970 would be
+    resolved to 0.24 µs only (float64). Raises ValueError for several dates of ambiguous order, and for dates that do
+    not exist."""
     date_s_by_text: dict[str, float] = {}  # no value for a single date of ambiguous order
     has_several_dates = dates.nunique() > 1
     for date in dates.unique():
-        numbers = [int(part) for part in re.split(r"\D", date)]
-        if numbers[0] < 1000 and has_several_dates:
+        date_parts = [int(part) for part in re.split(r"\D", date)]
+        if date_parts[0] < 1000 and has_several_dates:
             raise ValueError(f"'{date}' may be day and month or month and day; write dates as 2024-03-01")
-        if numbers[0] >= 1000:
-            date_s_by_text[date] = _parse_day_s(numbers, date)
+        if date_parts[0] >= 1000:
+            date_s_by_text[date] = _parse_day_s(date_parts, date)
     first_date_s = date_s_by_text.get(str(dates.iloc[0]), 0.0)
     return np.asarray(dates.map(lambda date: date_s_by_text.get(date, first_date_s) - first_date_s), dtype=np.float64)
 
 
-def _parse_day_s(numbers: list[int], date: str) -> float:
-    """Seconds from 1970-01-01 to a date (year, month, day). Raises ValueError for a date that does not exist."""
-    year, month, day = numbers
+def _parse_day_s(date_parts: list[int], date: str) -> float:
+    """Convert a date (year, month, day) to seconds since 1970-01-01. Raises ValueError for a date that does not
+    exist."""
+    year, month, day = date_parts
     try:
         return float(np.datetime64(f"{year:04d}-{month:02d}-{day:02d}", "D").astype(np.int64)) * DAY_S
     except ValueError as error:

@@ -1,7 +1,8 @@
 """Evaluate the expressions of an import map: arithmetic over arrays.
 
-The text is parsed by Python's parser and evaluated here on the syntax tree, never by Python itself. What is not in the
-lists below is refused by name: attributes, other function calls, comprehensions.
+The text is parsed by Python's parser and evaluated here on the syntax tree, never by Python itself. All constructs
+that are not in the lists below are refused, such as attributes, other function calls, comprehensions. Called by
+`namespace`, and `map_library` for the names.
 """
 
 import ast
@@ -22,9 +23,9 @@ Lookup = Callable[[str], Value]
 """Returns the value of a name. Raises ImportProblemError for an unknown name."""
 
 LONGEST_EXPRESSION = 2000
-"""Longest expression of a map, in characters: parsing takes time and stack depth."""
-_CALL_COSTS = 20
-"""Cost of a function call per element, in additions: the slowest functions sort, or compute a sine."""
+"""Longest expression of a map, in characters: parsing takes time and stack depth. Chosen."""
+_CALL_COST = 20
+"""Cost of a function call per element, in additions: the slowest functions sort, or compute a sine. Chosen."""
 
 _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: np.add,
@@ -47,10 +48,9 @@ ALLOWED = "allowed are numbers, names, + - * / ** %, < <= > >=, [ ] and the func
 
 
 def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
-    """Value of an expression: an array of float64; a single number has the shape ().
-
-    Raises ImportProblemError with the part that is not understood, or that exceeds the budget.
-    """
+    """Evaluate an expression to an array of float64; a single number has the shape (). text: the expression; lookup,
+    clock: give the values of names and the times of the samples. Raises ImportProblemError with the part that is not
+    understood, or that exceeds the budget."""
     tree = parse_expression(text)
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
@@ -64,17 +64,18 @@ def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
 
 
 def find_names(text: str) -> set[str]:
-    """Names of arrays, channels and definitions that an expression uses. Raises ImportProblemError."""
+    """Find the names of arrays, channels and definitions that an expression uses; without the functions, `pi`, and
+    the variables `clock_s` and `rate_hz`. Raises ImportProblemError where it cannot be parsed."""
     tree = parse_expression(text)
-    functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
+    function_nodes = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in function_nodes}
     quoted = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     return (identifiers | quoted) - {"pi", "clock_s", "rate_hz"}
 
 
 @lru_cache(maxsize=1024)
 def parse_expression(text: str) -> ast.expr:
-    """Syntax tree of an expression. Raises ImportProblemError."""
+    """Parse an expression to its syntax tree. Raises ImportProblemError for an empty, too long or invalid one."""
     if not text.strip():
         raise ImportProblemError("the expression is empty")
     if len(text) > LONGEST_EXPRESSION:
@@ -95,7 +96,7 @@ class _Evaluation:
         self.budget = budget
 
     def evaluate_node(self, node: ast.expr) -> Any:
-        """Value of a node of the syntax tree: numbers, or a text."""
+        """Evaluate a node of the syntax tree to numbers or a text."""
         with self.budget.enter_nesting(self.text):
             match node:
                 case ast.Constant() | ast.Name():
@@ -117,7 +118,7 @@ class _Evaluation:
             raise self._make_not_allowed_error(node)
 
     def _evaluate_leaf(self, node: ast.Constant | ast.Name) -> Any:
-        """Value of a name, a number or a text."""
+        """Evaluate a name, a number or a text. Booleans, and numbers from 1e300 on, are refused."""
         self.budget.spend(0, self.text)
         match node:
             case ast.Name(id="pi"):
@@ -131,7 +132,7 @@ class _Evaluation:
         raise self._make_not_allowed_error(node)
 
     def _evaluate_numbers(self, node: ast.expr) -> Value:
-        """Value of a node that must be numbers."""
+        """Evaluate a node that must be numbers."""
         value = self.evaluate_node(node)
         if isinstance(value, str):
             raise ImportProblemError(f"in '{self.text}' the text '{value}' is found where numbers are needed")
@@ -139,7 +140,7 @@ class _Evaluation:
         return numbers
 
     def _negate_operand(self, node: ast.expr) -> Value:
-        """Value of a node with a minus sign."""
+        """Evaluate a node with a minus sign."""
         value = self._evaluate_numbers(node)
         self.budget.spend(np.size(value), self.text)
         return np.negative(value)
@@ -147,7 +148,7 @@ class _Evaluation:
     def _combine_operands(
         self, operation: Callable[[Any, Any], Any], left_operand: ast.expr, right_operand: ast.expr
     ) -> Value:
-        """Value of an operator or comparison between two nodes."""
+        """Evaluate an operator or comparison between two nodes."""
         first = self._evaluate_numbers(left_operand)
         with self.budget.hold_numbers(np.size(first)):
             second = self._evaluate_numbers(right_operand)
@@ -161,14 +162,14 @@ class _Evaluation:
                 f"in '{self.text}' arrays of the shapes {np.shape(first)} and {np.shape(second)} cannot be combined"
             ) from error
 
-    def _count_cost(self, values: Sequence[Value], times: int) -> None:
+    def _count_cost(self, values: Sequence[Value], cost_per_number: int) -> None:
         """Count the cost of an elementwise operation on these values. Raises ValueError if their shapes do not fit."""
         size = math.prod(np.broadcast_shapes(*(np.shape(value) for value in values)))
         with self.budget.hold_numbers(sum(np.size(value) for value in values)):
-            self.budget.spend(size, self.text, times)
+            self.budget.spend(size, self.text, cost_per_number)
 
     def _call_function(self, name: str, arguments: list[ast.expr]) -> Value:
-        """Value of a function call; its cost is counted before it is computed."""
+        """Evaluate a function call; its cost is counted before it is computed."""
         if name == "array":
             return self._look_up_array(arguments)
         if name not in FUNCTIONS:
@@ -186,7 +187,7 @@ class _Evaluation:
             if name == "repeat":
                 self.budget.spend(np.size(values[0]) * float(values[1]), self.text)
             else:
-                self._count_cost(values, _CALL_COSTS)
+                self._count_cost(values, _CALL_COST)
             return np.asarray(function.call(self.clock, *values), dtype=np.float64)
         except ImportProblemError:
             raise
@@ -194,14 +195,14 @@ class _Evaluation:
             raise ImportProblemError(f"in '{self.text}' {function.usage} fails: {error}") from error
 
     def _look_up_array(self, arguments: list[ast.expr]) -> Value:
-        """Value of `array("NAME")`, for names that are not identifiers."""
+        """Evaluate `array("NAME")`, for names that are not identifiers."""
         match arguments:
             case [ast.Constant(value=str() as name)]:
                 return self.lookup(name)
         raise ImportProblemError(f"in '{self.text}' array(\"NAME\") takes one name in quotes")
 
     def _index_array(self, operand: ast.expr, index: ast.expr) -> Value:
-        """Value of an indexed array."""
+        """Evaluate an indexed array."""
         array = self._evaluate_numbers(operand)
         entries = index.elts if isinstance(index, ast.Tuple) else [index]
         indices: list[int | slice] = []
@@ -215,7 +216,7 @@ class _Evaluation:
         return part
 
     def _evaluate_index(self, node: ast.expr) -> int | slice:
-        """An index or a slice of integers."""
+        """Evaluate an index or a slice to integers."""
         if not isinstance(node, ast.Slice):
             return self._evaluate_integer(node)
         bounds = [
@@ -226,19 +227,19 @@ class _Evaluation:
         return slice(*bounds)
 
     def _evaluate_integer(self, node: ast.expr) -> int:
-        """Value of a node that must be an integer."""
+        """Evaluate a node that must be an integer."""
         number = self._evaluate_numbers(node)
         if np.ndim(number) or not float(number).is_integer():
             raise ImportProblemError(f"in '{self.text}' an index is not a whole number")
         return int(number)
 
     def _make_not_allowed_error(self, node: ast.expr) -> ImportProblemError:
-        """The error for a node that is not allowed."""
+        """Make the error for a node that is not allowed."""
         # As written in the source: unparsing would need memory in proportion to its depth.
         part = ast.get_source_segment(self.text.strip(), node) or self.text
         return ImportProblemError(f"in '{self.text}' this is not understood: {part}; {ALLOWED}")
 
 
 def _describe_error(error: BaseException) -> str:
-    """Message of a syntax error; name of any other exception."""
+    """Describe a syntax error by its message, any other exception by the name of its class."""
     return error.msg if isinstance(error, SyntaxError) else type(error).__name__

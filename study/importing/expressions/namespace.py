@@ -27,7 +27,7 @@ class NoTime:
     """`Clock` for the expressions that define a rate or time stamps: no time is known yet."""
 
     def times_s(self, count: int) -> Value:
-        """Raises ValueError, because no time is known."""
+        """Raise ValueError, because no time is known."""
         raise ValueError("there is no clock in this place yet")
 
 
@@ -47,19 +47,20 @@ class Namespace:
     _open_definitions: set[str] = field(default_factory=set)
     """Names of the definitions that are being evaluated: a recursive definition is refused."""
 
-    def compute_value(self, text: str, clock: Clock) -> Value:
-        """Compute the value of `text`: an array if it is the exact name of one, which may contain any characters; else
-        an expression. clock: gives the times for it. Raises ImportProblemError where it cannot be computed."""
-        if text in self.arrays:
-            return self._convert_to_float(text)
-        return evaluate(text, lambda name: self.look_up_value(name, clock), clock, self.budget)
+    def compute_value(self, expression: str, clock: Clock) -> Value:
+        """Compute a value that the map states: the array whose exact name `expression` is (it may contain any
+        characters), else the value of the expression. clock: gives the times for it. Raises ImportProblemError where it
+        cannot be computed."""
+        if expression in self.arrays:
+            return self._convert_to_float(expression)
+        return evaluate(expression, lambda name: self.look_up_value(name, clock), clock, self.budget)
 
-    def compute_number(self, text: str) -> float:
+    def compute_number(self, expression: str) -> float:
         """Compute the value of an expression that must be a single finite number, without a time. Raises
         ImportProblemError otherwise."""
-        value = self.compute_value(text, NoTime())
+        value = self.compute_value(expression, NoTime())
         if np.size(value) != 1 or not np.isfinite(value).all():
-            raise ImportProblemError(f"'{text}' has the shape {np.shape(value)}; it must be one number")
+            raise ImportProblemError(f"'{expression}' has the shape {np.shape(value)}; it must be one number")
         return float(np.ravel(value)[0])
 
     def look_up_value(self, name: str, clock: Clock) -> Value:

@@ -1,4 +1,8 @@
-"""Parse the TOML text of an import map into an ImportMap, or report all its problems."""
+"""Parse the TOML text of an import map into an `ImportMap`, or report its problems.
+
+Steps: TOML syntax, keys and types (pydantic), then contradictions between keys; only the problems of the first step
+that fails are reported. `map_library` and `workflows.files.recognisers` call `parse_map`;
+`workflows.files.importing_docs` makes docs/importing.md from `MAP_SCHEMA`."""
 
 import json
 import tomllib
@@ -17,13 +21,14 @@ KIND = "import map"
 """Kind of the document, for messages."""
 
 _ADAPTER: TypeAdapter[ImportMap] = TypeAdapter(ImportMap)
-"""Validates a map, and makes its JSON Schema."""
+"""Validator of a map, from which also its JSON Schema is made."""
 MAP_SCHEMA: Node = _ADAPTER.json_schema()
-"""JSON Schema of a map: docs/importing.md is made from it."""
+"""JSON Schema of a map."""
 
 
 def parse_map(text: str, source: Path) -> ImportMap:
-    """Parse the text of a map. source: for messages. Raises UnusableFileError with one problem for each key."""
+    """Parse the text of a map. source: its path, for messages. Raises UnusableFileError with a clause for each
+    problem."""
     try:
         values = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
@@ -32,7 +37,7 @@ def parse_map(text: str, source: Path) -> ImportMap:
         import_map = _ADAPTER.validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
         raise UnusableFileError(source, KIND, tuple(_describe_errors(error.errors()))) from error
-    except (ValueError, RecursionError) as error:  # a number of more digits than Python writes
+    except (ValueError, RecursionError) as error:  # an integer with more digits than Python converts to text
         raise UnusableFileError(source, KIND, (f"it cannot be read: {error}",)) from error
     if problems := (
         *_find_contradictions(import_map),
@@ -44,49 +49,52 @@ def parse_map(text: str, source: Path) -> ImportMap:
 
 
 def is_map(values: dict[str, Any]) -> bool:
-    """Whether TOML values are a map: only maps have channels."""
+    """Whether TOML values are a map: only a map has a list `channel`."""
     return isinstance(values.get("channel"), list)
 
 
 def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
-    """A clause for each validation error of pydantic."""
+    """Describe each validation error of pydantic (`ValidationError.errors()`) in a clause."""
     for error in errors:
-        place: ValuePath = error["loc"]
+        location: ValuePath = error["loc"]
         if error["type"] == "json_invalid":  # nested too deeply
             yield f"it cannot be read: {error['msg']}"
             continue
-        key = format_key_path(MAP_SCHEMA, place)
+        key = format_key_path(MAP_SCHEMA, location)
         if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
-            yield _describe_unknown_key(key, place)
+            yield _describe_unknown_key(key, location)
         elif error["type"] == "missing":
-            yield f"{key} is missing; it is {_describe_allowed(place)}"
+            yield f"{key} is missing; it is {_describe_allowed(location)}"
         else:
-            yield f"{key} is {_quote_value(error['input'])}; it must be {_describe_allowed(place)}"
+            yield f"{key} is {_quote_value(error['input'])}; it must be {_describe_allowed(location)}"
 
 
-def _describe_unknown_key(key: str, place: ValuePath) -> str:
-    table = find_node(MAP_SCHEMA, place[:-1])
+def _describe_unknown_key(key: str, location: ValuePath) -> str:
+    """Describe in a clause a key that no map has, with the most similar key or else all keys of its table."""
+    table = find_node(MAP_SCHEMA, location[:-1])
     known_keys = list_keys(MAP_SCHEMA, table) if table else ()
-    nearest = find_nearest_key(str(place[-1]), known_keys)
+    nearest_key = find_nearest_key(str(location[-1]), known_keys)
     return f"{key} is no key of a map" + (
-        f"; did you mean {nearest}" if nearest else f"; keys here are {', '.join(known_keys)}"
+        f"; did you mean {nearest_key}" if nearest_key else f"; keys here are {', '.join(known_keys)}"
     )
 
 
 def _quote_value(value: Any) -> str:
+    """Format a value for a message; text in quotes."""
     return f'"{value}"' if isinstance(value, str) else describe_value(value)
 
 
-def _describe_allowed(place: ValuePath) -> str:
-    node = find_node(MAP_SCHEMA, place)
+def _describe_allowed(location: ValuePath) -> str:
+    """Describe the allowed values of a key in words; for an entry of a free table, those of its entries."""
+    node = find_node(MAP_SCHEMA, location)
     if node is None:
-        parent = resolve_reference(MAP_SCHEMA, find_node(MAP_SCHEMA, place[:-1]) or {})
+        parent = resolve_reference(MAP_SCHEMA, find_node(MAP_SCHEMA, location[:-1]) or {})
         return "a number" if parent.get("additionalProperties", {}).get("type") == "number" else "text in quotes"
-    return describe_allowed_in_map(node, str(place[-1]))
+    return describe_allowed_in_map(node, str(location[-1]))
 
 
 def describe_allowed_in_map(node: Node, key: str) -> str:
-    """Allowed values of a key, in words."""
+    """Describe in words the values that the node of a key allows. key: its name, whose suffix determines the unit."""
     resolved = resolve_reference(MAP_SCHEMA, node)
     if resolved.get("type") == "object" and "properties" not in resolved:
         return "a table"
@@ -94,17 +102,17 @@ def describe_allowed_in_map(node: Node, key: str) -> str:
 
 
 def _find_contradictions(import_map: ImportMap) -> Iterator[str]:
-    """Contradictions among channels, clocks and parts, as clauses."""
-    clocks = [clock.name for clock in import_map.clock]
-    keys = [(entry.role, entry.name) for entry in import_map.channel]
-    keys += [(entry.role, entry.name) for entry in import_map.computed]
-    for role, name in sorted({key for key in keys if keys.count(key) > 1}):
+    """Find contradictions among channels, clocks and parts; yields a clause for each."""
+    clock_names = [clock.name for clock in import_map.clock]
+    channel_keys = [(entry.role, entry.name) for entry in import_map.channel]
+    channel_keys += [(entry.role, entry.name) for entry in import_map.computed]
+    for role, name in sorted({channel_key for channel_key in channel_keys if channel_keys.count(channel_key) > 1}):
         yield f"{role} '{name}' is defined twice"
-    for name in sorted({name for name in clocks if clocks.count(name) > 1}):
+    for name in sorted({name for name in clock_names if clock_names.count(name) > 1}):
         yield f"clock '{name}' is defined twice"
     for channel in import_map.channel:
-        if channel.clock and channel.clock not in clocks:
-            yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clocks)}"
+        if channel.clock and channel.clock not in clock_names:
+            yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clock_names)}"
     yield from _find_missing_roles(import_map)
     yield from _find_hold_contradictions(import_map)
     yield from _find_clock_contradictions(import_map)
@@ -113,7 +121,8 @@ def _find_contradictions(import_map: ImportMap) -> Iterator[str]:
 
 
 def _find_segment_contradictions(import_map: ImportMap) -> Iterator[str]:
-    """Invalid splits of segments, and limits that are stated twice, as clauses."""
+    """Find invalid splits (shares must sum to 1 within 0.001, for rounded fractions) and limits that are stated both in
+    samples and in seconds; yields a clause for each. A limit of 0 counts as not stated."""
     for number, segment in enumerate(import_map.segment, start=1):
         if set(segment.split) - {"fit", "test", ""}:
             yield f"segment[{number}].split names {', '.join(segment.split)}; roles are fit, test, or empty"
@@ -124,7 +133,7 @@ def _find_segment_contradictions(import_map: ImportMap) -> Iterator[str]:
 
 
 def _find_meta_problems(import_map: ImportMap) -> Iterator[str]:
-    """Metadata that JSON cannot hold, as a clause."""
+    """Find numbers in the metadata that JSON cannot hold (NaN, infinity); yields at most one clause."""
     try:
         json.dumps(import_map.meta, allow_nan=False)
     except ValueError:
@@ -139,7 +148,7 @@ _FREE_MOTION_ADVICE = (
 
 
 def _find_missing_roles(import_map: ImportMap) -> Iterator[str]:
-    """A clause for each of the roles command and response that no channel has."""
+    """Find the roles, command and response, that no channel has; yields a clause for each."""
     roles = {channel.role for channel in import_map.channel} | {channel.role for channel in import_map.computed}
     for role in ("command", "response"):
         if role not in roles:
@@ -147,25 +156,31 @@ def _find_missing_roles(import_map: ImportMap) -> Iterator[str]:
             yield f"there is no channel with the role '{role}'; a recording needs both command and response{advice}"
 
 
-_RESAMPLE_OF_HOLD = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
-"""How commands are resampled, by the `hold` of the map."""
+_RESAMPLE_BY_HOLD = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
+"""Value of `resample` of a command that agrees with the `hold` of the map, by `hold`."""
 
 
 def _find_hold_contradictions(import_map: ImportMap) -> Iterator[str]:
-    """Commands whose `resample` contradicts the `hold` of the recording, as clauses."""
+    """Find commands of which either `resample` or the `hold` of the recording, but not both, keeps values constant
+    between samples; yields a clause for each."""
     for channel in import_map.channel:
-        hold = {"held": "zero-order"}.get(channel.resample, channel.resample)
-        if channel.role == "command" and hold and (hold == "zero-order") != (import_map.hold == "zero-order"):
+        resample_hold = {"held": "zero-order"}.get(channel.resample, channel.resample)
+        if (
+            channel.role == "command"
+            and resample_hold
+            and (resample_hold == "zero-order") != (import_map.hold == "zero-order")
+        ):
             yield (
                 f"command '{channel.name}' is resampled {channel.resample}, but the recording's hold is "
                 f"{import_map.hold}; a command either stays between its samples (held, zero-order) or it does not: "
-                f'write hold = "{hold}" at the top of the map, or '
-                f'resample = "{_RESAMPLE_OF_HOLD[import_map.hold]}" here'
+                f'write hold = "{resample_hold}" at the top of the map, or '
+                f'resample = "{_RESAMPLE_BY_HOLD[import_map.hold]}" here'
             )
 
 
 def _find_clock_contradictions(import_map: ImportMap) -> Iterator[str]:
-    """Clocks with no time, or with several or incomplete statements of time or alignment, as clauses."""
+    """Find clocks with no time, or with several or incomplete statements of time or alignment; yields a clause for
+    each. The first clock must have no alignment, because the others are aligned to it."""
     for clock in import_map.clock:
         statements = [bool(clock.time), bool(clock.rate_hz), bool(clock.rate), clock.unknown]
         if sum(statements) > 1:

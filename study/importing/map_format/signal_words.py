@@ -2,6 +2,7 @@
 roles of channels (command, response, ...) from them.
 
 `parse_signal_name` interprets one name; `assign_roles`, `list_open_roles` and `propose_roles` take all names of a file.
+Called by `header_map`, `map_skeleton`, `imposed_roles`, and the readers of tables in `study.importing.arrays`.
 """
 
 import re
@@ -12,8 +13,8 @@ from typing import Literal
 
 from equalizer.signals.quantity_words import WORDS_NEEDING_UNIT, detect_quantity, split_into_words
 from equalizer.signals.units import (
+    NO_UNIT,
     QUANTITY_UNITS,
-    UNSTATED,
     UnknownUnitError,
     check_quantity,
     find_quantity,
@@ -24,19 +25,19 @@ from equalizer.signals.units import (
 )
 from study.importing.map_format.import_map import SignalRole
 
-_BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
+_BRACKETED_UNIT = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 """A name followed by its unit in brackets."""
 _UNIT_SEPARATOR = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
 """Separator between a name and its unit without brackets (`force / N`, `force, N`, `Kraft in N`), as in standards and
 in files of testing machines."""
-_NO_UNITS = ("n/a", "na", "none", "-", "--")
-"""Words in the place of a unit that state that there is none."""
-_PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
-"""Mark of a unit whose numbers are peak or rms values."""
+_NO_UNIT_WORDS = ("n/a", "na", "none", "-", "--")
+"""Words, in lower case, that are written in place of a unit where there is none."""
+_PEAK_MARK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
+"""Mark, in the text of a unit, that its numbers are peak or rms values."""
 LONGEST_NAME = 300
-"""Longest name in characters; the search for a unit takes quadratic time."""
+"""Longest name (characters) in which a unit is searched, chosen: the search takes quadratic time."""
 _CACHE_SIZE = 2**14
-"""Size of the cache of names: the headers of one file are interpreted repeatedly."""
+"""Number of names whose results are cached, because the headers of a file are interpreted repeatedly. Chosen."""
 _FOREIGN_WORDS = {
     "time": ("时间", "時間", "時刻", "시간", "время", "χρόνος"),
     "force": ("载荷", "荷重", "하중", "сила", "усилие", "δύναμη"),
@@ -57,17 +58,17 @@ _CERTAIN_UNITS = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
 """Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; units with a slash are unambiguous, too."""
 _JOINED_UNITS = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 """Units as written in names, without blanks or slashes, and their usual notation."""
-_ROLE_OF_WORD: dict[str, SignalRole] = {
+_ROLE_BY_WORD: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
     **dict.fromkeys(("referencia", "sollwert", "consigne"), "helper"),
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
-"""Role that a word in a name states."""
+"""Role that a word in a name states; the first such word counts."""
 _TEXTBOOK_ROLES: dict[str, SignalRole] = {"u": "command", "y": "response"}
 """Role of the textbook names of input and output. They count only if both occur and no name is `x`: `y` would then be
 an axis."""
-_ROLE_OF_NAME: dict[str, SignalRole] = {
+_ROLE_BY_NAME: dict[str, SignalRole] = {
     **dict.fromkeys(("input", "entrada", "eingang", "entrée", "entree"), "command"),
     **dict.fromkeys(("output", "salida", "ausgang", "sortie"), "response"),
 }
@@ -102,75 +103,77 @@ class ParsedName:
 
 
 def strip_units(columns: Sequence[ParsedName]) -> list[str]:
-    """Names without the unit at their end (`displacement_in` becomes `displacement`, because samples are converted to
+    """Remove the units at the end of names (`displacement_in` becomes `displacement`, because samples are converted to
     SI), where the unit is certain and the names stay distinct."""
     stems = [_strip_unit(column) for column in columns]
     return [name if stems.count(name) == 1 else column.name for name, column in zip(stems, columns, strict=True)]
 
 
 def _strip_unit(column: ParsedName) -> str:
-    """Name without the unit at its end, where that is certain."""
+    """Remove the unit at the end of a name where it is the unit of a certain interpretation."""
     stem, unit = split_unit_at_end(column.name)
     return stem if unit and unit == column.unit and not column.doubt else column.name
 
 
 @lru_cache(_CACHE_SIZE)
 def split_bracketed_unit(header: str) -> tuple[str, str]:
-    """Name and bracketed unit; the unit is empty if there is none."""
-    match = _BRACKETED.fullmatch(header) if len(header) <= LONGEST_NAME else None
+    """Split a header into its name and its unit in brackets, which is empty if there is none."""
+    match = _BRACKETED_UNIT.fullmatch(header) if len(header) <= LONGEST_NAME else None
     if not match or not match["name"].strip():
         return header, ""
     unit = match["unit"].strip()
-    return match["name"].strip(), "" if unit.lower() in _NO_UNITS else normalise_unit(unit)
+    return match["name"].strip(), "" if unit.lower() in _NO_UNIT_WORDS else normalise_unit(unit)
 
 
 def is_peak_value(unit: str) -> bool:
     """Whether a unit, as written in a file, states rms or peak values (`A (peak)`, `mV_rms`)."""
-    return normalise_unit(unit) != unit and _PEAK.search(unit) is not None
+    return normalise_unit(unit) != unit and _PEAK_MARK.search(unit) is not None
 
 
 @lru_cache(_CACHE_SIZE)
 def parse_signal_name(header: str) -> ParsedName:
-    """Interpret one header. The quantity follows from a word of the name if there is one, otherwise from the unit; a
-    contradiction between both is a doubt."""
+    """Interpret one header. The quantity follows from a word of the name if there is one, otherwise from the unit.
+    Where they contradict each other, the quantity is that of the unit, with a doubt unless the word needs a unit."""
     name, unit = split_bracketed_unit(header)
-    foreign_word = max((stated for stated in FOREIGN_WORDS if stated in name.lower()), key=len, default="")
-    stated = detect_quantity(name) if FOREIGN_WORDS.get(foreign_word, "time") == "time" else FOREIGN_WORDS[foreign_word]
+    foreign_word = max((word for word in FOREIGN_WORDS if word in name.lower()), key=len, default="")
+    stated_quantity = (
+        detect_quantity(name) if FOREIGN_WORDS.get(foreign_word, "time") == "time" else FOREIGN_WORDS[foreign_word]
+    )
     unit_text = unit or split_unit_at_end(name)[1]
     try:
         parsed_unit = parse_unit(unit_text)
     except UnknownUnitError:
-        return ParsedName(header, name, "", stated, _describe_unknown_unit(unit) if unit else "")
-    by_unit = "time" if parsed_unit.si == "s" else find_quantity(parsed_unit.si)
-    if by_unit == parsed_unit.si != UNSTATED and stated not in ("setting", *QUANTITY_UNITS):
-        return ParsedName(header, name, unit_text, by_unit, f"what is measured in {unit_text} is not known")
-    if not stated:
+        return ParsedName(header, name, "", stated_quantity, _describe_unknown_unit(unit) if unit else "")
+    unit_quantity = "time" if parsed_unit.si == "s" else find_quantity(parsed_unit.si)
+    if unit_quantity == parsed_unit.si != NO_UNIT and stated_quantity not in ("setting", *QUANTITY_UNITS):
+        return ParsedName(header, name, unit_text, unit_quantity, f"what is measured in {unit_text} is not known")
+    if not stated_quantity:
         doubt = (
             ""
             if unit or unit_text in _CERTAIN_UNITS or "/" in unit_text
             else f"whether {unit_text} is its unit is not sure, for no word says what it is"
         )
-        return ParsedName(header, name, unit_text, by_unit, doubt)
+        return ParsedName(header, name, unit_text, unit_quantity, doubt)
     try:
-        check_quantity(stated, parsed_unit)
+        check_quantity(stated_quantity, parsed_unit)
     except UnknownUnitError:
         if WORDS_NEEDING_UNIT & set(split_into_words(name)):
-            return ParsedName(header, name, unit_text, by_unit, "")
-        hint = suggest_force_unit(stated, parsed_unit)
-        doubt = f"its name says {stated}, its unit, {unit_text}, says {by_unit}{hint}"
-        return ParsedName(header, name, unit_text, by_unit, doubt)
-    return ParsedName(header, name, unit_text, stated, "")
+            return ParsedName(header, name, unit_text, unit_quantity, "")
+        unit_hint = suggest_force_unit(stated_quantity, parsed_unit)
+        doubt = f"its name says {stated_quantity}, its unit, {unit_text}, says {unit_quantity}{unit_hint}"
+        return ParsedName(header, name, unit_text, unit_quantity, doubt)
+    return ParsedName(header, name, unit_text, stated_quantity, "")
 
 
 def _describe_unknown_unit(unit: str) -> str:
-    """Clause about an unknown unit."""
-    nearest = suggest_unit(unit)
-    return f"'{unit}' is not a unit known here" + (f" (did you mean '{nearest}'?)" if nearest else "")
+    """Describe an unknown unit in a clause, with the most similar known unit."""
+    nearest_unit = suggest_unit(unit)
+    return f"'{unit}' is not a unit known here" + (f" (did you mean '{nearest_unit}'?)" if nearest_unit else "")
 
 
 def assign_roles(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
-    """Roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named as
-    commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
+    """Assign roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named
+    as commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
     are conditions. None if something is open or contradicted by a name (`list_open_roles` says what)."""
     return (
         None
@@ -180,32 +183,35 @@ def assign_roles(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
 
 
 def list_open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
-    """What names and quantities leave open, one clause each; empty if they determine all roles."""
+    """List what names and quantities leave open, one clause each; empty if they determine all roles."""
     stated_roles = _find_stated_roles(columns)
     roles = _compute_roles(columns, stated_roles)
-    questions = []
+    open_questions = []
     for column, role, stated_role in zip(columns, roles, stated_roles, strict=True):
         if role == "helper" or (role and stated_role not in ("", role)):
-            questions.append(f"whether '{column.header}' is to be compared, or is only a help to others")
+            open_questions.append(f"whether '{column.header}' is to be compared, or is only a help to others")
         elif not role and column.quantity in _ELECTRICAL:
-            questions.append(f"whether '{column.header}' is the command")
+            open_questions.append(f"whether '{column.header}' is the command")
         elif not role:
-            questions.append(f"what '{column.header}' is")
-    if questions:
-        return tuple(questions)
+            open_questions.append(f"what '{column.header}' is")
+    if open_questions:
+        return tuple(open_questions)
     if "command" not in roles:
-        questions.append("what the command is (no column is a force, torque, current or voltage, or called command)")
+        open_questions.append(
+            "what the command is (no column is a force, torque, current or voltage, or called command)"
+        )
     if "response" not in roles:
-        questions.append("what the response is (no column is a position, angle, speed or acceleration)")
-    return tuple(questions)
+        open_questions.append("what the response is (no column is a position, angle, speed or acceleration)")
+    return tuple(open_questions)
 
 
 def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
-    """Roles by words of the names, otherwise by quantity; empty where open. A reference is a helper; so are currents
-    and voltages where there is a force."""
-    all_stated = _find_stated_roles(columns)
+    """Propose roles by words of the names, otherwise by quantity; empty where open. A reference is a helper; so are
+    currents and voltages where there is a force."""
+    stated_roles = _find_stated_roles(columns)
     return [
-        stated_role or role for stated_role, role in zip(all_stated, _compute_roles(columns, all_stated), strict=True)
+        stated_role or role_by_quantity
+        for stated_role, role_by_quantity in zip(stated_roles, _compute_roles(columns, stated_roles), strict=True)
     ]
 
 
@@ -213,52 +219,46 @@ def may_be_imposed_motion(columns: Sequence[ParsedName]) -> bool:
     """Whether there are forces (or torques) and positions (or angles), no velocities or accelerations, and no name that
     states a command, a response or a helper."""
     quantities = {column.quantity for column in columns}
-    is_unstated = not {"command", "helper", "response"} & set(_find_stated_roles(columns))
+    has_no_stated_role = not {"command", "helper", "response"} & set(_find_stated_roles(columns))
     return (
-        is_unstated
+        has_no_stated_role
         and bool(quantities & set(_FORCES) and quantities & set(_POSITIONS))
         and not quantities & set(_RATES)
     )
 
 
 def _compute_roles(columns: Sequence[ParsedName], stated_roles: Sequence[_Role]) -> list[_Role]:
-    """Role of each channel by quantity, with conditions and commands that names state; empty where open."""
+    """Compute the role of each channel by quantity, with the conditions and commands that names state; empty where
+    open."""
     roles_by_quantity = _map_roles(columns, stated_roles)
     return [_choose_role(column, role, roles_by_quantity) for column, role in zip(columns, stated_roles, strict=True)]
 
 
 def _choose_role(column: ParsedName, stated_role: _Role, roles_by_quantity: Mapping[str, SignalRole]) -> _Role:
+    """Choose the role of one channel; empty where it is open."""
     if stated_role == "condition":
         return "condition"
     if stated_role == "command" and column.quantity in ("", "1") and "command" not in roles_by_quantity.values():
         return "command"
-    has_other_quantity = column.quantity not in (
-        "",
-        "1",
-        "time",
-        *_FORCES,
-        *_ELECTRICAL,
-        *_RATES,
-        *_POSITIONS,
-    )
+    has_other_quantity = column.quantity not in ("", "1", "time", *_FORCES, *_ELECTRICAL, *_RATES, *_POSITIONS)
     return roles_by_quantity.get(column.quantity, "condition" if has_other_quantity else "")
 
 
 def _find_stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
-    """Role that each name states; empty where it states none."""
+    """Find the role that each name states; empty where it states none."""
     first_words = {column.name.split("_")[0].lower() for column in columns}
     textbook_roles = _TEXTBOOK_ROLES if {"u", "y"} <= first_words and "x" not in first_words else {}
     roles: list[_Role] = []
     for column in columns:
         words = split_into_words(column.name)
-        role_of_name: _Role = _ROLE_OF_NAME.get(words[0], "") if len(words) == 1 else ""
+        role_of_name: _Role = _ROLE_BY_NAME.get(words[0], "") if len(words) == 1 else ""
         default_role = role_of_name or (textbook_roles.get(words[0], "") if words else "")
-        roles.append(next((_ROLE_OF_WORD[word] for word in words if word in _ROLE_OF_WORD), default_role))
+        roles.append(next((_ROLE_BY_WORD[word] for word in words if word in _ROLE_BY_WORD), default_role))
     return roles
 
 
 def _map_roles(columns: Sequence[ParsedName], stated_roles: Sequence[_Role]) -> dict[str, SignalRole]:
-    """Role of each quantity, given which quantities occur in the file (see `assign_roles`)."""
+    """Map each quantity to its role, given which quantities occur in the file (see `assign_roles`)."""
     quantities = {column.quantity for column, role in zip(columns, stated_roles, strict=True) if role != "condition"}
     response_quantities = _RATES if quantities & set(_RATES) else _POSITIONS
     roles_by_quantity: dict[str, SignalRole] = {}
@@ -273,8 +273,8 @@ def _map_roles(columns: Sequence[ParsedName], stated_roles: Sequence[_Role]) -> 
 
 @lru_cache(_CACHE_SIZE)
 def split_unit_at_end(name: str) -> tuple[str, str]:
-    """Name, and the unit at its end as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the longest ending
-    that is a unit). Without such a unit: the whole name, and an empty unit."""
+    """Split a name from the unit at its end, as in `displacement_mm`, `omega_rad_s`, `a_mps2`, `force / N` (the
+    longest ending that is a unit). Without such a unit: the whole name, and an empty unit."""
     if len(name) > LONGEST_NAME:
         return name, ""
     parts = name.split("_")
@@ -282,8 +282,8 @@ def split_unit_at_end(name: str) -> tuple[str, str]:
         ("_".join(parts[:split_index]), _join_unit(parts[split_index:])) for split_index in range(1, len(parts))
     ]
     candidates += [(name[: separator.start()], name[separator.end() :]) for separator in _UNIT_SEPARATOR.finditer(name)]
-    for stem, text in candidates:
-        unit = normalise_unit(text)
+    for stem, unit_text in candidates:
+        unit = normalise_unit(unit_text)
         try:
             parse_unit(unit)
         except UnknownUnitError:
@@ -293,8 +293,8 @@ def split_unit_at_end(name: str) -> tuple[str, str]:
 
 
 def _join_unit(parts: Sequence[str]) -> str:
-    """A unit in usual notation, from the parts of a name between underscores."""
-    text = "_".join(parts)
-    text = re.sub(r"mps2$", "m/s^2", text)
-    text = _JOINED_UNITS.get(text, text.replace("_per_", "/").replace("_", "/"))
-    return re.sub(r"(?<=[a-z])2$", "^2", text)
+    """Join the parts of a name between underscores to a unit in its usual notation."""
+    unit_text = "_".join(parts)
+    unit_text = re.sub(r"mps2$", "m/s^2", unit_text)
+    unit_text = _JOINED_UNITS.get(unit_text, unit_text.replace("_per_", "/").replace("_", "/"))
+    return re.sub(r"(?<=[a-z])2$", "^2", unit_text)

@@ -2,8 +2,9 @@
 
 Most of these trials are void because the computer was too busy, which delays the 1 kHz control loop or the screen; they
 are repeated. `is_computer_busy` recognises this cause by the text of the logged reason; therefore the texts must not
-change. Used where trials are judged (`judge_trial`, `present_trial`, `timing_verdict`), where a sitting ends
-(`run_session`, `end_sitting`), by the screens and by the alarms of `hapteq watch`.
+change. Used where trials are judged (`judge_trial`, `present_trial`, `timing_verdict`), where void trials are counted
+(`fold_trial`, `session_facts`), where a sitting ends (`run_session`, `end_sitting`), by the safety layer of a device,
+by the screens and by the alarms of `hapteq watch`.
 """
 
 SCREEN_UNRESPONSIVE = "the screen gave no sign of life"
@@ -11,7 +12,7 @@ SCREEN_UNRESPONSIVE = "the screen gave no sign of life"
 SCREEN_DELAYED_BY_LOAD = f"{SCREEN_UNRESPONSIVE}: the computer was too busy"
 """As `SCREEN_UNRESPONSIVE`, where the load of the computer or the delay of the engine shows the cause."""
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
-"""The process of the session did not reset the device's watchdog within its time limit `watchdog_s`."""
+"""The session process did not reset the watchdog of the device within its time limit `watchdog_s`."""
 TICKS_MISSED = "of the 1 kHz ticks were missed"
 """End of the reason, which begins with the share of missed ticks of the control loop in percent."""
 TICKS_LATE = "of the 1 kHz ticks were late or missed"
@@ -31,8 +32,8 @@ LOAD_PER_PROCESSOR = 0.75
 """Load average per processor above which tasks often have to wait for a processor. Chosen by hand."""
 
 ENGINE_LATE_S = 0.1
-"""Least delay (s) of a wake-up of the session process that shows a busy computer. Chosen: 2.5 times the interval of
-40 ms at which it polls the screen."""
+"""Least delay (s) of a wake-up of the session process that shows a busy computer. Chosen: 2.5 times the interval
+at which it polls the screen (`remote_display.KEEPALIVE_INTERVAL_S`)."""
 
 
 def explain_silent_screen(engine_late_s: float, load_per_processor: float | None) -> str:
@@ -64,11 +65,11 @@ def explain_many_voids(reasons: tuple[str, ...]) -> str:
     return f"{void_text}, the last because {reasons[-1]}"
 
 
-def describe_busy_voids(voids: int) -> str:
+def describe_busy_voids(void_count: int) -> str:
     """Return a summary for the experimenter at the end of a sitting. voids: number of trials that were void because of
     a busy computer."""
-    trials = "1 trial was" if voids == 1 else f"{voids} trials were"
+    phrase = "1 trial was" if void_count == 1 else f"{void_count} trials were"
     return (
-        f"The computer was too busy: {trials} void because of it in this sitting and repeated. Close other programs; "
+        f"The computer was too busy: {phrase} void because of it in this sitting and repeated. Close other programs; "
         "hapteq doctor measures how late it is."
     )

@@ -19,7 +19,7 @@ from protocols.procedure.schedule import (
     label_direction,
     rove_level_n,
 )
-from protocols.procedure.staircase import StaircaseState, level_n, to_db
+from protocols.procedure.staircase import StaircaseState, compute_level_n, to_db
 from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
 from study.session.facts.level_scale import convert_level_to_acceleration
@@ -79,7 +79,7 @@ def compute_due_trial(
         label = draw.direction
         direction = draw_detection_direction(opening_event.seed, run.index, place.trial, draw_index)
     phase, level_db = run.phase, place.staircase.level_db
-    force_n = level_n(rule, place.staircase)
+    force_n = compute_level_n(rule, place.staircase)
     if run.practice:
         force_n = draw_practice_level_n(protocol.practice, opening_event.seed, run.index, place.trial, draw_index)
         level_db = to_db(force_n)

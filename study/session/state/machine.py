@@ -2,7 +2,7 @@
 
 `find_next_preparation` gives the steps before the instructions of a sitting (forms, device check) and is called by
 `prepare_sitting`. `find_next_action` gives the steps after them and is called by `run_session`; its order of precedence
-is: end of the session, limits of the sitting, demonstration, rest, reference, probe, trial.
+is: end of the session, limits of the sitting (`find_reached_limit`), demonstration, rest, reference, probe, trial.
 """
 
 from dataclasses import dataclass
@@ -38,9 +38,10 @@ class Demonstrate:
 
 @dataclass(frozen=True, slots=True)
 class TakeRest:
-    """A rest of this length (s) is enforced before the next trial."""
+    """A rest is enforced before the next trial."""
 
     seconds: float
+    """Duration of the rest (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class EndSitting:
     """The sitting must end here."""
 
     reason: str
-    """Reason for the user, a clause in words."""
+    """Reason for the user, as a clause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +71,13 @@ def find_next_preparation(state: SessionState) -> Preparation | None:
         return None
     if sitting.ineligibility:
         return EndSitting(INELIGIBILITY_REASONS[sitting.ineligibility])
-    forms = (
+    form_steps = (
         (FormKind.CONSENT, sitting.consented),
         (FormKind.EXCLUSION, sitting.included),
         (FormKind.QUESTIONNAIRE, sitting.questionnaire_done),
         (FormKind.SETUP, sitting.setup_done),
     )
-    for kind, is_done in forms:
+    for kind, is_done in form_steps:
         form = None if is_done else make_form(state.protocol, kind)
         if form is not None:
             return FillIn(form)
@@ -84,8 +85,8 @@ def find_next_preparation(state: SessionState) -> Preparation | None:
 
 
 def find_next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
-    """Find the next action. Raises ValueError while a trial is open: its answer, its measurement or its failure must be
-    logged first.
+    """Find the next action. Raises ValueError while a trial is open: its answer and measurement, or that it is void,
+    must be logged first.
 
     utc, monotonic_s: the present time (ISO 8601) and monotonic clock (s), by which the limits of a sitting are judged;
     with an empty utc the limits are not applied.
@@ -98,17 +99,22 @@ def find_next_action(state: SessionState, utc: str = "", monotonic_s: float | No
         return FillIn(form) if form is not None and not state.closed else Finish()
     if is_person and utc and (reason := find_reached_limit(state, utc, monotonic_s)):
         return EndSitting(reason)
-    probing, probes = state.sitting.probing, state.protocol.probes
+    probe_state, probe_settings = state.sitting.probing, state.protocol.probes
     if is_person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
         return Demonstrate()
     if state.rest_due_s > 0:
         return TakeRest(seconds=state.rest_due_s)
-    return find_due_reference(probing, probes) or find_due_probe(probing, probes) or find_due_presentation(state)
+    return (
+        find_due_reference(probe_state, probe_settings)
+        or find_due_probe(probe_state, probe_settings)
+        or find_due_presentation(state)
+    )
 
 
 def find_reached_limit(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
-    """Find the limit that ends this sitting; returns the reason in words, empty if the sitting may continue. The limits
-    are the duration of the sitting (minutes) and the daily vibration exposure A(8) of the hand (m/s²)."""
+    """Find the limit that ends this sitting; returns the reason as a clause, empty if the sitting may continue. The
+    limits are the duration of the sitting since the first motion of the handle (min) and the daily vibration exposure
+    A(8) of the hand (m/s²). utc, monotonic_s: the present time, as in `find_next_action`."""
     limits = state.protocol.limits
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
     if (sitting.sitting_elapsed_s or 0.0) / 60.0 >= limits.longest_min:

@@ -40,7 +40,8 @@ class ProbeState:
     since_probe_s: float | None = None
     """Time (s) since the last probe with a hand in this sitting; None before the first, and after a long pause."""
     is_reference_done: bool = False
-    """Whether the reference that is due once in this sitting, and again after a long pause, was begun or declined."""
+    """Whether the reference that is due once in this sitting, and again after a long pause, was declined or begun; it
+    begins with the test whether the handle is free."""
     hand_mass_kg: float | None = None
     """Apparent mass of the handle with the hand at the last such probe since a long pause; None where not known."""
     hand_level_n: float = 0.0
@@ -104,10 +105,10 @@ def end_probe(state: ProbeState, event: ProbeMeasured) -> ProbeState:
     is_declined = event.number == state.probe_count and event.recording is None
     if not is_declined and (state.open is None or state.open.number != event.number):
         raise LogContradiction(f"a measurement of probe {event.number}, which is not playing")
-    updated = replace(state, open=None, is_reference_done=state.is_reference_done or is_declined)
+    updated_state = replace(state, open=None, is_reference_done=state.is_reference_done or is_declined)
     if state.open is None or state.open.kind != "hand":
-        return updated
-    return replace(updated, hand_mass_kg=event.apparent_mass_kg, hand_level_n=state.open.level_n)
+        return updated_state
+    return replace(updated_state, hand_mass_kg=event.apparent_mass_kg, hand_level_n=state.open.level_n)
 
 
 def apply_break(state: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:

@@ -1,8 +1,9 @@
 """State of a sitting apart from its trials: forms, device check, demonstration, and the vibration dose of the day.
 
 Part of the session's state, `SessionState.sitting`, with a function per logged event that returns the next state;
-called by `fold`, `fold_trial` and `daily_dose`. The dose is that of the daily exposure A(8) (`vibration_dose`); a rest
-of `DAILY_REST_H` without movement of the handle starts a new day.
+called by `fold`, `fold_trial` and `daily_dose`. `machine` and `make_watch_view` read durations and dose. The dose is
+that of the daily exposure A(8) (`vibration_dose`); a rest of `DAILY_REST_H` without movement of the handle starts a new
+day.
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ class SittingState:
     for the whole session; set-up and device check for one sitting."""
 
     consented: bool = False
+    """Whether the participant consented."""
     included: bool = False
+    """Whether the exclusion form was passed: no exclusion criterion applies."""
     ineligibility: Literal["", "refused", "excluded"] = ""
-    """Reason why no stimulus may be played: consent refused, or excluded by a question; empty if allowed."""
+    """Reason why no stimulus may be played: consent refused, or an exclusion criterion applies; empty if allowed."""
     place_assigned: bool = False
     """Whether the participant's place in the counterbalanced order of conditions is assigned."""
     questionnaire_done: bool = False
@@ -43,16 +46,16 @@ class SittingState:
     device_checked: bool = False
     demo_done: bool = False
     demo_count: int = 0
-    """Demonstrations played in the session."""
+    """Number of demonstrations played in the session."""
     debriefed: bool = False
     last_moment: Moment = Moment("")  # noqa: RUF009 - frozen
     """Time of the last log entry; all durations below are given for this time."""
     sitting_elapsed_s: float | None = None
     """Seconds since the handle first moved in this sitting; None before."""
     busy_voids: int = 0
-    """Trials of this sitting that were void because the computer was too busy."""
+    """Number of trials of this sitting that were void because the computer was too busy."""
     answers_before: int = 0
-    """Answers given in earlier sittings."""
+    """Number of answers given in earlier sittings."""
     still_s: float | None = None
     """Seconds since the handle last moved, in any sitting; None before."""
     dose: Dose = NO_DOSE
@@ -60,12 +63,13 @@ class SittingState:
     other_sessions_dose: Dose = NO_DOSE
     """Dose of the participant's other sessions on the same day, as known at the beginning of this sitting."""
     unread_sessions: tuple[str, ...] = ()
-    """Sessions of the participant that could not be read at the beginning of this sitting."""
+    """Names of the participant's sessions that could not be read at the beginning of this sitting."""
     daily_rest: DailyRest | None = None
     """The last rest of `DAILY_REST_H` or more; None before the first, or where a step of the clock disproved it."""
     clock_steps: tuple[ClockStep, ...] = ()
     """Steps of the computer's wall clock that the log shows."""
     probing: ProbeState = ProbeState()  # noqa: RUF009 - frozen
+    """State of the probes and references of the session."""
 
 
 DAILY_REST_H = 10.0
@@ -77,7 +81,8 @@ DAILY_REST_S = 3600 * DAILY_REST_H
 
 
 def apply_form(sitting: SittingState, event: FormFilled) -> SittingState:
-    """Apply a form, of which `event.passed` decides on consent and on inclusion; returns the new state."""
+    """Return the state after a form was filled in; `event.passed` states whether consent was given, or no exclusion
+    criterion applies, and is ignored for other forms."""
     match event.form:
         case "consent":
             return replace(sitting, consented=event.passed, ineligibility="" if event.passed else "refused")
@@ -92,18 +97,19 @@ def apply_form(sitting: SittingState, event: FormFilled) -> SittingState:
 
 
 def apply_device_check(sitting: SittingState, event: DeviceChecked) -> SittingState:
-    """Apply a device check; a failed one also withdraws an earlier pass."""
+    """Return the state after a device check; a failed check revokes an earlier passed one."""
     return replace(sitting, device_checked=event.passed)
 
 
 def finish_demo(sitting: SittingState, event: DemoFinished) -> SittingState:
-    """Record that the demonstration is over."""
+    """Return the state after the demonstration."""
     return replace(sitting, demo_done=True)
 
 
 def resume_sitting(sitting: SittingState, answers: int) -> SittingState:
-    """Begin a further sitting. answers: number of answers so far. A participant who was turned away is asked again, in
-    case an answer was mistyped, under version 1 of the rules (`rules`)."""
+    """Return the state at the beginning of a further sitting. answers: number of answers so far. A participant who
+    refused or was excluded is asked again, in case an answer was mistyped: possible under version 1 of the rules only,
+    because later versions close such a session (`rules.is_refusal_final`)."""
     return replace(
         sitting,
         setup_done=False,
@@ -117,42 +123,42 @@ def resume_sitting(sitting: SittingState, answers: int) -> SittingState:
 
 
 def pass_time(sitting: SittingState, moment: Moment, resumed: bool = False) -> SittingState:
-    """Advance all durations to this moment. resumed: whether it begins a new sitting, whose monotonic clock cannot be
-    compared with earlier values."""
+    """Return the state with all durations advanced to this moment. resumed: whether it begins a new sitting, whose
+    monotonic clock cannot be compared with earlier values."""
     previous_moment = Moment(sitting.last_moment.utc) if resumed else sitting.last_moment
     elapsed_s, step = (
         compute_elapsed_s(previous_moment, moment),
         find_clock_step(previous_moment, moment, between_sittings=resumed),
     )
     since_probe_s = sitting.probing.since_probe_s
-    advanced = replace(
+    advanced_sitting = replace(
         sitting,
         last_moment=moment,
         probing=replace(sitting.probing, since_probe_s=None if since_probe_s is None else since_probe_s + elapsed_s),
         sitting_elapsed_s=None if sitting.sitting_elapsed_s is None else sitting.sitting_elapsed_s + elapsed_s,
         still_s=None if sitting.still_s is None else sitting.still_s + elapsed_s,
     )
-    return advanced if step is None else _apply_clock_step(advanced, step)
+    return advanced_sitting if step is None else _apply_clock_step(advanced_sitting, step)
 
 
 def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
-    """Correct the rests for a step of the wall clock. A clock that is set back may have been set forward between two
-    sittings, so that less time passed than was counted: the rest is shortened, and a dose that it reset is restored if
-    the rest is then shorter than `DAILY_REST_H`."""
+    """Return the state with the rests corrected for a step of the wall clock. A clock that is set back may have been
+    set forward between two sittings, so that less time passed than was counted: the rest is shortened, and a dose that
+    it reset is restored if the rest is then shorter than `DAILY_REST_H`."""
     steps = (*sitting.clock_steps, step)
-    corrected = replace(sitting, clock_steps=steps)
+    corrected_sitting = replace(sitting, clock_steps=steps)
     # Known steps forward were not counted as rest: setting the clock back by the same amount changes nothing.
     overcounted_s = max(0.0, -_sum_steps_s(steps)) - max(0.0, -_sum_steps_s(sitting.clock_steps))
     if overcounted_s <= 0:
-        return corrected
-    if corrected.still_s is not None:
-        corrected = replace(corrected, still_s=max(0.0, corrected.still_s - overcounted_s))
-    if corrected.daily_rest is None:
-        return corrected
-    daily_rest = replace(corrected.daily_rest, still_s=corrected.daily_rest.still_s - overcounted_s)
+        return corrected_sitting
+    if corrected_sitting.still_s is not None:
+        corrected_sitting = replace(corrected_sitting, still_s=max(0.0, corrected_sitting.still_s - overcounted_s))
+    if corrected_sitting.daily_rest is None:
+        return corrected_sitting
+    daily_rest = replace(corrected_sitting.daily_rest, still_s=corrected_sitting.daily_rest.still_s - overcounted_s)
     if daily_rest.still_s >= DAILY_REST_S:
-        return replace(corrected, daily_rest=daily_rest)
-    return replace(corrected, daily_rest=None, dose=sum_doses(daily_rest.dose, corrected.dose))
+        return replace(corrected_sitting, daily_rest=daily_rest)
+    return replace(corrected_sitting, daily_rest=None, dose=sum_doses(daily_rest.dose, corrected_sitting.dose))
 
 
 def _sum_steps_s(steps: tuple[ClockStep, ...]) -> float:
@@ -161,7 +167,8 @@ def _sum_steps_s(steps: tuple[ClockStep, ...]) -> float:
 
 
 def start_motion(sitting: SittingState) -> SittingState:
-    """Apply a movement of the handle, which resets the dose to zero after a rest of `DAILY_REST_H` or more."""
+    """Return the state after the handle begins to move, which resets the dose to zero after a rest of `DAILY_REST_H` or
+    more, and begins the duration of the sitting at its first motion."""
     if sitting.still_s is not None and sitting.still_s >= DAILY_REST_S:
         sitting = replace(
             sitting, daily_rest=DailyRest(sitting.still_s, sitting.dose), dose=NO_DOSE, other_sessions_dose=NO_DOSE
@@ -179,15 +186,16 @@ def compute_daily_dose(sitting: SittingState) -> Dose:
 def add_exposure(
     sitting: SittingState, frequency_hz: float, amplitude_mps2: float | None, duration_s: float | None
 ) -> SittingState:
-    """Add sinusoidal vibration to the dose. amplitude_mps2: acceleration (m/s^2); None = not known. duration_s: nothing
-    is added for 0, or for None as in logs of older versions, which do not record it."""
+    """Return the state with a sinusoidal vibration added to the dose. amplitude_mps2: amplitude of the acceleration
+    (m/s²), None if not known. duration_s: nothing is added for 0, or for None as in logs of older versions, which do
+    not record it."""
     if not duration_s:
         return sitting
     return replace(sitting, dose=add_sinusoid(sitting.dose, frequency_hz, amplitude_mps2, duration_s))
 
 
 def estimate_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
-    """Estimate the acceleration amplitude (m/s^2) of a stimulus that was not measured: its level (N) times the largest
+    """Estimate the acceleration amplitude (m/s²) of a stimulus that was not measured: its level (N) times the largest
     ratio of amplitude to level measured at this frequency; None without such a measurement."""
     ratios = [
         trial.delivered_mps2 / trial.level_n

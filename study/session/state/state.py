@@ -1,7 +1,8 @@
 """State of a session: an immutable value, computed from the logged events by `study.session.state.fold`.
 
-The state depends on the log alone, so that the same log always gives the same state (event sourcing). A session that
-was interrupted by a crash is resumed from its log in this way.
+The state depends on the log alone, so that the same log always gives the same state (event sourcing); an interrupted
+session is resumed from its log. `fold` and `fold_trial` compute the states, `machine` the next action from a state;
+`study.workflows` reads the states.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,10 +25,10 @@ from study.session.state.sitting_state import SittingState
 
 @dataclass(frozen=True, slots=True)
 class SessionState:
-    """Position in the schedule, open trial, finished trials, and facts of the current sitting."""
+    """Position in the schedule, open trial, presentations so far, and state of the current sitting."""
 
     opened: SessionOpened
-    """The opening line of the log: participant, device, seed."""
+    """The opening event of the log: participant, device, seed."""
     protocol: StudyProtocol
     runs: tuple[Run, ...]
     """Schedule of the participant, in order."""
@@ -40,15 +41,15 @@ class SessionState:
     attempt: int
     """Number of the current presentation of that trial, from 0; above 0 where earlier presentations were void."""
     presented: TrialPresented | None
-    """The trial that is presented and not completed, if any."""
+    """The presentation that is not completed; None between trials."""
     answered: AnswerGiven | None
-    """The answer of the open trial, whose measurement is not logged yet."""
+    """The answer of the open trial, whose measurement is not logged yet; None before it."""
     trials: tuple[Trial, ...]
     """All presentations so far, including void presentations, and the open trial as the last."""
     rest_due_s: float
-    """Rest before the next trial (s)."""
+    """Rest that is due before the next trial (s); 0 for none."""
     closed: bool
-    """Whether the log says that the session is closed."""
+    """Whether the log contains the closing event."""
     practice: PracticeState = field(default_factory=PracticeState)
     """Answers of the current run, if it is a practice run; its staircase is then unused."""
     sitting: SittingState = field(default_factory=SittingState)
@@ -75,8 +76,8 @@ class SessionState:
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:
-    """The state after the opening line of the log. Raises LogContradiction where that line and the protocol
-    disagree."""
+    """Compute the state after the opening event of the log. Raises LogContradiction where an equalized session has no
+    scale of levels for a frequency of the protocol."""
     _check_scales(opened, protocol)
     state = SessionState(
         opened=opened,
@@ -103,37 +104,39 @@ def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
     if opened.equalized is None:
         return
     scaled_hz = {scale.frequency_hz for scale in opened.equalized.levels}
-    missing = [f"{frequency:g} Hz" for frequency in protocol.all_frequencies_hz if frequency not in scaled_hz]
-    if missing:
-        raise LogContradiction(f"the session has no scale of levels for {', '.join(missing)}")
+    unscaled_frequencies = [
+        f"{frequency_hz:g} Hz" for frequency_hz in protocol.all_frequencies_hz if frequency_hz not in scaled_hz
+    ]
+    if unscaled_frequencies:
+        raise LogContradiction(f"the session has no scale of levels for {', '.join(unscaled_frequencies)}")
 
 
 def assign_place(state: SessionState, participant_number: int) -> SessionState:
-    """Assign the place in the counterbalanced order, before the first trial. participant_number replaces the number of
-    the opening line and determines the order of the runs."""
+    """Return the state with the place in the counterbalanced order, assigned before the first trial. participant_number
+    replaces the number of the opening event and determines the order of the runs."""
     opened = replace(state.opened, participant_number=participant_number)
-    order = schedule_runs(state.protocol, opened.seed, participant_number)
-    updated = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, place_assigned=True))
-    return replace(updated, staircase=begin_staircase(make_current_rule(updated)))
+    runs = schedule_runs(state.protocol, opened.seed, participant_number)
+    updated_state = replace(state, opened=opened, runs=runs, sitting=replace(state.sitting, place_assigned=True))
+    return replace(updated_state, staircase=begin_staircase(make_current_rule(updated_state)))
 
 
 def make_current_rule(state: SessionState) -> StaircaseRule:
-    """Staircase rule of the current run; unused in a practice run."""
+    """Make the staircase rule of the current run; unused in a practice run. Raises IndexError if all runs are done."""
     return make_staircase_rule(state.protocol, state.runs[state.run].phase)
 
 
 def find_due_presentation(state: SessionState) -> PresentTrial:
-    """The next presentation, determined by the staircase and the schedule of the current run."""
+    """Find the next presentation, determined by the staircase and the schedule of the current run, which must exist."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
     return compute_due_trial(state.protocol, state.opened, make_current_rule(state), place)
 
 
 def count_repeats_left(state: SessionState) -> int | None:
-    """Number of further repeats of a stimulus that the participant may request in this run; None if unlimited."""
+    """Count the further repeats of a stimulus that the participant may request in this run; None if unlimited."""
     if not is_same_stimulus_repeated(state.opened):
         return None
-    requested = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
-    return max(0, state.protocol.trial.repeats_per_run - requested)
+    repeat_count = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
+    return max(0, state.protocol.trial.repeats_per_run - repeat_count)
 
 
 def is_felt_by_person(opened: SessionOpened) -> bool | None:

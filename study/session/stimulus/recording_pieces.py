@@ -44,7 +44,7 @@ class RecordingPiece:
     """Number of the realisation of a multisine's phases, from 1."""
 
     def scale_to(self, amplitude_n: float) -> "RecordingPiece":
-        """Scale the excitation to another peak (N)."""
+        """Return the piece with the excitation scaled to another peak (N)."""
         samples = self.commands.samples * (amplitude_n / self.segment.amplitude)
         return replace(
             self,
@@ -80,18 +80,20 @@ def make_unit_vector(directions: TestDirections, axis_name: str) -> FloatArray:
 
 
 def _make_sine_piece(
-    protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, rate_hz: float
+    protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, sample_rate_hz: float
 ) -> RecordingPiece:
     """Make the piece of a sinusoid. The evaluated part is a whole number, at least one, of loops: the shortest whole
     periods that are a whole number of samples (`count_loop_samples`). Settling and fades lie outside."""
-    period_samples = count_loop_samples(frequency_hz, rate_hz)
-    fade_samples = round(protocol.fade_s * rate_hz)
-    settle_samples = max(fade_samples, round(segment.settle_s * rate_hz))
-    evaluated_samples = max(1, round(segment.duration_s * rate_hz) // period_samples) * period_samples
-    wave = make_sine(frequency_hz, segment.amplitude_n, settle_samples + evaluated_samples + fade_samples, rate_hz)
+    period_samples = count_loop_samples(frequency_hz, sample_rate_hz)
+    fade_samples = round(protocol.fade_s * sample_rate_hz)
+    settle_samples = max(fade_samples, round(segment.settle_s * sample_rate_hz))
+    evaluated_samples = max(1, round(segment.duration_s * sample_rate_hz) // period_samples) * period_samples
+    wave = make_sine(
+        frequency_hz, segment.amplitude_n, settle_samples + evaluated_samples + fade_samples, sample_rate_hz
+    )
     unit_vector = make_unit_vector(protocol.directions, segment.along)
     commands, rest_samples = _add_rests(
-        protocol, apply_fades(wave, fade_samples, fade_samples)[:, None] * unit_vector, rate_hz
+        protocol, apply_fades(wave, fade_samples, fade_samples)[:, None] * unit_vector, sample_rate_hz
     )
     start = rest_samples + settle_samples
     return RecordingPiece(
@@ -105,18 +107,19 @@ def _make_sine_piece(
 
 
 def _make_sweep_piece(
-    protocol: RecordingProtocol, number: int, segment: SweepSegment, rate_hz: float
+    protocol: RecordingProtocol, number: int, segment: SweepSegment, sample_rate_hz: float
 ) -> RecordingPiece:
     """Make the piece of a sweep. With several periods it is faded in during the first, which contains the transient;
     every period ends at zero, so that no fade-out is needed."""
-    period_samples = round(segment.duration_s * rate_hz)
+    period_samples = round(segment.duration_s * sample_rate_hz)
     wave = np.tile(
-        make_log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period_samples, rate_hz), segment.periods
+        make_log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period_samples, sample_rate_hz),
+        segment.periods,
     )
     unit_vector = make_unit_vector(protocol.directions, segment.along)
-    fade_in_samples = round(protocol.fade_s * rate_hz) if segment.periods > 1 else 0
+    fade_in_samples = round(protocol.fade_s * sample_rate_hz) if segment.periods > 1 else 0
     commands, start = _add_rests(
-        protocol, apply_fades(wave, min(fade_in_samples, period_samples), 0)[:, None] * unit_vector, rate_hz
+        protocol, apply_fades(wave, min(fade_in_samples, period_samples), 0)[:, None] * unit_vector, sample_rate_hz
     )
     return RecordingPiece(
         commands=commands,
@@ -129,21 +132,28 @@ def _make_sweep_piece(
 
 
 def _make_multisine_pieces(
-    protocol: RecordingProtocol, number: int, segment: MultisineSegment, rate_hz: float
+    protocol: RecordingProtocol, number: int, segment: MultisineSegment, sample_rate_hz: float
 ) -> list[RecordingPiece]:
     """Make a piece for each realisation of a multisine. A multisine does not start at zero; therefore fades lie outside
     the evaluated periods."""
-    period_samples, fade_samples = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
-    lines = list_lines_between(segment.from_hz, segment.to_hz, period_samples, rate_hz, odd_only=segment.odd_only)
+    period_samples, fade_samples = round(segment.duration_s * sample_rate_hz), round(protocol.fade_s * sample_rate_hz)
+    harmonic_numbers = list_lines_between(
+        segment.from_hz, segment.to_hz, period_samples, sample_rate_hz, odd_only=segment.odd_only
+    )
     unit_vector = None if segment.along == "all" else make_unit_vector(protocol.directions, segment.along)
     period_waves = make_multisines(
-        lines, period_samples, segment.amplitude_n, 3 if unit_vector is None else 1, segment.realisations, segment.seed
+        harmonic_numbers,
+        period_samples,
+        segment.amplitude_n,
+        3 if unit_vector is None else 1,
+        segment.realisations,
+        segment.seed,
     )
     pieces = []
     for realisation, period_wave in enumerate(period_waves, start=1):
         wave = period_wave[np.arange(-fade_samples, segment.periods * period_samples + fade_samples) % period_samples]
         forces = apply_fades(wave if unit_vector is None else wave * unit_vector, fade_samples, fade_samples)
-        commands, rest_samples = _add_rests(protocol, forces, rate_hz)
+        commands, rest_samples = _add_rests(protocol, forces, sample_rate_hz)
         start, stop = rest_samples + fade_samples, rest_samples + fade_samples + segment.periods * period_samples
         pieces.append(
             RecordingPiece(
@@ -159,13 +169,13 @@ def _make_multisine_pieces(
     return pieces
 
 
-def _add_rests(protocol: RecordingProtocol, forces: FloatArray, rate_hz: float) -> tuple[Signal, int]:
+def _add_rests(protocol: RecordingProtocol, forces: FloatArray, sample_rate_hz: float) -> tuple[Signal, int]:
     """Add a rest before and after `forces`, (n, 3), N. Returns the commands of the piece and the index at which the
     forces begin."""
-    rest_samples = round(protocol.rest_s * rate_hz)
+    rest_samples = round(protocol.rest_s * sample_rate_hz)
     samples = np.zeros((len(forces) + 2 * rest_samples, 3))
     samples[rest_samples : rest_samples + len(forces)] = forces
-    return Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), rest_samples
+    return Signal(samples, sample_rate_hz, "force", "N", ("fx", "fy", "fz")), rest_samples
 
 
 def _to_tuple(vector: FloatArray) -> tuple[float, float, float]:

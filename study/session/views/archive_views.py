@@ -16,7 +16,7 @@ INELIGIBILITY_REASONS = {
     "refused": "consent was not given",
     "excluded": "a question of the exclusion list was answered with yes",
 }
-"""Reason, in words, for each status of a person who did not take part."""
+"""Reason, as a clause, for each status of a person who did not take part; also the reason with which a sitting ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +32,12 @@ class SessionLine:
     protocol: str
     """Name of the protocol."""
     begun_utc: str
-    """Time of the opening (UTC, ISO 8601); of the withdrawal of a withdrawn session; of the last change of one that
-    cannot be read."""
+    """Time (UTC, ISO 8601) at which the session was opened; for a withdrawn session the time of the withdrawal, for an
+    unreadable one the time of the last change of its files."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     answers: int
-    """Number of answers in the log. This and the next two: 0 for a withdrawn or unreadable session."""
+    """Number of answers in the log; 0, like the next two numbers, for a withdrawn or unreadable session."""
     runs_done: int
     """Number of completed runs."""
     runs: int
@@ -68,14 +68,14 @@ class HomeView:
     data: str
     """Path of the data folder."""
     sessions: tuple[SessionLine, ...]
-    """Latest first."""
+    """Sessions of the folder, latest first."""
     protocols: tuple[ProtocolLine, ...]
     devices: tuple[str, ...]
     """Names of devices, as `--device` takes them."""
     models: tuple[str, ...] = ()
     """Paths of files of identified models."""
     qualities: tuple[tuple[str, str], ...] = ()
-    """Held-out error of each model in words: (path, words)."""
+    """(path of a model file, its held-out error in words)."""
 
     def describe_quality(self, model: str) -> str:
         """Describe the held-out error of the model in this file; empty where it is not known."""
@@ -84,17 +84,19 @@ class HomeView:
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
-    """One run of a staircase, for a plot. Its tuples have one entry per trial that counts; levels are forces in N."""
+    """One run of a staircase, for a plot. Its tuples have one entry per trial that counts, in order."""
 
     title: str
     levels_n: tuple[float, ...]
+    """Level of each trial (N)."""
     correct: tuple[bool, ...]
+    """Whether the answer was right."""
     reversals: tuple[bool, ...]
     """Whether the staircase reversed at that trial."""
     threshold_n: float | None
-    """Estimated threshold; None where the run is not complete."""
+    """Estimated threshold (N); None where the run is not complete."""
     cap_n: float
-    """Highest level that the protocol allows."""
+    """Highest level (N) that the protocol allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,11 +132,11 @@ class DiagnosisView:
     rivals: tuple[str, ...]
     """Effects that explain the recordings as well, one sentence each."""
     mismatch: tuple[tuple[str, ...], ...]
-    """Differences of model and recording. This and the next two: rows of text, the first one the header."""
+    """Differences of model and recording, as rows of text, the first one the header."""
     fit: tuple[tuple[str, ...], ...]
-    """Errors of the given model, of the re-tuned model, and of the model with the effects."""
+    """Errors of the given model, of the re-tuned model, and of the model with the effects, as rows like `mismatch`."""
     remainder: tuple[tuple[str, ...], ...]
-    """Errors above the noise that the effects do not explain."""
+    """Errors above the noise that the effects do not explain, as rows like `mismatch`."""
     next_experiment: str
     """Recommended next recording, in words."""
     report: str = ""

@@ -1,6 +1,7 @@
 """State machine of a form while it is filled in: each key, click or paste gives the next state from the previous one.
 
-States are immutable, and nothing is drawn here: `study.tui.screens.form` draws the state. Keys are applied in the order
+States are immutable, and nothing is drawn here: `study.tui.screens.form` calls these functions and draws the state;
+`study.tui.widgets.choice_row` uses the functions of a single row of choices. Keys are applied in the order
 of arrival, so that an answer belongs to the question at which the cursor was when the key arrived, however fast the
 keys are pressed.
 """
@@ -10,7 +11,8 @@ from dataclasses import dataclass, replace
 from study.session.views.form_views import Form, FormField, FormKind, FormReply, find_missing_fields
 
 MAX_TEXT_CHARACTERS = 500
-"""Largest number of characters of free text in a field; further characters are ignored. Chosen."""
+"""Largest number of characters of free text in a field; further characters are ignored. Chosen: a few
+sentences."""
 CONFIRMED_KINDS = (FormKind.CONSENT, FormKind.EXCLUSION)
 """Kinds of forms in which changed choices must be confirmed before sending, because safety depends on them."""
 CURSOR_STEPS = {"down": 1, "up": -1, "tab": 1, "shift+tab": -1}
@@ -56,7 +58,7 @@ class FormEntry:
 
 
 def make_blank_entry(form: Form) -> FormEntry:
-    """An empty entry for this form."""
+    """Make an empty entry for this form."""
     return FormEntry(form, (FieldEntry(),) * len(form.fields))
 
 
@@ -71,8 +73,8 @@ def make_reply(entry: FormEntry) -> FormReply:
 
 
 def apply_key(entry: FormEntry, key: str, character: str | None = None, stacked: bool = False) -> FormEntry | None:
-    """Apply one key: the next entry; None if the key has no function at the cursor. After sending, no key has an
-    effect.
+    """Apply one key and return the next entry; None if the key has no function at the cursor. After sending, no key has
+    an effect.
 
     key: name of the key in Textual (the terminal interface library), such as "enter", "shift+tab", "1". character: the
     character that the key prints; None without one. stacked: whether the choices under the cursor are listed
@@ -82,11 +84,11 @@ def apply_key(entry: FormEntry, key: str, character: str | None = None, stacked:
         return entry
     field = entry.field
     if field is not None and field.choices and stacked and key in ("up", "down"):
-        marked = move_mark(
+        moved_mark = move_mark(
             entry.field_entries[entry.cursor].marked, CURSOR_STEPS[key], len(field.choices), stop_at_ends=False
         )
-        if marked is not None:
-            return _change_field(entry, marked=marked)
+        if moved_mark is not None:
+            return _change_field(entry, marked=moved_mark)
     if key in CURSOR_STEPS:
         return move_cursor(entry, entry.cursor + CURSOR_STEPS[key])
     if field is None:
@@ -99,9 +101,9 @@ def move_cursor(entry: FormEntry, field_index: int) -> FormEntry:
     return entry if entry.is_sent else replace(entry, cursor=min(max(field_index, 0), len(entry.form.fields)))
 
 
-def click_choice(entry: FormEntry, field_index: int, choice: int) -> FormEntry:
-    """Apply a click on a choice: the cursor moves to its field, and it is chosen. field_index, choice: from 0."""
-    return entry if entry.is_sent else _choose(move_cursor(entry, field_index), choice)
+def click_choice(entry: FormEntry, field_index: int, choice_index: int) -> FormEntry:
+    """Apply a click on a choice: the cursor moves to its field, and it is chosen. Both indices count from 0."""
+    return entry if entry.is_sent else _choose_answer(move_cursor(entry, field_index), choice_index)
 
 
 def click_continue(entry: FormEntry) -> FormEntry:
@@ -115,29 +117,31 @@ def paste_text(entry: FormEntry, text: str) -> FormEntry:
     field = entry.field
     if entry.is_sent or field is None or field.choices:
         return entry
-    return _insert_text(entry, "".join(c for c in " ".join(text.split()) if c.isprintable()))
+    return _insert_text(entry, "".join(character for character in " ".join(text.split()) if character.isprintable()))
 
 
-def move_mark(marked: int | None, step: int, choices: int, stop_at_ends: bool = True) -> int | None:
-    """Move the mark among the choices by a step of 1 or -1: index of the marked choice. Without a mark (None), a step
-    of 1 gives the first choice, -1 the last. A step beyond the ends leaves the mark unchanged; if `stop_at_ends` is
-    false, it gives None, as does a step of -1 without a mark."""
+def move_mark(marked: int | None, step: int, choice_count: int, stop_at_ends: bool = True) -> int | None:
+    """Move the mark among the choices by a step of 1 or -1 and return the index of the marked choice. Without a mark
+    (None), a step of 1 gives the first choice, -1 the last. A step beyond the ends leaves the mark unchanged; if
+    `stop_at_ends` is false, it gives None, as does a step of -1 without a mark."""
     if marked is None:
-        return (0 if step > 0 else choices - 1) if stop_at_ends or step > 0 else None
-    target = marked + step
-    return target if 0 <= target < choices else marked if stop_at_ends else None
+        return (0 if step > 0 else choice_count - 1) if stop_at_ends or step > 0 else None
+    moved_mark = marked + step
+    return moved_mark if 0 <= moved_mark < choice_count else marked if stop_at_ends else None
 
 
 def find_choice(choices: tuple[str, ...], character: str) -> int | None:
-    """Find the choice that a typed character selects: by its number from 1, or by its first letter if no other choice
-    has the same. Where any choice is a number, a digit selects the choice with this text. None without such a
-    choice."""
+    """Find the index of the choice that a typed character selects: by its number from 1, or by its first letter if no
+    other choice has the same. Where any choice is a number, a digit selects the choice with this text. None without
+    such a choice."""
     if character.isdecimal():
         if any(choice.isdigit() for choice in choices):
             return choices.index(character) if character in choices else None
         return int(character) - 1 if 0 < int(character) <= len(choices) else None
-    matching = [i for i, choice in enumerate(choices) if choice.casefold().startswith(character.casefold())]
-    return matching[0] if len(matching) == 1 else None
+    matching_choices = [
+        index for index, choice in enumerate(choices) if choice.casefold().startswith(character.casefold())
+    ]
+    return matching_choices[0] if len(matching_choices) == 1 else None
 
 
 def _press_choice(entry: FormEntry, field: FormField, key: str, character: str | None) -> FormEntry | None:
@@ -148,13 +152,13 @@ def _press_choice(entry: FormEntry, field: FormField, key: str, character: str |
             entry, marked=move_mark(field_entry.marked, 1 if key == "right" else -1, len(field.choices))
         )
     if key in ("space", "enter"):
-        chosen = entry if field_entry.marked is None else _choose(entry, field_entry.marked)
-        can_leave = chosen.field_entries[entry.cursor].answer or not field.needed
-        return move_cursor(chosen, entry.cursor + 1) if key == "enter" and can_leave else chosen
+        changed_entry = entry if field_entry.marked is None else _choose_answer(entry, field_entry.marked)
+        can_leave = changed_entry.field_entries[entry.cursor].answer or not field.needed
+        return move_cursor(changed_entry, entry.cursor + 1) if key == "enter" and can_leave else changed_entry
     if key in ("backspace", "delete") and not field.needed:
         return _change_field(entry, answer="")
-    choice = find_choice(field.choices, character) if character else None
-    return None if choice is None else _choose(entry, choice)
+    choice_index = find_choice(field.choices, character) if character else None
+    return None if choice_index is None else _choose_answer(entry, choice_index)
 
 
 def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry | None:
@@ -177,18 +181,20 @@ def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry 
 def _insert_text(entry: FormEntry, characters: str) -> FormEntry:
     """Insert characters at the caret, up to `MAX_TEXT_CHARACTERS` in the field."""
     text, caret = entry.field_entries[entry.cursor].answer, entry.field_entries[entry.cursor].caret
-    fitting = characters[: MAX_TEXT_CHARACTERS - len(text)]
-    return _change_field(entry, answer=text[:caret] + fitting + text[caret:], caret=caret + len(fitting))
+    fitting_characters = characters[: MAX_TEXT_CHARACTERS - len(text)]
+    return _change_field(
+        entry, answer=text[:caret] + fitting_characters + text[caret:], caret=caret + len(fitting_characters)
+    )
 
 
-def _choose(entry: FormEntry, choice: int) -> FormEntry:
+def _choose_answer(entry: FormEntry, choice_index: int) -> FormEntry:
     """Choose an answer in the field under the cursor; in `CONFIRMED_KINDS`, a changed choice is added to `replaced`."""
     field, previous_answer = entry.form.fields[entry.cursor], entry.field_entries[entry.cursor].answer
-    answer = field.choices[choice]
-    chosen = _change_field(entry, answer=answer, marked=choice)
+    answer = field.choices[choice_index]
+    changed_entry = _change_field(entry, answer=answer, marked=choice_index)
     if previous_answer in ("", answer) or entry.form.kind not in CONFIRMED_KINDS:
-        return chosen
-    return replace(chosen, replaced=entry.replaced | {entry.cursor})
+        return changed_entry
+    return replace(changed_entry, replaced=entry.replaced | {entry.cursor})
 
 
 def _change_field(

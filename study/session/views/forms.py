@@ -1,7 +1,7 @@
 """Forms of a session, made from its protocol, and the evaluation of a filled form.
 
-Consent, exclusion criteria, questionnaires before and after the trials, set-up, and state of the handle. The data
-classes are those of `form_views`.
+Consent, exclusion criteria, questionnaires before and after the trials, set-up, and release of the handle. The data
+classes are those of `form_views`. Called by `machine` (which form is due), `prepare_sitting` and `play_probe`.
 """
 
 from dataclasses import dataclass
@@ -41,12 +41,12 @@ class FormOutcome:
 
 
 def make_words(protocol: StudyProtocol) -> Words:
-    """The texts of this protocol that participants read, in its language."""
+    """Make the texts that participants read, in the language of the protocol."""
     return Words(protocol.text.words)
 
 
 def make_form(protocol: StudyProtocol, kind: FormKind) -> Form | None:
-    """The form of this kind; None if the protocol has no questions of this kind."""
+    """Make the form of this kind; None if the protocol has no questions of this kind."""
     words = make_words(protocol)
     match kind:
         case FormKind.CONSENT:
@@ -68,7 +68,7 @@ def make_form(protocol: StudyProtocol, kind: FormKind) -> Form | None:
 
 
 def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOutcome:
-    """Whether the form is passed, and which of its answers are logged."""
+    """Judge whether the form is passed, and select which of its answers are logged."""
     answers = encode_answers(form, reply)
     match form.kind:
         case FormKind.CONSENT:
@@ -87,10 +87,10 @@ def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOut
 
 
 def make_confirmation(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
-    """Form that asks to confirm a refused consent or an exclusion before it becomes final, with the questions
+    """Make the form that asks to confirm a refused consent or an exclusion before it becomes final, with the questions
     concerned."""
     is_consent, answers = form.kind is FormKind.CONSENT, encode_answers(form, reply)
-    texts = [
+    quoted_questions = [
         words.fill("quoted", {"text": field.label})
         for field in form.fields
         if answers[field.key] != ("yes" if is_consent else "no")
@@ -98,7 +98,7 @@ def make_confirmation(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS
     return Form(
         form.kind,
         words["confirm_title"],
-        words.fill("confirm_no" if is_consent else "confirm_yes", {"questions": " ".join(texts)}),
+        words.fill("confirm_no" if is_consent else "confirm_yes", {"questions": " ".join(quoted_questions)}),
         (_make_yes_no_field("right", words["confirm_refused" if is_consent else "confirm_excluded"], words),),
         form.version,
         form.ethics_id,
@@ -106,34 +106,35 @@ def make_confirmation(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS
 
 
 def is_confirmed(confirmation: Form, reply: FormReply) -> bool:
-    """Whether the answers were confirmed; otherwise the form is filled in again."""
+    """Whether the answers were confirmed by yes; otherwise the form is filled in again."""
     return encode_answers(confirmation, reply)["right"] == "yes"
 
 
 def _make_yes_no_field(key: str, label: str, words: Words) -> FormField:
-    """A question to be answered by yes or no."""
+    """Make a question to be answered by yes or no."""
     return FormField(key, label, tuple(words[word_key] for word_key in YES_NO), codes=YES_NO)
 
 
 def _make_choice_field(key: str, label: str, choices: dict[str, str], words: Words) -> FormField:
-    """A question with choices. choices: logged code, and key of the text."""
+    """Make a question with choices. choices: key of the text by logged code."""
     return FormField(key, label, tuple(words[word_key] for word_key in choices.values()), codes=tuple(choices))
 
 
 def _make_consent_form(protocol: StudyProtocol, words: Words) -> Form:
-    """Consent form: the statements of the protocol, and a statement on probes, which no protocol can leave out."""
+    """Make the consent form: the statements of the protocol, and a statement on probes, which no protocol can leave
+    out."""
     settings = protocol.consent
     statements = (*settings.statements, *list_probe_statements(protocol.probes, words))
     fields = tuple(
         _make_yes_no_field(f"statement_{number}", statement, words)
         for number, statement in enumerate(statements, start=1)
     )
-    origin = settings.version, settings.ethics_id
-    return Form(FormKind.CONSENT, words["consent_title"], words["consent_intro"], fields, *origin)
+    version_and_ethics_id = settings.version, settings.ethics_id
+    return Form(FormKind.CONSENT, words["consent_title"], words["consent_intro"], fields, *version_and_ethics_id)
 
 
 def list_probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
-    """Statements of consent to the probes between trials; empty where the protocol has none."""
+    """List the statements of consent to the probes between trials; empty where the protocol has no probes."""
     if not probes.levels_n:
         return ()
     probe_texts = {"seconds": f"{probes.interval_s:g}", "newtons": f"{max(probes.levels_n):g}"}
@@ -141,8 +142,8 @@ def list_probe_statements(probes: ProbeSettings, words: Words = ENGLISH_WORDS) -
 
 
 def _make_release_form(protocol: StudyProtocol, words: Words) -> Form:
-    """Form that asks the participant to release the handle for the reference probe. The duration shown is
-    `reference_s` plus an allowance of 5 s."""
+    """Make the form that asks the participant to release the handle for the reference probe. The duration shown is
+    `reference_s` plus an allowance of 5 s, chosen."""
     probes = protocol.probes
     reference_texts = {"seconds": f"{probes.reference_s + 5:.0f}", "newtons": f"{probes.reference_n:g}"}
     answers = {"yes": "yes", "not now": "let_go_not_now"}
@@ -155,25 +156,26 @@ def _make_release_form(protocol: StudyProtocol, words: Words) -> Form:
 
 
 def make_take_handle_form(words: Words = ENGLISH_WORDS) -> Form:
-    """The form that asks the participant to take the handle again, after a reference probe."""
+    """Make the form that asks the participant to take the handle again, after a reference probe."""
     held_field = _make_choice_field("held", words["take_held"], {"yes": "yes"}, words)
     return Form(FormKind.HANDLE, words["take_title"], words["take_intro"], (held_field,))
 
 
 def _make_exclusion_form(settings: ConsentSettings, words: Words) -> Form:
-    """Form of the exclusion criteria: yes to any question excludes the participant."""
+    """Make the form of the exclusion criteria: yes to any question excludes the participant."""
     fields = tuple(
         _make_yes_no_field(f"question_{number}", question, words)
         for number, question in enumerate(settings.exclusions, start=1)
     )
-    origin = settings.version, settings.ethics_id
-    return Form(FormKind.EXCLUSION, words["exclusion_title"], words["exclusion_intro"], fields, *origin)
+    version_and_ethics_id = settings.version, settings.ethics_id
+    return Form(FormKind.EXCLUSION, words["exclusion_title"], words["exclusion_intro"], fields, *version_and_ethics_id)
 
 
 def _make_setup_form(settings: SetupSettings, words: Words) -> Form:
-    """Set-up form. Where the protocol has a requirement, the question states it."""
+    """Make the set-up form. Where the protocol has a requirement, the question states it."""
 
-    def question_text(key: str, is_required: bool) -> str:
+    def format_question(key: str, is_required: bool) -> str:
+        """Format the question with this key of its text, with the requirement if there is one."""
         return f"{words[key]} {words[f'{key}_wanted']}" if is_required else words[key]
 
     return Form(
@@ -181,9 +183,9 @@ def _make_setup_form(settings: SetupSettings, words: Words) -> Form:
         words["setup_title"],
         words["setup_intro"],
         (
-            _make_choice_field("hearing", question_text("setup_hearing", settings.hearing_masked), HEARING, words),
-            _make_yes_no_field("hand_hidden", question_text("setup_hidden", settings.hand_hidden), words),
-            _make_yes_no_field("arm_supported", question_text("setup_arm", settings.arm_supported), words),
+            _make_choice_field("hearing", format_question("setup_hearing", settings.hearing_masked), HEARING, words),
+            _make_yes_no_field("hand_hidden", format_question("setup_hidden", settings.hand_hidden), words),
+            _make_yes_no_field("arm_supported", format_question("setup_arm", settings.arm_supported), words),
             _make_choice_field("grip", words.fill("setup_grip", {"grip": settings.grip}), GRIPS, words),
             _make_choice_field("hand", words["setup_hand"], HANDS, words),
         ),
@@ -191,24 +193,24 @@ def _make_setup_form(settings: SetupSettings, words: Words) -> Form:
 
 
 def _describe_deviations(setup: SetupSettings, answers: dict[str, str]) -> str:
-    """Differences between set-up and protocol, as an English sentence for the log; empty if they agree."""
-    requirements = (
+    """Describe differences between set-up and protocol in an English sentence for the log; empty if they agree."""
+    checked_requirements = (
         (setup.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
         (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
         (setup.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
     )
-    text = ", ".join(deviation for is_violated, deviation in requirements if is_violated)
-    return f"The set-up is not the protocol's: {text}." if text else ""
+    deviation_text = ", ".join(deviation for is_violated, deviation in checked_requirements if is_violated)
+    return f"The set-up is not the protocol's: {deviation_text}." if deviation_text else ""
 
 
 def _make_question_form(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
-    """Form of voluntary questions: participation does not depend on their answers."""
+    """Make a form of voluntary questions: participation does not depend on their answers."""
     fields = tuple(_make_question_field(question, words) for question in questions)
     return Form(kind, words[f"{name}_title"], words[f"{name}_intro"], fields)
 
 
 def _make_question_field(question: Question, words: Words) -> FormField:
-    """A question of the protocol as a field; the meaning of a scale's ends is added to the question."""
+    """Make the field of a question of the protocol; the meaning of a scale's ends is added to the question."""
     label = question.question
     if question.ends:
         meaning = {"low_end": question.ends[0], "high_end": question.ends[1]}

@@ -13,8 +13,7 @@ BeforeMoving = Callable[[str], None]
 
 
 def refuse_unannounced(notice: str) -> None:
-    """A `BeforeMoving` for callers that cannot show a notice to a person: always raises StudyError, so the device does
-    not move."""
+    """Raise StudyError, so that the device does not move: the `BeforeMoving` of callers that cannot show a notice."""
     raise StudyError(
         "The device was not moved",
         f"A real device would move without a warning. {notice}",
@@ -24,7 +23,8 @@ def refuse_unannounced(notice: str) -> None:
 
 
 def format_recording_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:
-    """Notice before a recording. device: name of the device; total_s: duration (s) if no segment is repeated."""
+    """Format the notice before a recording. device: name of the device; total_s: duration (s) if no segment is
+    repeated."""
     peak_n = max(segment.amplitude_n for segment in protocol.segments)
     if protocol.hand == "held":
         return (
@@ -36,7 +36,8 @@ def format_recording_notice(protocol: RecordingProtocol, device: str, total_s: f
 
 
 def format_free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
-    """Notice before a device moves a handle that no hand holds. peak_n: largest force (N); total_s: duration (s)."""
+    """Format the notice before a device moves a handle that no hand holds. peak_n: largest force (N); total_s: duration
+    (s)."""
     return (
         f"No person may hold the handle: '{device}' is going to move by itself {_describe_duration(total_s)}, "
         f"pushed with up to {peak_n:g} N and held at its place by a weak spring. Keep hands away and the "
@@ -45,8 +46,8 @@ def format_free_handle_notice(device: str, peak_n: float, total_s: float) -> str
 
 
 def format_limit_test_notice(device: str, force_n: float) -> str:
-    """Notice before `study.devices.opening.accept_device`, the test of a device's force cap and watchdog. force_n:
-    force of the test (N). The virtual spring is off during the test, so the handle moves freely."""
+    """Format the notice before the test of a device's force cap and watchdog (`study.devices.opening.accept_device`),
+    during which the virtual spring is off, so that the handle moves freely. force_n: force of the test (N)."""
     return (
         f"No person may hold the handle: within some seconds '{device}' is shaken along x for a quarter of a second, "
         f"by {force_n:g} N, or twice as much where its cap does not hold; then it is pushed along x with {force_n:g} N "
@@ -55,5 +56,5 @@ def format_limit_test_notice(device: str, force_n: float) -> str:
 
 
 def _describe_duration(total_s: float) -> str:
-    """A duration (s) in words: in minutes from 60 s on, else in seconds."""
+    """Describe a duration (s) in words: from 60 s on in whole minutes, else in whole seconds, at least 1."""
     return f"for about {round(total_s / 60)} min" if total_s >= 60 else f"for about {max(1, round(total_s))} s"

@@ -1,7 +1,9 @@
 """State of a session that an experimenter follows from another terminal.
 
 The state is computed from the log event by event, as in the running session (`study.session.state.fold`); events that
-do not affect it (notes, forms, remarks on trials, probes, end of the sitting) are kept in addition.
+do not affect it (notes, forms, remarks on trials, probes, end of the sitting) are kept in addition. `watch_session`
+(for `hapteq watch`) and `session_references` apply the events; `make_watch_view`, `followed_trials` and `watch_alarms`
+read the result.
 """
 
 from dataclasses import dataclass, replace
@@ -25,8 +27,8 @@ from study.session.state.state import SessionState, begin_session
 from study.session.watching.watch_view import FormRecord, NoteRecord
 
 UNMEASURED_FLAG = "no steady part to measure, or too little of it"
-"""A flag in logs before version 1.1 that is not shown, because nearly every trial has it and it is no fault. Later logs
-have the status `unmeasured` instead."""
+"""Flag of trials in logs before version 1.1. It is not shown, because nearly every trial has it and it is no fault;
+later logs have the status `unmeasured` instead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,38 +48,39 @@ class PlayedProbe:
     recording: str = ""
     """Path of the recording within the session's folder; empty without a recording."""
     trouble: str = ""
-    """Why there is no recording, or why it should not be used; empty otherwise."""
+    """Reason why there is no recording, or why it should not be used; empty otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
 class FollowedSession:
-    """A followed session: the state computed from its log, and facts that only an observer of the session needs."""
+    """A followed session: the state computed from its log, and what only the experimenter who follows it needs."""
 
     state: SessionState
     remarks: tuple[str, ...]
     """For each of `state.trials`, its flags or the reason why it is void; empty without a remark."""
     forms: tuple[FormRecord, ...]
+    """Forms filled in so far, oldest first."""
     notes: tuple[NoteRecord, ...]
-    """Oldest first."""
+    """Notes of the log, oldest first."""
     end_reason: str
-    """Why the sitting was ended; empty while it has not ended."""
+    """Reason why the sitting was ended; empty while it has not ended."""
     sitting_utc: str
-    """When the present sitting was opened."""
+    """Time at which the present sitting was opened (UTC, ISO 8601)."""
     notes_before: int
     """Number of notes that are older than the present sitting; they come first in `notes`."""
     last_utc: str
-    """Time of the last event."""
+    """Time of the last event (UTC, ISO 8601)."""
     sitting: int = 0
     """Number of the present sitting, from 0."""
     playing: PlayedProbe | None = None
-    """The probe that is playing, without its measurement; None if there is none."""
+    """The last probe whose measurement is not in the log yet; None if there is none."""
     probes: tuple[PlayedProbe, ...] = ()
-    """Probes whose measurement is in the log, oldest first."""
+    """Probes that were played and whose measurement is in the log, oldest first."""
 
 
 def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSession:
-    """The followed session after the opening line of its log. Raises LogContradiction where that line and the protocol
-    disagree."""
+    """Make the followed session after the opening event of its log. Raises LogContradiction where that event and the
+    protocol disagree (`begin_session`)."""
     return FollowedSession(
         state=begin_session(opened, protocol),
         remarks=(),
@@ -91,39 +94,40 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSe
 
 
 def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSession:
-    """The followed session after one more event. Raises LogContradiction where the event cannot follow the previous
-    ones."""
-    updated = replace(watched, state=apply_event(watched.state, event), last_utc=event.utc)
+    """Return the followed session after one more event. Raises LogContradiction where the event cannot follow the
+    previous ones."""
+    updated_session = replace(watched, state=apply_event(watched.state, event), last_utc=event.utc)
     match event:
         case TrialPresented():
-            return replace(updated, remarks=(*watched.remarks, ""))
+            return replace(updated_session, remarks=(*watched.remarks, ""))
         case TrialMeasured():
-            return _set_remark(updated, ", ".join(flag for flag in event.flags if flag != UNMEASURED_FLAG))
+            return _set_remark(updated_session, ", ".join(flag for flag in event.flags if flag != UNMEASURED_FLAG))
         case TrialSpoiled():
-            return _set_remark(updated, event.reason)
+            return _set_remark(updated_session, event.reason)
         case ProbePlayed() | ProbeMeasured():
-            return _record_probe(updated, event)
+            return _record_probe(updated_session, event)
         case FormFilled():
-            return replace(updated, forms=(*watched.forms, FormRecord(event.utc, event.form, event.passed)))
+            return replace(updated_session, forms=(*watched.forms, FormRecord(event.utc, event.form, event.passed)))
         case NoteTaken():
             note = NoteRecord(event.utc, event.who, event.text, event.adverse)
-            return replace(updated, notes=(*watched.notes, note))
+            return replace(updated_session, notes=(*watched.notes, note))
         case SessionInterrupted():
-            return replace(updated, end_reason=event.reason)
+            return replace(updated_session, end_reason=event.reason)
         case SessionResumed():
             return replace(
-                updated,
+                updated_session,
                 end_reason="",
                 sitting_utc=event.utc,
                 notes_before=len(watched.notes),
                 sitting=watched.sitting + 1,
             )
         case _:
-            return updated
+            return updated_session
 
 
 def _record_probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
-    """Note the beginning or the measurement of a probe; a declined reference, which was not played, is left out."""
+    """Return the followed session after a probe began or was measured; a declined reference, which was not played, is
+    ignored."""
     if isinstance(event, ProbePlayed):
         started_s = max(0.0, compute_wall_clock_s(watched.state.opened.utc, event.utc))
         return replace(
@@ -137,5 +141,5 @@ def _record_probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) 
 
 
 def _set_remark(watched: FollowedSession, remark: str) -> FollowedSession:
-    """Set the remark of the latest trial."""
+    """Return the followed session with the remark of the latest trial replaced."""
     return replace(watched, remarks=(*watched.remarks[:-1], remark))

@@ -6,7 +6,7 @@ reveal it to the participant.
 
 from protocols.procedure.practice import PracticeState, count_right_of_last, is_practice_passed
 from protocols.procedure.schedule import Run
-from protocols.procedure.staircase import level_n
+from protocols.procedure.staircase import compute_level_n
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.state.state import SessionState, find_due_presentation, make_current_rule
 from study.session.watching.followed_session import FollowedSession
@@ -51,7 +51,11 @@ def find_next_level_n(state: SessionState, shown_run: int | None) -> float | Non
     if state.finished or shown_run != state.run:
         return None
     run = state.runs[state.run]
-    return find_due_presentation(state).level_n if run.practice else level_n(make_current_rule(state), state.staircase)
+    return (
+        find_due_presentation(state).level_n
+        if run.practice
+        else compute_level_n(make_current_rule(state), state.staircase)
+    )
 
 
 def make_watched_run(state: SessionState, run: Run) -> WatchedRun:

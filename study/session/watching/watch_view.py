@@ -1,9 +1,9 @@
-"""Data classes of the view that an experimenter has of a running session. They hold plain values and import quickly.
+"""Data classes of the view that an experimenter has of a running session; field names are the keys of its JSON form.
 
 The view contains no seed, and the direction of a trial only after the answer, because an experimenter who knows the
 direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a screen
 adds 1. `make_watch_view` makes the view; screens, text lines and `hapteq watch --json` show it. Levels are stimulus
-amplitudes, stated as force (N).
+amplitudes, stated as force (N). The values are plain, so that the module imports quickly.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,9 @@ class WatchedRun:
     phase: str
     """Training, practice, test or detection."""
     frequency_hz: float
+    """Frequency of the stimulus (Hz)."""
     status: RunStatus
+    """Whether the run is done, in progress or next, or later."""
     reversals: int
     """Number of reversals so far."""
     reversals_needed: int
@@ -45,15 +47,19 @@ class StaircasePoint:
     """A counted trial of a staircase; catch trials, which do not affect the staircase, are left out."""
 
     trial: int
+    """Index of the trial in its run."""
     level_n: float
+    """Level of the trial (N)."""
     correct: bool
+    """Whether the answer was right."""
     reversal: bool
     """Whether the staircase reversed its direction at this trial."""
 
 
 @dataclass(frozen=True, slots=True)
 class OpenTrial:
-    """A trial that is presented and not answered yet. catch: whether it is a catch trial."""
+    """A trial that is presented and not answered yet. run, trial, attempt: indices of the run, of the trial in the run,
+    and of its presentation; catch: whether it is a catch trial."""
 
     run: int
     trial: int
@@ -67,8 +73,8 @@ class OpenTrial:
 
 @dataclass(frozen=True, slots=True)
 class ClosedTrial:
-    """A trial that was answered or is void. `shown` and `correct` are None for a void trial, and until it is decided
-    whether the trial counts."""
+    """A trial that was answered or is void, with its indices as in `OpenTrial`. `shown` and `correct` are None for a
+    void trial, and until it is decided whether the trial counts."""
 
     run: int
     trial: int
@@ -83,7 +89,9 @@ class ClosedTrial:
     """Answer of the participant, 1 or 2; None where there is none."""
     correct: bool | None
     reversal: bool
+    """Whether the staircase reversed its direction at this trial."""
     response_time_s: float | None
+    """Time from the onset to the answer (s); None where there is none."""
     delivered_mps2: float | None
     """Measured amplitude of the acceleration along the direction (m/s²); None where it was not measured."""
     off_axis_mps2: float | None
@@ -99,10 +107,13 @@ class Exposure:
     """Duration of the sitting (min) and vibration dose of the hand (m/s²), with their limits."""
 
     elapsed_min: float
+    """Time since the handle first moved in the sitting (min)."""
     limit_min: float
+    """Longest sitting of the protocol (min)."""
     dose_a8_mps2: float
     """Daily vibration exposure A(8) by ISO 5349-1, as in `vibration_dose`."""
     dose_limit_mps2: float
+    """Largest A(8) of the protocol (m/s²)."""
 
     @property
     def time_share(self) -> float:
@@ -117,8 +128,8 @@ class Exposure:
 
 @dataclass(frozen=True, slots=True)
 class PracticeResult:
-    """Result of a practice run: `right` of the last `of` answers were correct. passed: whether the criterion was
-    met."""
+    """Result of a practice run at this frequency (Hz): `right` of the last `of` answers were correct. passed: whether
+    the criterion was met."""
 
     frequency_hz: float
     right: int
@@ -132,8 +143,9 @@ class FormRecord:
     take part."""
 
     utc: str
-    """Time at which it was filled in, ISO 8601."""
+    """Time at which it was filled in (UTC, ISO 8601)."""
     form: str
+    """Kind of the form (`FormKind`)."""
     passed: bool
 
 
@@ -143,6 +155,7 @@ class NoteRecord:
     pain."""
 
     utc: str
+    """Time of the note (UTC, ISO 8601)."""
     who: str
     text: str
     adverse: bool
@@ -167,7 +180,7 @@ class Alarm:
     kind: str
     """Short name that identifies the alarm, such as "device"."""
     sentence: str
-    """What is wrong, and what to do."""
+    """Cause and remedy, for the experimenter."""
     since: str
     """Start time, UTC (ISO 8601). An alarm keeps its start time as long as it lasts."""
     urgent: bool = True
@@ -181,7 +194,7 @@ class WatchView:
     """The complete view of a followed session at one moment, from which screens and text lines are made."""
 
     utc: str
-    """Time of the view, ISO 8601."""
+    """Time of the view (UTC, ISO 8601)."""
     session: str
     """Name of the session."""
     subject: str
@@ -197,7 +210,7 @@ class WatchView:
     standing: SittingStatus
     """Status of the session."""
     reason: str
-    """Why the session does not run, in words; empty while it runs."""
+    """Reason why the session does not run, in words; empty while it runs."""
     activity: str
     """Present activity in words."""
     activity_s: float
@@ -207,7 +220,7 @@ class WatchView:
     shown_run: int | None
     """Index of the run that `points` belong to, see `followed_trials.find_shown_run`."""
     points: tuple[StaircasePoint, ...]
-    """Counted trials of that run."""
+    """Counted trials of `shown_run`, in order."""
     next_level_n: float | None
     """Next level (N) of the staircase in `shown_run`, after the last point; None where the run is over."""
     cap_n: float
@@ -219,6 +232,7 @@ class WatchView:
     answers: int
     """Number of answers that count."""
     exposure: Exposure
+    """Duration of the sitting and vibration dose, with their limits."""
     catch_given: int
     """Number of catch trials that count."""
     catch_lapses: int

@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Row = TypeVar("Row", bound="DataclassInstance")
+"""Dataclass of the rows of a table."""
 
 _LISTED_PROBLEM_LIMIT = 8
-"""Number of problems that are listed individually; the others are counted."""
+"""Number of problems that are listed individually; the others are only counted. Chosen: the message fits a screen."""
 
 
 class CsvError(ListedProblemsError):
@@ -46,7 +47,8 @@ def format_csv_table(rows: Iterable[Row], row_type: type[Row]) -> str:
 
 def parse_csv_table(text: str, row_type: type[Row]) -> tuple[Row, ...]:
     """Parse CSV text with a header into rows. Unknown columns after the known ones are ignored, no column may occur
-    twice, and trailing columns with a default may be missing. Raises CsvError with all problems."""
+    twice, and trailing columns with a default may be missing. Raises CsvError with the problem of the header, or with
+    the first `_LISTED_PROBLEM_LIMIT` problems of the fields and the number of the others."""
     try:
         csv_rows = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
@@ -81,8 +83,8 @@ def parse_csv_table(text: str, row_type: type[Row]) -> tuple[Row, ...]:
 
 
 def drop_absent_columns(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
-    """Rows as a table of an earlier version would hold them. text: that table; in columns that it lacks, the rows get
-    their defaults."""
+    """Return the rows as a table of an earlier version would hold them. text: that table; the trailing columns that it
+    lacks have their defaults in the returned rows."""
     header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
     absent_columns = list_columns(row_type)[len(_select_present_columns(tuple(header), row_type)) :]
     defaults = {field.name: field.default for field in fields(row_type) if field.name in absent_columns}
@@ -90,7 +92,8 @@ def drop_absent_columns(text: str, rows: Iterable[Row], row_type: type[Row]) -> 
 
 
 def _select_present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
-    """Select the columns to read; trailing columns with a default may be missing, as in tables of earlier versions."""
+    """Select the columns to read: all of the row type, without the trailing ones with a default that the header lacks,
+    as in tables of earlier versions."""
     columns = list_columns(row_type)
     required_count = sum(field.default is MISSING for field in fields(row_type))
     while len(columns) > required_count and header[: len(columns)] != columns:
@@ -104,13 +107,13 @@ def find_header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> s
         return ""
     for position, name in enumerate(expected, start=1):
         if header[position - 1 : position] != (name,):
-            actual = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
-            return f"column {position} of the header {actual}; it must be '{name}' (of {', '.join(expected)})"
+            actual_text = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
+            return f"column {position} of the header {actual_text}; it must be '{name}' (of {', '.join(expected)})"
     return ""
 
 
 def _find_duplicate_column(header: Sequence[str]) -> str:
-    """Problem with a header that names a column twice, in words; empty if there is none. Empty names, which
+    """Find a column that the header names twice, and describe the problem; empty if there is none. Empty names, which
     spreadsheets leave at the end of a header, are ignored."""
     names = [name.strip() for name in header]
     duplicate = next((name for index, name in enumerate(names) if name and name in names[:index]), None)
@@ -126,7 +129,8 @@ def format_csv_line(row_fields: Sequence[str]) -> str:
 
 
 def describe_type(column_type: Any) -> str:
-    """Describe the content of a column of this type in words, for the documentation of a table."""
+    """Describe the content of a column in words, for the documentation of a table. column_type: bool, int, float, str,
+    an enumeration, or one of these or None; KeyError for others."""
     if get_origin(column_type) in (Union, UnionType):
         (option_type,) = (option for option in get_args(column_type) if option is not NoneType)
         return f"{describe_type(option_type)}, or empty"

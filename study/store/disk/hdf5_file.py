@@ -40,7 +40,7 @@ BROKEN_SEAL_PROBLEM = (
 """Problem of a file whose content differs from its seal: a sentence fragment for `UnusableFileError`."""
 
 
-class Problems:
+class ProblemCollector:
     """Collector of the problems of a file (sentence fragments), so that a reader can report all of them in one
     error."""
 

@@ -22,7 +22,7 @@ PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels"
 
 
 @dataclass(frozen=True, slots=True)
-class Parent:
+class InputFile:
     """An input file of a result."""
 
     file: str
@@ -42,14 +42,14 @@ class Provenance:
     protocol_hash: str | None = None
     """Hash of the protocol; None where none was used."""
     seeds: Mapping[str, int] | None = None
-    """Seeds of random numbers, by what they were used for."""
+    """Seeds of random numbers, by their use."""
     settings: Mapping[str, float | None] | None = None
-    """Values in effect of the options on which the result depends."""
-    parents: tuple[Parent, ...] = ()
+    """Values of the options on which the result depends, in the unit that the name of the option states."""
+    parents: tuple[InputFile, ...] = ()
     """Input files of the result."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, TOML and HDF5; fields that are None are left out."""
+        """Convert to plain values for JSON, TOML and HDF5; fields that are None are left out."""
         values = asdict(self)
         values["command"] = list(self.command)
         values["parents"] = list(values["parents"])
@@ -71,12 +71,12 @@ def gather_provenance(
         protocol_hash=protocol_hash,
         seeds=seeds,
         settings=settings,
-        parents=tuple(Parent(replace_invalid_bytes(path.name), compute_sha256(path)) for path in parents),
+        parents=tuple(InputFile(replace_invalid_bytes(path.name), compute_sha256(path)) for path in parents),
     )
 
 
 def list_versions() -> dict[str, str]:
-    """Versions of Python and of `PACKAGES`; "not installed" where a package is missing."""
+    """List the versions of Python and of `PACKAGES`, by name; "not installed" where a package is missing."""
     return {"python": platform.python_version(), **{name: _find_version(name) for name in PACKAGES}}
 
 
@@ -91,7 +91,8 @@ def replace_invalid_bytes(name: str) -> str:
 
 
 def compute_sha256(path: Path) -> str:
-    """Compute the SHA-256 of a regular file's content, in hexadecimal. Raises CannotReadError."""
+    """Compute the SHA-256 of a regular file's content, in hexadecimal. Raises CannotReadError where the file cannot be
+    read."""
     try:
         with open_regular(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -101,7 +102,8 @@ def compute_sha256(path: Path) -> str:
 
 @cache
 def _find_version(package: str) -> str:
-    """Version of an installed package; "not installed" without it. Cached, because it does not change."""
+    """Find the version of a package; "not installed" without it. Cached, because it does not change while the program
+    runs."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -109,7 +111,7 @@ def _find_version(package: str) -> str:
 
 
 def _remove_folders(argument: str) -> str:
-    """The argument with a path, also one after `--option=`, reduced to its last part."""
+    """Reduce a path in an argument, also one after `--option=`, to its last part; other arguments are unchanged."""
     option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
     value_name = PurePath(value).name if "/" in value or "\\" in value else value
     return replace_invalid_bytes(option + equals + value_name)

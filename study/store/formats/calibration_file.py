@@ -15,7 +15,7 @@ from equalizer.linkage.calibration import CalibrationError, LinkageCalibration
 from equalizer.signals.signal import FloatArray
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.hdf5_attributes import read_numbers_attribute, read_text_attribute
-from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
+from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
 from study.store.disk.strict_json import load_json
 
@@ -60,7 +60,7 @@ ARRAY_SHAPES = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3
 
 def read_calibration(path: Path) -> LinkageCalibration:
     """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems of the file."""
-    problems = Problems()
+    problems = ProblemCollector()
     with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
         fields = _read_fields(file, problems)
     if problems.messages:
@@ -87,7 +87,7 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
     write_hdf5(path, fill_file, overwrite=False, sealed=True)
 
 
-def _read_fields(file: Any, problems: Problems) -> dict[str, Any]:
+def _read_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
     """Read the fields of `LinkageCalibration`; where a part is missing or wrong, the problem is recorded and a
     placeholder returned."""
 

@@ -1,8 +1,8 @@
 """Identified models as HDF5 files: the format `hapteq-model`, version 1.
 
 A model is a discrete-time linear state space, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k], with its band, units,
-uncertainty and quality; `equalizer.plant.identified_model` validates it. `identify_model` writes these files; playback,
-`export_controller` and the start screen read them.
+uncertainty and quality; `equalizer.plant.identified_model` validates it. `identify_model` writes these files. They are
+read for playback, equalized stimuli, `export_controller`, the start screen, `hapteq validate` and reproductions.
 """
 
 import json
@@ -23,11 +23,12 @@ from study.store.disk.hdf5_attributes import (
     read_texts_attribute,
     write_texts,
 )
-from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
+from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.layout import Entry
 from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-model", 1
+"""Name and version of the format, as attributes of the file."""
 KIND = "identified model"
 """Name of this kind of file in messages."""
 
@@ -73,8 +74,9 @@ LAYOUT = (
 
 
 def read_identified_model(path: Path | str) -> IdentifiedModel:
-    """Read a model. Raises CannotReadError, or UnusableFileError with all problems of the file."""
-    path, problems = Path(path), Problems()
+    """Read a model. Raises CannotReadError where the file cannot be read, UnusableFileError with all problems of its
+    content."""
+    path, problems = Path(path), ProblemCollector()
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         model_fields = _read_model_fields(file, problems)
     if problems.messages:
@@ -93,9 +95,11 @@ def confirm_identified_model(path: Path) -> bool:
 
 
 def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrite: bool = False) -> None:
-    """Write a model. Raises AlreadyExistsError if the file exists and `overwrite` is false, and CannotWriteError."""
+    """Write a model. Raises AlreadyExistsError where the file exists and `overwrite` is False, CannotWriteError where
+    it cannot be written."""
 
     def write_contents(file: Any) -> None:
+        """Write attributes and matrices into the open file."""
         file.attrs.update({"format": FORMAT, "version": VERSION, "sample_rate_hz": model.sample_rate_hz})
         file.attrs.update({"band_hz": model.band_hz, "delay_samples": model.delay_samples})
         if model.place_m is not None:
@@ -112,22 +116,24 @@ def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrit
     write_hdf5(Path(path), write_contents, overwrite=overwrite)
 
 
-QUALITY_NUMBERS = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
+QUALITY_NUMBER_NAMES = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
 """Names of the numbers in `ModelQuality`; each is an attribute of the file."""
 
 
 def _write_quality(file: Any, quality: ModelQuality) -> None:
-    for name in QUALITY_NUMBERS:
+    """Write the quality of the model as attributes; numbers that are None are left out."""
+    for name in QUALITY_NUMBER_NAMES:
         if getattr(quality, name) is not None:
             file.attrs[name] = getattr(quality, name)
     write_texts(file, "quality_remarks", quality.remarks)
 
 
 def _read_quality(file: Any) -> ModelQuality | None:
-    """Quality of the model; None if the file states none (older files). Raises ValueError for an unusable attribute."""
+    """Read the quality of the model; None if the file states none (older files). A missing misfit error is taken as the
+    expected error. Raises ValueError for an unusable attribute."""
     if "expected_error" not in file.attrs:
         return None
-    numbers = {name: read_numbers_attribute(file, name, 1)[0] for name in QUALITY_NUMBERS if name in file.attrs}
+    numbers = {name: read_numbers_attribute(file, name, 1)[0] for name in QUALITY_NUMBER_NAMES if name in file.attrs}
     remarks = read_texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
     return ModelQuality(
         expected_error=numbers["expected_error"],
@@ -140,17 +146,20 @@ def _read_quality(file: Any) -> ModelQuality | None:
     )
 
 
-def _read_model_fields(file: Any, problems: Problems) -> dict[str, Any]:
-    """Arguments of `IdentifiedModel`, by name. Problems are collected in `problems`; an unreadable field has a
+def _read_model_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
+    """Read the arguments of `IdentifiedModel`, by name. Problems are collected in `problems`; an unreadable field has a
     placeholder value."""
 
     def read_matrix(name: str) -> FloatArray:
+        """Read a matrix; (0, 0) after a problem."""
         return problems.attempt(lambda: read_float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
 
     def read_texts(name: str) -> tuple[str, ...]:
+        """Read the texts of an attribute; none after a problem."""
         return problems.attempt(lambda: read_texts_attribute(file, name), ())
 
     def read_numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+        """Read `count` numbers of an attribute; zeros after a problem."""
         return problems.attempt(lambda: read_numbers_attribute(file, name, count, default), (0.0,) * count)
 
     provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
@@ -169,7 +178,7 @@ def _read_model_fields(file: Any, problems: Problems) -> dict[str, Any]:
 
 
 def _read_provenance(file: Any) -> dict[str, Any]:
-    """Provenance; empty if the file has none. Raises ValueError if it is not a JSON object."""
+    """Read the provenance; empty if the file has none. Raises ValueError if it is not a JSON object."""
     text = read_text_attribute(file, "provenance", "{}")
     try:
         provenance = load_json(text)

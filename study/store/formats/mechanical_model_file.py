@@ -1,7 +1,7 @@
 """Read and write mechanical models as TOML files: mass, damping and stiffness matrices, sensor, actuator, effects.
 
 This module handles the file and describes its keys; `equalizer.plant.mechanical_model_toml` converts the text. Called
-by the workflows of diagnosis and equalization, and by the evaluation of the diagnosis.
+by the workflows of diagnosis and equalization, by the evaluation of the diagnosis, and by `hapteq validate`.
 """
 
 from pathlib import Path
@@ -66,5 +66,6 @@ def read_mechanical_model(path: Path | str) -> MechanicalModel:
 
 
 def write_mechanical_model(path: Path | str, model: MechanicalModel, *, overwrite: bool = False) -> None:
-    """Write a model. Raises AlreadyExistsError where the file exists and overwrite is False, and CannotWriteError."""
+    """Write a model. Raises AlreadyExistsError where the file exists and `overwrite` is False, CannotWriteError where
+    it cannot be written."""
     write_text(Path(path), format_mechanical_model(model), overwrite=overwrite)

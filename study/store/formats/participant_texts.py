@@ -33,7 +33,7 @@ KIND = "table of texts"
 def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:
     """Read a language's name (code, or name of the file without suffix), and its texts by key. language: a code such as
     "de", or the path of a .toml file, relative to folder (None: the current one). Raises WrongUseError (neither of
-    these), CannotReadError, and UnusableFileError (not TOML, or with all keys that are missing or wrong)."""
+    these), CannotReadError, and UnusableFileError (not TOML, or texts that are missing or wrong; all are listed)."""
     if language == "en":
         return language, dict(ENGLISH)
     if language in LANGUAGES:
@@ -75,19 +75,19 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
     try:
         language_name, table = read_language(language, folder)
     except WrongUseError as error:
-        allowed = f"{list_languages()}, or the path of a .toml file"
-        raise ProtocolError(source, (Problem("text.language", f'is "{language}"', allowed),)) from error
+        allowed_text = f"{list_languages()}, or the path of a .toml file"
+        raise ProtocolError(source, (Problem("text.language", f'is "{language}"', allowed_text),)) from error
     protocol = protocol_from_values(translate_protocol(values, table, language_name), source)
     return protocol, dump_protocol(protocol)
 
 
 def make_language_template(language: str) -> str:
-    """Make a language's table as TOML text, as a template for a translation. Above each text that differs from the
-    English text, a comment holds the latter. Raises as `read_language`."""
+    """Make a language's table as TOML text, as a template for a translation. A comment above each text that differs
+    from the English one states the English text. Raises as `read_language`."""
     name, table = read_language(language)
     lines = [f"# Participants' texts of hapteq, {LANGUAGES.get(name, name)}. What stands in braces is filled in."]
-    for key, english in ENGLISH.items():
-        if table[key] != english:
-            lines.append("# " + " ".join(english.split()))
+    for key, english_text in ENGLISH.items():
+        if table[key] != english_text:
+            lines.append("# " + " ".join(english_text.split()))
         lines.append(f"{key} = {json.dumps(table[key], ensure_ascii=False)}")
     return "\n".join(lines) + "\n"

@@ -25,6 +25,7 @@ from study.store.disk.text_file import read_text, read_toml_text, write_text
 from study.store.formats.participant_texts import load_in_language
 
 P = TypeVar("P", bound=Protocol, covariant=True)
+"""Kind of protocol: study or recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +34,8 @@ class ProtocolFile(Generic[P]):
 
     protocol: P
     text: str
-    """Text of the file, comments included; where the file names a language, with all texts of that language filled
-    in."""
+    """Text of the file, comments included; where texts of another language had to be filled in, the protocol with these
+    texts, without the comments."""
     path: Path | None
     """Path of the file; None for a shipped protocol."""
     lock: ProtocolLock | None
@@ -42,7 +43,7 @@ class ProtocolFile(Generic[P]):
 
     @property
     def locked(self) -> bool:
-        """Whether the protocol is locked, beside its file or in the data folder."""
+        """Whether a lock of the protocol is beside its file or in the data folder."""
         return self.lock is not None
 
 
@@ -115,10 +116,11 @@ def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile
 
 
 def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, hapteq_version: str) -> Path:
-    """Write NAME.lock.json into `folder`, that of the data or of the protocol. locked_utc: ISO 8601 time.
+    """Write NAME.lock.json into `folder` (data folder, or folder of the protocol) and return its path. locked_utc: time
+    of the locking (ISO 8601).
 
     Locking the same protocol again changes nothing. Raises LockedProtocolChangedError if another version is locked
-    there, CannotWriteError, CannotReadError or UnusableFileError for an existing lock.
+    there, CannotReadError or UnusableFileError for an unusable existing lock, CannotWriteError.
     """
     path = locate_lock(file.protocol, folder)
     if _read_lock(path, file.protocol) is None:
@@ -127,7 +129,7 @@ def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, h
 
 
 def locate_lock(protocol: Protocol, folder: Path) -> Path:
-    """Path of the lock of this protocol in the folder; it need not exist."""
+    """Return the path of the lock of this protocol in the folder; the file need not exist."""
     return folder / f"{protocol.name}.lock.json"
 
 
@@ -176,8 +178,8 @@ def _is_toml(name: str) -> bool:
 
 
 def _make_wrong_kind_error(protocol: Protocol, purpose: str, command: str) -> WrongUseError:
-    """Make the error for a protocol of another kind. purpose: use for which it was given; command: that which takes
-    it."""
+    """Make the error for a protocol of another kind. purpose: relative clause about the kind that is needed; command:
+    command that takes the given protocol."""
     return WrongUseError(
         title="This protocol is of another kind",
         happened=f"'{protocol.name}' is a {protocol.kind} protocol, not one that {purpose}.",

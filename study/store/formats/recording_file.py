@@ -25,7 +25,7 @@ from study.store.disk.hdf5_attributes import (
     read_texts_attribute,
     write_texts,
 )
-from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
+from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.strict_json import load_json
 from study.store.formats.recording_layout import FORMAT, KIND, SEGMENT_FIELDS, VERSION
 
@@ -35,11 +35,11 @@ _SEGMENT_TYPE = np.dtype(
         ("amplitude", "<f8"), ("period", "<i8"), ("role", h5py.string_dtype()),
     ]
 )  # fmt: skip
-"""A row of the dataset `segments`; its fields as in `SEGMENT_FIELDS`."""
+"""NumPy type of a row of the dataset `segments`; fields as in `SEGMENT_FIELDS`."""
 
 _COMPRESS_ABOVE_BYTES = 2**18
-"""Arrays above this size are compressed. By hand: smaller ones, of which a session has thousands, are written faster
-without."""
+"""Size (bytes) above which arrays are compressed. Chosen by hand: smaller arrays, of which a session has thousands, are
+written faster without compression."""
 
 
 def read_recording(path: Path | str) -> Recording:
@@ -47,7 +47,7 @@ def read_recording(path: Path | str) -> Recording:
     problems where it is no valid recording."""
     path = Path(path)
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
-        problems = Problems()
+        problems = ProblemCollector()
         rate_hz = problems.attempt(lambda: _read_rate(file), 1.0)
 
         def read_signal(name: str) -> Signal | None:
@@ -80,13 +80,13 @@ def write_recording(
     precision: Literal["float32", "float64"] = "float64",
     overwrite: bool = False,
 ) -> None:
-    """Write a recording. `precision` applies to all signals but position, which like the time is always float64, for
-    micrometres in a large workspace. Raises StudyError where the file cannot be written, or exists and `overwrite` is
-    False; ValueError for an inconsistent recording."""
+    """Write a recording. `precision` applies to all signals but the position; position and time are always float64, to
+    resolve micrometres in a large workspace. Raises AlreadyExistsError where the file exists and `overwrite` is False,
+    CannotWriteError where it cannot be written, ValueError for an inconsistent recording."""
     if inconsistencies := check_recording(recording):
         raise ValueError(f"this recording cannot be written: {'; '.join(inconsistencies)}")
 
-    def fill(file: Any) -> None:
+    def write_contents(file: Any) -> None:
         """Write attributes, signals, time, segments and metadata into the open file."""
         file.attrs.update(
             {"format": FORMAT, "version": VERSION, "sample_rate_hz": recording.sample_rate_hz,
@@ -102,7 +102,7 @@ def write_recording(
         for key, value in recording.meta.items():
             meta.attrs[key] = json.dumps(value, allow_nan=False)
 
-    write_hdf5(Path(path), fill, overwrite=overwrite)
+    write_hdf5(Path(path), write_contents, overwrite=overwrite)
 
 
 def _read_rate(file: Any) -> float:
@@ -136,13 +136,15 @@ def _read_signal(file: Any, name: str, rate_hz: float) -> Signal:
     return Signal(samples * np.array(factors) + np.array(offsets), rate_hz, signal.quantity, tuple(si_units), channels)
 
 
-def _split_channel_names(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
-    """Split channel names. A single text for several columns either lists them, separated by commas or spaces, or is a
-    common name that is numbered from 1; other names are returned unchanged."""
-    if len(channels) != 1 or columns < 2:
+def _split_channel_names(channels: tuple[str, ...], column_count: int) -> tuple[str, ...]:
+    """Split channel names into one per column. A single text for several columns either lists them, separated by commas
+    or spaces, or is a common name that is numbered from 1; other names are returned unchanged."""
+    if len(channels) != 1 or column_count < 2:
         return channels
     names = tuple(channels[0].replace(",", " ").split())
-    return names if len(names) == columns else tuple(f"{channels[0]} {number + 1}" for number in range(columns))
+    return (
+        names if len(names) == column_count else tuple(f"{channels[0]} {number + 1}" for number in range(column_count))
+    )
 
 
 def _read_time_s(file: Any) -> FloatArray | None:

@@ -5,7 +5,7 @@ constants. Sample k is taken at time t_k; all datasets have the same rate and nu
 """
 
 from equalizer.signals.recording import SEGMENT_KINDS, Hold
-from equalizer.signals.units import UNSTATED
+from equalizer.signals.units import NO_UNIT
 from study.store.disk.layout import Entry
 
 FORMAT, VERSION = "hapteq-recording", 1
@@ -64,7 +64,9 @@ conditions."""
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
     Entry(
-        "unit", "attribute, text or list", f"likewise; converted to SI when read; `{UNSTATED}` if the unit is not known"
+        "unit",
+        "attribute, text or list",
+        f"likewise; converted to SI when read; `{NO_UNIT}` if the unit is not known",
     ),
     Entry(
         "channels",

@@ -24,7 +24,7 @@ TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "diction
 ANSWERS_NAME = "answers.csv"
 """Answers to questionnaires; written only where the protocol asks questions."""
 KIND = "table of exported trials"
-"""Name of the file's kind in messages."""
+"""Name of the exported files in messages."""
 
 
 def is_tidy_csv(folder: Path) -> bool:
@@ -40,30 +40,31 @@ def write_tidy_csv(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write the export and return its files. folder: existing and empty. name: of the study. protocol_text: TOML.
-    facts: JSON values about the study and the program. answers: written only if it has columns. Raises
-    CannotWriteError, also where a file exists."""
+    """Write the export and return the paths of its files. folder: an existing, empty folder; name: name of the study;
+    protocol_text: the protocol in TOML; facts: JSON values about the study and the program; answers: written only if
+    the table has columns. Raises AlreadyExistsError where a file exists, CannotWriteError where one cannot be
+    written."""
     dictionary_rows = [
         ["column", "description", "unit"],
         *([column, *TRIAL_COLUMNS[column]] for column in list_columns(Trial)),
     ]
     dictionary_rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
-    texts = {
+    text_by_file_name = {
         TRIALS_NAME: format_csv_table(trials, Trial),
         DICTIONARY_NAME: "".join(format_csv_line(row) + "\n" for row in dictionary_rows),
         PROTOCOL_NAME: protocol_text,
         FACTS_NAME: json.dumps({"study": name, **facts}, indent=2, ensure_ascii=False) + "\n",
     }
     if answers.columns:
-        texts[ANSWERS_NAME] = answers.as_csv()
-    for file_name, text in texts.items():
+        text_by_file_name[ANSWERS_NAME] = answers.as_csv()
+    for file_name, text in text_by_file_name.items():
         write_text(folder / file_name, text, overwrite=False)
-    return tuple(folder / file_name for file_name in texts)
+    return tuple(folder / file_name for file_name in text_by_file_name)
 
 
 def read_tidy_csv(folder: Path) -> ExportedTrials:
-    """Read the trials, protocol and facts that `write_tidy_csv` wrote. Raises CannotReadError where a file cannot be
-    opened, UnusableFileError where its content is not valid."""
+    """Read the trials, protocol and facts of an export by `write_tidy_csv`. Raises CannotReadError where a file cannot
+    be opened, UnusableFileError where its content is not valid."""
     facts_path = folder / FACTS_NAME
     try:
         facts = load_json(read_text(facts_path))

@@ -40,7 +40,7 @@ def read_trials(path: Path | str) -> tuple[Trial, ...]:
     return trials
 
 
-def _find_not_finite(trial: Trial) -> list[str]:
+def _find_non_finite_columns(trial: Trial) -> list[str]:
     """Find the names of the columns with an infinity or NaN. A session writes neither: a missing value is an empty
     field."""
     values = ((name, getattr(trial, name)) for name in TRIALS_HEADER)
@@ -61,6 +61,7 @@ def find_trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
         if not (trial.level_n > 0 and trial.frequency_hz > 0):
             problems.append(f"line {line_number}: level_n and frequency_hz must be above 0")
         problems += [
-            f"line {line_number}: {name} is not finite; leave it empty if unknown" for name in _find_not_finite(trial)
+            f"line {line_number}: {name} is not finite; leave it empty if unknown"
+            for name in _find_non_finite_columns(trial)
         ]
     return tuple(problems)

@@ -61,19 +61,20 @@ def write_trials_mat(
 
 def _convert_answers(table: AnswerTable) -> dict[str, Any]:
     """Convert the answers to the variables `answers` (a cell array per column, with a row per session) and `questions`
-    (descriptions); no variables if the table has no columns."""
+    (descriptions); no variables if the table has no columns, an empty `answers` if it has no rows."""
     if not table.columns:
         return {}
-    rows = [(subject, session, *answers) for subject, session, answers in table.rows]
+    answer_rows = [(subject, session, *answers) for subject, session, answers in table.rows]
     descriptions = {column.name: column.description for column in table.columns}
     return {
-        "answers": dict(zip(table.header, map(_make_cells, zip(*rows, strict=True)), strict=False)),
+        "answers": dict(zip(table.header, map(_make_cells, zip(*answer_rows, strict=True)), strict=False)),
         "questions": descriptions,
     }
 
 
 def _convert_column(values: Sequence[Any]) -> Any:
-    """Convert a column to an (n,) array of float, None as NaN; to cells if any value is text, None as empty text."""
+    """Convert a column to an (n,) array of float with None as NaN; if any value is text, to cells with None as empty
+    text."""
     cell_values = [value.value if isinstance(value, Enum) else value for value in values]
     if any(isinstance(value, str) for value in cell_values):
         return _make_cells(["" if value is None else value for value in cell_values])

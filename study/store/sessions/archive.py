@@ -1,7 +1,8 @@
 """Session folders within the data folder of a study: naming, creation, search, and paths of the files in them.
 
 A folder is named by participant code and session number, as in `P01_001`. Folders of withdrawn sessions remain, with a
-tombstone in place of the data, so that their numbers are not used again.
+tombstone (a small file that states the withdrawal) in place of the data, so that their numbers are not used again.
+Called by all workflows that open, create or list sessions, and by the commands that take the name of a session.
 """
 
 import contextlib
@@ -71,7 +72,7 @@ class SessionFolder:
 
 
 def locate_withdrawal_record(data: Path, subject: str) -> Path:
-    """Path of the withdrawal record of a participant."""
+    """Return the path of the withdrawal record of a participant; the file need not exist."""
     return data / f"{subject}.withdrawal.json"
 
 
@@ -101,7 +102,7 @@ def check_subject(code: str) -> str:
 def create_session_folder(data: Path, subject: str) -> SessionFolder:
     """Create the participant's next session folder, numbered from 1. An existing folder is never used, even if two
     programs create one at the same time. Raises WrongUseError for an invalid code, StudyError if the folder cannot be
-    created."""
+    created, or if 1000 times (chosen) in turn another program created the folder of the next number first."""
     check_subject(subject)
     try:
         is_new = not data.exists()
@@ -135,7 +136,8 @@ def create_session_folder(data: Path, subject: str) -> SessionFolder:
 
 
 def list_session_folders(data: Path) -> tuple[SessionFolder, ...]:
-    """All session folders in the data folder, withdrawn ones included, in alphabetical order."""
+    """List all session folders in the data folder, withdrawn ones included, in alphabetical order; empty without that
+    folder."""
     if not data.is_dir():
         return ()
     return tuple(
@@ -144,7 +146,7 @@ def list_session_folders(data: Path) -> tuple[SessionFolder, ...]:
 
 
 def parse_session_number(name: str) -> int:
-    """Session number in a folder's name; 0 if the name is not that of a session folder."""
+    """Parse the session number in a folder's name; 0 if the name is not that of a session folder."""
     match = FOLDER_PATTERN.fullmatch(name)
     return int(match["number"]) if match else 0
 

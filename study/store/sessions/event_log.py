@@ -2,6 +2,8 @@
 
 A program appends the line and syncs it to the disk (fsync) before it acts on the event (write-ahead), so that the log
 never lacks what happened. Lines are never rewritten; only an incomplete last line, which a crash leaves, is removed.
+Written by `open_session`, `resume_session`, `sitting` and `take_note`; read by the workflows that show, analyse or
+continue a session.
 """
 
 import contextlib
@@ -28,15 +30,16 @@ class EventLog:
     """A log that is open for appending. It has a single writer, which holds the session's lock."""
 
     def __init__(self, path: Path, descriptor: int, chain: Chain | None = EMPTY_CHAIN) -> None:
-        """descriptor: of the file, open for appending. chain: of the existing lines; None = read before the first
-        line is added."""
+        """descriptor: descriptor of the file, open for appending. chain: hash chain of the existing lines; None: it is
+        read before the first line is added."""
         self._path = path
         self._descriptor = descriptor
         self._chain = chain
 
     @classmethod
     def create(cls, path: Path) -> "EventLog":
-        """Create an empty log. Raises FileExistsError for an existing log, OSError, and StudyError if it is locked."""
+        """Create an empty log. Raises FileExistsError for an existing log, OSError where it cannot be created,
+        StudyError if another program has locked it."""
         descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
         sync_folder(path.parent)
         _lock_file(descriptor, path)
@@ -60,11 +63,12 @@ class EventLog:
         return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
-        """Append one line; on return it is on the disk. Raises StudyError, leaving the log unchanged, on failure."""
+        """Append one line; on return it is on the disk. Raises StudyError where it cannot be written; the log is then
+        unchanged."""
         previous_size = os.fstat(self._descriptor).st_size
         if self._chain is None:
             self._chain = read_log(self._path).chain
-        extended, line = append_checksum(self._chain, encode_event(event).removesuffix(b"\n"))
+        extended_chain, line = append_checksum(self._chain, encode_event(event).removesuffix(b"\n"))
         try:
             _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
@@ -75,7 +79,7 @@ class EventLog:
             if isinstance(problem, OSError):
                 raise _make_save_error(self._path, event, problem) from problem
             raise
-        self._chain = extended
+        self._chain = extended_chain
 
     def close(self) -> None:
         """Close the file; all lines are on the disk already. To be called once only."""
@@ -101,35 +105,37 @@ def read_log(path: Path) -> LogContents:
     """Read a log. Only the last line may be incomplete. Raises StudyError where the file cannot be read, or an earlier
     line is damaged or unknown."""
     try:
-        data = read_regular(path)
+        log_bytes = read_regular(path)
     except OSError as problem:
         raise StudyError(
             "The session log cannot be read",
             f"{path.name} in {path.parent.name}: {problem.strerror}.",
             "Check the folder's name and permissions.",
         ) from problem
-    *lines, incomplete = data.split(b"\n")
+    *whole_lines, incomplete_line = log_bytes.split(b"\n")
     chain, events = Chain(), []
-    for line in lines:
-        chain, event = _parse_next(path, chain, line)
+    for line in whole_lines:
+        chain, event = _parse_next_line(path, chain, line)
         events.append(event)
-    complete_lines = data[: len(data) - len(incomplete)]
+    complete_lines = log_bytes[: len(log_bytes) - len(incomplete_line)]
     return LogContents(
-        tuple(events), incomplete.decode("utf-8", errors="replace"), len(incomplete), chain, complete_lines
+        tuple(events), incomplete_line.decode("utf-8", errors="replace"), len(incomplete_line), chain, complete_lines
     )
 
 
 def read_opening(path: Path) -> Event | None:
-    """The event of the first line alone; None if the file or a complete line is missing. Raises StudyError, OSError."""
+    """Read the event of the first line alone; None if the file or a complete line is missing. Raises StudyError for a
+    damaged or unknown line, OSError where the file cannot be read."""
     if not path.exists():
         return None
     with open_regular(path) as file:
         line = file.readline(MAX_DOCUMENT_BYTES)
-    return _parse_next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
+    return _parse_next_line(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
 
 
 def read_valid_events(path: Path) -> tuple[Event, ...]:
-    """Events before the first damaged line, to inspect an unusable log; empty where the file cannot be read."""
+    """Read the events before the first damaged line, to inspect an unusable log; empty where the file cannot be
+    read."""
     chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
@@ -141,7 +147,8 @@ def read_valid_events(path: Path) -> tuple[Event, ...]:
 
 
 def remove_incomplete_line(path: Path, contents: LogContents) -> None:
-    """Remove an incomplete last line, so that the next event starts on a line of its own. Raises StudyError."""
+    """Remove an incomplete last line, so that the next event starts on a new line. Raises StudyError where the file
+    cannot be changed."""
     if not contents.torn_bytes:
         return
     try:
@@ -195,31 +202,34 @@ def hold_log_lock(path: Path) -> Iterator[None]:
         log.close()
 
 
-def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
-    """The chain after the next line, and its event. chain: of the lines before. line: without its line end. Raises
-    StudyError for a line that is damaged, unknown, or of a newer version."""
+def _parse_next_line(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
+    """Verify and parse the next line; returns the chain after it, and its event. chain: hash chain of the lines before.
+    line: without its line end. Raises StudyError for a line that is damaged, unknown, or of a newer version."""
     try:
-        extended, event = verify_checksum(chain, line)
-        return extended, parse_event(event)
+        extended_chain, event = verify_checksum(chain, line)
+        return extended_chain, parse_event(event)
     except ValueError as problem:
-        number = chain.lines + 1
-        if number == 1 and _has_newer_version(line):
+        line_number = chain.lines + 1
+        if line_number == 1 and _has_newer_version(line):
             raise StudyError(
                 "This session was written by a newer hapteq",
                 f"The log of {path.parent.name} is of a version that this program does not know.",
                 "Use the hapteq that began it, or a newer one.",
                 saved="Nothing was changed.",
             ) from problem
-        clause, saved_text = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
+        clause, saved_text = (
+            "is not an event that this version knows",
+            f"The {line_number - 1} lines before it are whole.",
+        )
         if isinstance(problem, ChainBrokenError):
             clause = f"{problem}"
             if (
-                number > 1 and not chain.first_checksum_line
+                line_number > 1 and not chain.first_checksum_line
             ):  # This checksum covers earlier lines without a checksum, too.
                 clause, saved_text = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
         raise StudyError(
             "The session log is damaged",
-            f"Line {number} of {path.name} in {path.parent.name} {clause}.",
+            f"Line {line_number} of {path.name} in {path.parent.name} {clause}.",
             "Keep the folder as it is and restore the file from a copy; nothing was changed.",
             saved=saved_text,
         ) from problem
@@ -237,14 +247,14 @@ def _has_newer_version(line: bytes) -> bool:
     return isinstance(version, int) and version > SESSION_VERSION
 
 
-def _write_all(descriptor: int, data: bytes) -> None:
+def _write_all(descriptor: int, unwritten_bytes: bytes) -> None:
     """Write all bytes: `os.write` may write fewer than it was given."""
-    while data:
-        data = data[os.write(descriptor, data) :]
+    while unwritten_bytes:
+        unwritten_bytes = unwritten_bytes[os.write(descriptor, unwritten_bytes) :]
 
 
 def _make_save_error(path: Path, event: Event, problem: OSError) -> StudyError:
-    """The error for an event that could not be written."""
+    """Make the error for an event that could not be written."""
     return StudyError(
         "The session cannot be written to disk",
         f"Writing '{event.event.replace('_', ' ')}' to {path.name} of {path.parent.name} failed: {problem.strerror}.",

@@ -1,4 +1,4 @@
-"""Reads `session.json`, the summary of a session, without evaluating the whole log.
+"""Read `session.json`, the summary of a session, without evaluating the whole log.
 
 The summary is derived from the log and states what the log contained when it was written; a comparison with it shows
 whether the end of the log was lost later. Called by `fold_session` and `session_results`, which also writes the file.
@@ -13,6 +13,7 @@ from study.store.disk.json_document import read_json
 SUMMARY_NAME = "session.json"
 """Name of the file in the session's folder."""
 SUMMARY_FORMAT, SUMMARY_VERSION = "hapteq-session-summary", 1
+"""Name and version of the format."""
 
 
 def read_summary(folder: Path) -> dict[str, Any] | None:

@@ -1,7 +1,8 @@
-"""The recording of each trial and of each probe, a file of its own in the session's folder.
+"""Save and find the recordings of trials and probes: one HDF5 file for each, in the session's folder.
 
-A file is written once, before the log mentions it with its hash; its name holds run, trial and attempt. So a recording
-that the log does not mention yet can be found again after a crash.
+A file is written once, before its name and hash are logged; its name states run, trial and attempt, or the number of
+the probe. After a crash, a recording that is not logged yet is therefore found again. Called by `trial_events`,
+`play_probe` and `resume_session`.
 """
 
 from collections.abc import Mapping
@@ -20,21 +21,22 @@ PROBE_PREFIX = "probe-"
 
 @dataclass(frozen=True, slots=True)
 class SavedRecording:
-    """A recording in a session's folder, as the log names it."""
+    """Name and hash of a recording in a session's folder, as they are logged."""
 
     name: str
     """Path relative to the session's folder."""
     sha256: str
-    """Hash of the file."""
+    """SHA-256 of the file, in hexadecimal."""
 
 
-def recording_name(run: int, trial: int, attempt: int) -> str:
-    """Path of a trial's recording, relative to the session's folder. run, trial, attempt: from 0."""
+def name_recording(run: int, trial: int, attempt: int) -> str:
+    """Return the path of a trial's recording, relative to the session's folder. run, trial, attempt: indices from 0."""
     return f"recordings/run-{run:02d}_trial-{trial:03d}_attempt-{attempt}.h5"
 
 
-def probe_name(number: int) -> str:
-    """Path of a probe's recording, relative to the session's folder. number: of the probe in the session, from 0."""
+def name_probe_recording(number: int) -> str:
+    """Return the path of a probe's recording, relative to the session's folder. number: number of the probe in the
+    session, from 0."""
     return f"recordings/{PROBE_PREFIX}{number:03d}.h5"
 
 
@@ -54,10 +56,8 @@ def save_trial_recording(
 
 
 def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
-    """The latest recording of this name on the disk, which the log need not mention; None where there is none.
-
-    Raises StudyError where it cannot be read.
-    """
+    """Find and read the latest recording that was saved under this name, whether or not it is logged; None where there
+    is none. Raises CannotReadError or UnusableFileError where it cannot be read."""
     stem = Path(name).stem
     trial_paths = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]
     numbered_paths = sorted(trial_paths, key=lambda path: int(path.stem.rpartition("_")[2]))
@@ -68,10 +68,10 @@ def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecordi
 
 
 def _find_free_name(folder: Path, name: str) -> str:
-    """The name, or with the lowest number from 2 on that makes it new."""
+    """Return the name or, where such a file exists, the name with the lowest number from 2 on that makes it new."""
     number = 1
-    free = name
-    while (folder / free).exists():
+    free_name = name
+    while (folder / free_name).exists():
         number += 1
-        free = name.replace(".h5", f"_{number}.h5")
-    return free
+        free_name = name.replace(".h5", f"_{number}.h5")
+    return free_name

@@ -69,7 +69,7 @@ class HapteqApp(App[None]):
         super().__init__()
         self.outcome: Finished | Failed | None = None
         """Result of the last sitting, which the command line prints after the screen has closed."""
-        self._start = start
+        self._start_options = start
         self._started_from_terminal = start.first_sitting is not None
         self._engine = EngineConnection(self)
         self._archive = ArchiveScreens(self, self._engine.send, start)
@@ -89,8 +89,8 @@ class HapteqApp(App[None]):
 
     async def on_mount(self) -> None:
         install_exit_handlers(self, lambda: self._leave_app(ExitCode.INTERRUPTED))
-        if self._start.first_sitting is not None:
-            await self._begin_sitting(self._start.first_sitting)
+        if self._start_options.first_sitting is not None:
+            await self._begin_sitting(self._start_options.first_sitting)
         else:
             await self._archive.show_home()
         self.call_after_refresh(self._start_engine)
@@ -119,12 +119,13 @@ class HapteqApp(App[None]):
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
     async def _begin_sitting(self, command: BeginSession | Resume) -> None:
-        """Show the first screen of a sitting, and send its command to the engine. command: to begin or to
-        resume a session."""
-        self._started_from_terminal = self._started_from_terminal and command is self._start.first_sitting
+        """Show the first screen of a sitting, and send the engine the command to begin or resume a session."""
+        self._started_from_terminal = self._started_from_terminal and command is self._start_options.first_sitting
         self.outcome = self._stop_screen = None
         self._archive.close_screens()
-        self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.discard_earlier_keys)
+        self._sitting = SittingScreens(
+            self, self._engine.send, self._start_options.keys, self._keys.discard_earlier_keys
+        )
         await self._sitting.show_preparing()
         self._engine.send(command)
 
@@ -159,13 +160,14 @@ class HapteqApp(App[None]):
         self._show_outcome(outcome, final_message.path)
 
     def _show_outcome(self, outcome: Outcome, path: str) -> OutcomeScreen:
-        """Show the screen of an outcome and carry out the decision made on it. path: of the session to resume or show;
-        empty without any. Returns the screen."""
+        """Show the screen of an outcome, and carry out the decision made on it later. path: folder of the session to
+        resume or show; empty if there is none. Returns the screen."""
 
         async def act_on_decision(decision: Decision | None) -> None:
+            """Carry out the decision; nothing for None."""
             match decision:
                 case "resume":
-                    await self._begin_sitting(Resume(path, self._start.device, self._start.data))
+                    await self._begin_sitting(Resume(path, self._start_options.device, self._start_options.data))
                 case "look":
                     self._engine.send(ShowSession(path))
                 case "home":
@@ -183,8 +185,8 @@ class HapteqApp(App[None]):
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
-        """Ctrl-C: switch the force off and show the screen of the stop. Without a sitting, or at a second press:
-        leave."""
+        """Switch the force off and show the screen of the stop (Ctrl-C). Without a sitting, or at a second press, leave
+        the application."""
         if self._sitting is None or self._stop_screen is not None:
             self._leave_app(ExitCode.INTERRUPTED)
             return
@@ -256,14 +258,14 @@ class HapteqApp(App[None]):
     async def on_begin_requested(self, event: home_messages.BeginRequested) -> None:
         if self._sitting is not None:  # a second key press must not begin a second sitting
             return
-        start = self._start = replace(self._start, device=event.device)
+        start = self._start_options = replace(self._start_options, device=event.device)
         order = SessionOrder(event.protocol, event.device, event.subject, start.data, start.seed, event.model)
         await self._begin_sitting(BeginSession(order))
 
     async def on_resume_requested(self, event: home_messages.ResumeRequested) -> None:
         if self._sitting is not None:
             return
-        await self._begin_sitting(Resume(event.path, self._start.device, self._start.data))
+        await self._begin_sitting(Resume(event.path, self._start_options.device, self._start_options.data))
 
     async def on_home_requested(self) -> None:
         await self._archive.show_home()
@@ -282,5 +284,5 @@ class HapteqApp(App[None]):
     def on_demo_screen_pause_wanted(self) -> None:
         self.action_pause()
 
-    def on_watch_screen_left(self) -> None:
+    def on_watch_screen_closed(self) -> None:
         self._watch_controller.close()

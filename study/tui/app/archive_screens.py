@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 
 class ArchiveScreens:
-    """Shows the start screen, past sessions and diagnoses, and sends their requests to the engine. send: sends a
-    message to the engine; start: options of the start screen."""
+    """Controller of the start screen and of the screens of past sessions, diagnoses and calibration; it sends their
+    requests to the engine. send: sends a message to the engine; start: options of the start screen."""
 
     def __init__(self, app: App[Any], send: Callable[[ToEngine], None], start: StartOptions) -> None:
         self._app = app
@@ -99,7 +99,7 @@ class ArchiveScreens:
         from study.tui.screens.diagnosing import DiagnosingScreen
 
         def on_closed(is_stopped: bool | None) -> None:
-            """Called when the screen is closed, with True if the user stopped the diagnosis."""
+            """Handle the closing of the screen; is_stopped: True if the user stopped the diagnosis."""
             self._diagnosing_screen = None
             if is_stopped:
                 self._send(Interrupt())

@@ -1,4 +1,4 @@
-"""Connection of the application (`app`) to the engine process.
+"""Connection of the application to the engine process; made by `app`.
 
 It sends commands and a regular heartbeat, and delivers the engine's messages as events of Textual, so that they are
 handled by the event loop. Without a heartbeat the engine ends a running trial (`remote_display`).
@@ -29,7 +29,8 @@ class EngineMessage(Message):
 
 
 class EngineConnection:
-    """Sends commands and heartbeats to the engine, and posts its messages to the application as `EngineMessage`."""
+    """Connection that sends commands and heartbeats to the engine, and posts its messages to the application as
+    `EngineMessage`."""
 
     def __init__(self, app: App[Any]) -> None:
         self._app = app

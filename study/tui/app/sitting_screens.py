@@ -1,4 +1,4 @@
-"""Shows the screens of one sitting in the terminal, on request of the engine, and sends the replies.
+"""Show the screens of one sitting in the terminal, on request of the engine, and send the replies.
 
 The engine runs the session in another process. Each of its requests (`ScreenRequest`) opens a screen above the trial's
 screen, which stays open underneath; the screen's result is sent back with the number of the request. Used by `app`.
@@ -75,7 +75,7 @@ def make_screen(request: ScreenRequest, keys: AnswerKeys, words: Words) -> Scree
 def clear_render_caches(app: App[Any]) -> None:
     """Clear caches of Textual 8.2 that hold references to removed widgets; call it when screens change. Otherwise
     garbage collection of these widgets blocks the event loop for longer with every trial, finally for more than the
-    half second after which the engine treats the screen as unresponsive."""
+    time after which the engine treats the screen as unresponsive (`remote_display.HEARTBEAT_TIMEOUT_S`)."""
     # Textual caches 1024 lookups of two colours, each with the whole rendering of a widget as key.
     StylesCache.get_inner_outer.cache_clear()
     for screen in app.screen_stack:
@@ -85,12 +85,12 @@ def clear_render_caches(app: App[Any]) -> None:
 
 
 WARNING_DURATION_S = 8.0
-"""Time for which a warning is shown (s)."""
+"""Time for which a warning is shown (s). Chosen: long enough to read one sentence."""
 
 
 class SittingScreens:
-    """Shows the screens that the engine requests in one sitting, and sends the replies. Every reply carries the number
-    of its request and is sent only once."""
+    """Controller of the screens that the engine requests in one sitting. Every reply carries the number of its request
+    and is sent only once."""
 
     def __init__(
         self,
@@ -111,7 +111,7 @@ class SittingScreens:
         self._pending_number = 0
         """Number of the request that waits for a reply; 0 where none does."""
         self._request_screen: Screen[Any] | None = None
-        self._trial: TrialScreen | None = None
+        self._trial_screen: TrialScreen | None = None
         self._preparing_screen: PreparingScreen | None = None
 
     async def handle_message(self, message: FromEngine) -> None:
@@ -123,9 +123,9 @@ class SittingScreens:
                 self._close_request_screen()
             case HandleUpdate():
                 self._update_handle(message)
-            case Feedback(correct=correct) if self._trial is not None:
-                self._trial.show_saved()
-                self._trial.show_feedback(correct)
+            case Feedback(correct=correct) if self._trial_screen is not None:
+                self._trial_screen.show_saved()
+                self._trial_screen.show_feedback(correct)
             case UserNotice(sentence=sentence):
                 self._show_warning(sentence)
             case SessionReady(path=path):
@@ -138,14 +138,14 @@ class SittingScreens:
                 await self.show_preparing(sentence)
 
     def send_trial_reply(self, reply: TrialReply) -> None:
-        """Send the answer to a trial. Called on a message of the trial's screen, which accepts no further answer
-        then."""
+        """Send the answer to a trial. Called on a message of the trial's screen, which then accepts no further
+        answer."""
         self._send_reply(reply)
 
     async def show_preparing(self, sentence: str = "") -> None:
         """Show that the device is being prepared, while no request is open. sentence: current step, empty before the
         language is known."""
-        self._pending_number, self._request_screen, self._trial = 0, None, None
+        self._pending_number, self._request_screen, self._trial_screen = 0, None, None
         if self._preparing_screen is None:
             self._preparing_screen = PreparingScreen(sentence)
             await self._app.push_screen(self._preparing_screen)
@@ -163,8 +163,8 @@ class SittingScreens:
             # Cover the preparing screen: only an empty screen must show in the moment between two others.
             await self._app.push_screen(Screen())
         if request.call is DisplayCall.ASK:
-            trial = self._trial if self._trial is not None else await self._open_trial_screen()
-            trial.arm(request.content)
+            trial_screen = self._trial_screen if self._trial_screen is not None else await self._open_trial_screen()
+            trial_screen.arm(request.content)
             return
         self._request_screen = make_screen(request, self._keys, self.words)
         await self._app.push_screen(self._request_screen, partial(self._send_screen_result, request.number))
@@ -173,42 +173,42 @@ class SittingScreens:
 
     async def _open_trial_screen(self) -> TrialScreen:
         """Open the screen of all trials; it stays open until the device is prepared again."""
-        self._trial = TrialScreen(self._keys, self.words)
-        await self._app.push_screen(self._trial)
-        return self._trial
+        self._trial_screen = TrialScreen(self._keys, self.words)
+        await self._app.push_screen(self._trial_screen)
+        return self._trial_screen
 
     def _update_handle(self, update: HandleUpdate) -> None:
-        """Show a new position of the handle, if its request is still open."""
+        """Show a new position of the handle, unless its request was closed in the meantime."""
         if update.number == self._pending_number and isinstance(self._request_screen, HandleScreen):
             self._request_screen.update_view(update.view)
 
     def _show_warning(self, sentence: str) -> None:
-        """Show a warning on the trial's screen; as a notification where there is none, or another screen covers it."""
+        """Show a warning on the trial's screen, and as a notification where that screen is not open or is covered."""
         sentence = self.words.translate_fact(sentence)
-        if self._trial is not None:
-            self._trial.show_trouble(sentence)
-        if self._trial is None or self._request_screen is not None:
+        if self._trial_screen is not None:
+            self._trial_screen.show_trouble(sentence)
+        if self._trial_screen is None or self._request_screen is not None:
             self._app.notify(sentence, severity="warning", timeout=WARNING_DURATION_S, markup=False)
 
-    def _send_screen_result(self, number: int, value: Any) -> None:
+    def _send_screen_result(self, number: int, result: Any) -> None:
         """Send the result of a dismissed screen as the reply, if its request (`number`) is still open."""
         if number == self._pending_number:
             self._request_screen = None
-            self._send_reply(value)
+            self._send_reply(result)
 
-    def _send_reply(self, value: Any) -> None:
+    def _send_reply(self, reply_value: Any) -> None:
         """Send the reply to the open request, if there is one, and close the request."""
         if self._pending_number:
-            self._send(Reply(self._pending_number, value))
+            self._send(Reply(self._pending_number, reply_value))
         self._pending_number = 0
 
     def _close_request_screen(self) -> None:
         """Close the screen of the previous request and every screen above it (help, command palette), and take no
         further answer on the trial's screen."""
         self._pending_number = 0
-        if self._trial is not None:
-            self._trial.show_saved()  # the engine continues only after the answer is on disk
-            self._trial.disarm()
+        if self._trial_screen is not None:
+            self._trial_screen.show_saved()  # the engine continues only after the answer is on disk
+            self._trial_screen.disarm()
         request_screen, self._request_screen = self._request_screen, None
         while request_screen is not None and request_screen in self._app.screen_stack:
             self._app.pop_screen()

@@ -2,8 +2,9 @@
 
 A direction is a line segment in a plane at an angle in degrees, counted from the plane's first axis towards its second;
 it has no sign. The two segments differ in number, position and line style, not in colour, so that they can be
-distinguished on every terminal. They are drawn with Braille dots (2 x 4 per character). Proportions of arrowheads,
-dashes and barbs are chosen by hand.
+distinguished on every terminal. They are drawn with Braille dots (2 x 4 per character). Proportions of segments,
+arrowheads, dashes and barbs are chosen by hand. Called by the widget `direction_panel` and by line mode
+(`plain_question`, `plain_demo`).
 """
 
 import math
@@ -21,92 +22,102 @@ END_WORD_KEYS = {
 """Keys of the words for the positive and the negative end of a plane's first and second axis."""
 
 SCREEN_AXES = {"yz": ((1, 0), (0, 1)), "xy": ((0, -1), (1, 0)), "zx": ((0, 1), (1, 0))}
-"""Where a plane's first and second axis point on the screen: (right, up). With x towards the operator, y to the right
+"""Directions (right, up) of a plane's first and second axis on the screen. With x towards the operator, y to the right
 and z up, 'yz' is seen from the operator's side, 'xy' from above, and 'zx' from the left."""
 
 
 def describe_direction(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
-    """A direction in words with its number (1 or 2), such as "1: up-left to down-right"."""
+    """Describe a direction in words with its number (1 or 2), such as "1: up-left to down-right"."""
     return words.fill("direction", {"number": number, "ends": describe_direction_ends(picture, number, words)})
 
 
 def describe_direction_ends(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
-    """Both ends of a direction (1 or 2) in words, such as "up-left to down-right"."""
+    """Describe both ends of a direction (1 or 2) in words, such as "up-left to down-right"."""
     angle = picture.angle_deg[number - 1]
     start, end = _describe_end(picture.plane, angle, words), _describe_end(picture.plane, angle + 180, words)
     return words.fill("direction_ends", {"start": start, "end": end})
 
 
 def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
-    """Lines of text with both directions side by side: 1 solid, 2 dashed, each with its number below. columns, rows:
+    """Draw both directions side by side as lines of text: 1 solid, 2 dashed, each with its number below. columns, rows:
     size of each drawing in characters."""
     first_lines = _draw_direction(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
     second_lines = _draw_direction(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
-    numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
-    return [f"{a}    {b}".rstrip() for a, b in zip(first_lines, second_lines, strict=True)] + [numbers.rstrip()]
+    number_line = f"{'1'.center(columns)}    {'2'.center(columns)}"
+    return [
+        f"{first_line}    {second_line}".rstrip()
+        for first_line, second_line in zip(first_lines, second_lines, strict=True)
+    ] + [number_line.rstrip()]
 
 
 @lru_cache(maxsize=64)
 def draw_large_direction(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
-    """One direction (1 or 2) as large as fits into columns x rows characters: a thick segment with an arrowhead at both
-    ends; 1 solid, 2 dashed."""
+    """Draw one direction (1 or 2) as large as fits into columns x rows characters: a thick segment with an arrowhead at
+    both ends; 1 solid, 2 dashed. The results are cached."""
     canvas = Canvas(columns, rows)
     unit_right, unit_up = _project_to_screen(picture.plane, picture.angle_deg[number - 1])
-    x, y = canvas.centre
-    half_length = _compute_half_length(picture, x, y)
+    centre_x, centre_y = canvas.centre
+    half_length = _compute_half_length(picture, centre_x, centre_y)
     thickness = max(2.5, half_length / 8)
     head_length = 2.6 * thickness
-    shaft = half_length - head_length
+    shaft_half_length = half_length - head_length
 
-    def canvas_point(distance: float, offset: float = 0.0) -> tuple[float, float]:
-        # Point of the canvas from coordinates along and across the segment; y of the canvas points downwards.
-        return x + distance * unit_right + offset * unit_up, y - distance * unit_up + offset * unit_right
+    def convert_to_canvas(distance: float, offset: float = 0.0) -> tuple[float, float]:
+        """Convert coordinates along and across the segment (dots) to a point of the canvas, whose y points
+        downwards."""
+        return centre_x + distance * unit_right + offset * unit_up, centre_y - distance * unit_up + offset * unit_right
 
     for sign in (-1, 1):
-        base = sign * shaft
+        head_base = sign * shaft_half_length
         canvas.fill_polygon(
             (
-                canvas_point(sign * half_length),
-                canvas_point(base, 1.5 * thickness),
-                canvas_point(base, -1.5 * thickness),
+                convert_to_canvas(sign * half_length),
+                convert_to_canvas(head_base, 1.5 * thickness),
+                convert_to_canvas(head_base, -1.5 * thickness),
             )
         )
     for dash_start, dash_end in (
-        ((-shaft, shaft),) if number == 1 else _compute_dash_bounds(shaft, 2.2 * thickness, 1.1 * thickness)
+        ((-shaft_half_length, shaft_half_length),)
+        if number == 1
+        else _compute_dash_bounds(shaft_half_length, 2.2 * thickness, 1.1 * thickness)
     ):
-        canvas.draw_bar(canvas_point(dash_start), canvas_point(dash_end), thickness)
+        canvas.draw_bar(convert_to_canvas(dash_start), convert_to_canvas(dash_end), thickness)
     return tuple(canvas.render_lines())
 
 
-def _compute_half_length(picture: DirectionPicture, x: float, y: float) -> float:
-    """Half length of a segment in dots: the largest at which both directions fit into the canvas, at most 1.25 times
-    its smaller half side. The same for both, so that neither looks stronger. x, y: half width and half height of the
-    canvas (dots)."""
+def _compute_half_length(picture: DirectionPicture, half_width: float, half_height: float) -> float:
+    """Compute the half length of a segment in dots: the largest at which both directions fit into the canvas, at most
+    1.25 times its smaller half side, and the same for both, so that neither looks stronger. half_width, half_height: of
+    the canvas (dots). 1e-9 avoids a division by 0."""
     unit_vectors = [_project_to_screen(picture.plane, angle) for angle in picture.angle_deg]
     largest_half_length = min(
-        min(x / max(abs(unit_right), 1e-9), y / max(abs(unit_up), 1e-9)) for unit_right, unit_up in unit_vectors
+        min(half_width / max(abs(unit_right), 1e-9), half_height / max(abs(unit_up), 1e-9))
+        for unit_right, unit_up in unit_vectors
     )
-    return min(largest_half_length, 1.25 * min(x, y))
+    return min(largest_half_length, 1.25 * min(half_width, half_height))
 
 
-def _compute_dash_bounds(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
-    """Start and end of each dash along the segment from -half_length to half_length, evenly spaced, with a gap at both
-    ends. dash, gap: desired lengths, stretched so that a whole number of dashes fits."""
-    count = max(1, round((2 * half_length - gap) / (dash + gap)))
-    stretch = 2 * half_length / (count * dash + (count + 1) * gap)
-    starts = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]
-    return [(start, start + stretch * dash) for start in starts]
+def _compute_dash_bounds(half_length: float, dash_length: float, gap_length: float) -> list[tuple[float, float]]:
+    """Compute start and end of each dash along the segment from -half_length to half_length, evenly spaced, with a gap
+    at both ends. dash_length, gap_length: desired lengths (dots), scaled so that a whole number of dashes fits."""
+    dash_count = max(1, round((2 * half_length - gap_length) / (dash_length + gap_length)))
+    stretch = 2 * half_length / (dash_count * dash_length + (dash_count + 1) * gap_length)
+    starts = [
+        -half_length + stretch * (gap_length + dash_index * (dash_length + gap_length))
+        for dash_index in range(dash_count)
+    ]
+    return [(start, start + stretch * dash_length) for start in starts]
 
 
 def _draw_direction(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
-    """Lines of text with a thin segment and an open arrowhead (two barbs of 5 dots at 30 degrees) at both ends."""
+    """Draw a thin segment with an open arrowhead (two barbs of 5 dots at 30 degrees) at both ends, as lines of text."""
     canvas = Canvas(columns, rows)
     unit_right, unit_up = _project_to_screen(plane, angle_deg)
-    cx, cy = (canvas.width - 1) / 2, (canvas.height - 1) / 2
-    half_length = 0.95 * min(cx, cy)
+    centre_x, centre_y = (canvas.width - 1) / 2, (canvas.height - 1) / 2
+    half_length = 0.95 * min(centre_x, centre_y)
     start, end = (
-        (cx - half_length * unit_right, cy + half_length * unit_up),
-        (cx + half_length * unit_right, cy - half_length * unit_up),
+        (centre_x - half_length * unit_right, centre_y + half_length * unit_up),
+        (centre_x + half_length * unit_right, centre_y - half_length * unit_up),
     )
     canvas.draw_line(start, end, dashed)
     for tip, turn_deg in ((start, 180.0), (end, 0.0)):
@@ -119,18 +130,19 @@ def _draw_direction(plane: str, angle_deg: float, columns: int, rows: int, dashe
 
 
 def _project_to_screen(plane: str, angle_deg: float) -> tuple[float, float]:
-    """Unit vector of a direction on the screen, (right, up)."""
-    first, second = SCREEN_AXES[plane]
-    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    return c * first[0] + s * second[0], c * first[1] + s * second[1]
+    """Project the unit vector of a direction to the screen, (right, up)."""
+    first_axis, second_axis = SCREEN_AXES[plane]
+    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    return cosine * first_axis[0] + sine * second_axis[0], cosine * first_axis[1] + sine * second_axis[1]
 
 
 def _describe_end(plane: str, angle_deg: float, words: Words) -> str:
-    """One end of a direction in words; a component of at most 0.2 (about 11.5 degrees) is not mentioned."""
+    """Describe one end of a direction in words; a component of at most 0.2, chosen (an angle of 11.5 degrees), is not
+    mentioned."""
     (first_plus, first_minus), (second_plus, second_minus) = END_WORD_KEYS[plane]
-    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    second_word = words[second_plus if s > 0 else second_minus]
-    first_word = words[first_plus if c > 0 else first_minus]
-    if abs(s) > 0.2 and abs(c) > 0.2:
+    first_component, second_component = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    second_word = words[second_plus if second_component > 0 else second_minus]
+    first_word = words[first_plus if first_component > 0 else first_minus]
+    if abs(second_component) > 0.2 and abs(first_component) > 0.2:
         return words.fill("end_both", {"first": second_word, "second": first_word})
-    return second_word if abs(s) > 0.2 else first_word
+    return second_word if abs(second_component) > 0.2 else first_word

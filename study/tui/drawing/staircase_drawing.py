@@ -25,7 +25,7 @@ _MAX_DOTS_PER_TRIAL = 4.0
 """Largest horizontal distance between trials, in dots, so that short runs of different length are drawn to the same
 scale. Chosen."""
 _THRESHOLD_DOT_SPACING = 4
-"""Distance between the dots of the threshold line, in dots of the canvas."""
+"""Distance between the dots of the threshold line, in dots of the canvas. Chosen."""
 _MARKS_BY_PRIORITY = (RIGHT_MARK, WRONG_MARK, VALLEY_MARK, PEAK_MARK)
 """Marks by rising priority: of several trials in a character cell, the mark with the highest priority is shown."""
 

@@ -23,7 +23,7 @@ def start_child(
     screen. It uses this process's import path. When this process ends for any reason, the pipe closes, which the child
     reads as end of file. Raises OSError where the process cannot be started.
     """
-    own_end, child_end = socket.socketpair()
+    parent_end, child_end = socket.socketpair()
     with child_end:
         call = f"{function}({', '.join(map(repr, (child_end.fileno(), *arguments)))})"
         program = f"import sys; sys.path[:] = {sys.path!r}; from {module} import {function}; {call}"
@@ -35,4 +35,4 @@ def start_child(
             pass_fds=(child_end.fileno(),),
             start_new_session=True,
         )
-    return Connection(own_end.detach()), process
+    return Connection(parent_end.detach()), process

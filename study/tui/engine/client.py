@@ -36,7 +36,7 @@ class EngineClient:
         self._send_queue: SimpleQueue[ToEngine | None] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
-        self._closing = False
+        self._is_closing = False
         self._session: SessionReady | None = None
         self.has_failed = False
         """Whether the engine could not be started or ended without `close`; a new client can then be started."""
@@ -60,7 +60,7 @@ class EngineClient:
     def close(self, timeout_s: float = ENGINE_EXIT_TIMEOUT_S) -> None:
         """Close the pipe, wait up to `timeout_s` (s) for the engine to release the force, write the last line of the
         log, and end; then kill it. May be called repeatedly, and before `start`."""
-        self._closing = True
+        self._is_closing = True
         self._send_queue.put(None)
         if self._thread.ident is None:
             return
@@ -87,7 +87,7 @@ class EngineClient:
             exit_code = _await_exit_code(process)
             writer.join()
             connection.close()
-            if not self._closing:
+            if not self._is_closing:
                 self.has_failed = True
                 self._deliver(_make_end_failure(exit_code, _read_last_line(output), self._session))
 

@@ -43,11 +43,11 @@ INTERRUPTED = StudyError(
 
 
 class Engine:
-    """Performs the commands of the screen one after another, until the screen's process has ended. SIGINT interrupts
-    the current command, SIGTERM ends the engine."""
+    """Main loop of the engine process: the commands of the screen, one after another, until the screen's process has
+    ended. SIGINT interrupts the current command, SIGTERM ends the engine."""
 
     def __init__(self, connection: Connection) -> None:
-        self._busy = False
+        self._busy = False  # whether a command runs that may be interrupted
         self._link = ScreenLink(connection, self._interrupt, _force_exit)
         self._commands: EngineCommands | None = None
         for signal_name in ("SIGINT", "SIGTERM"):
@@ -90,10 +90,10 @@ class Engine:
         except StudyError as error:
             self._busy = False
             self._report_failure(error, error.exit_code)
-        except Exception as error_in_program:  # noqa: BLE001 - the screen shows it, and the device is closed
+        except Exception as exception:  # noqa: BLE001 - the screen shows it, and the device is closed
             self._busy = False
             traceback.print_exc()
-            self._report_failure(_make_bug_error(error_in_program), ExitCode.ERROR)
+            self._report_failure(_make_bug_error(exception), ExitCode.ERROR)
         finally:
             self._busy = False
 

@@ -63,7 +63,7 @@ from study.workflows.session.conduct_session import ConductedSitting, Participan
 from study.workflows.session.end_sitting import end_sitting, write_missing_results
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.withdraw_participant import list_remaining_copies, plan_withdrawal, withdraw
-from study.workflows.trial.display import PersonsHand
+from study.workflows.trial.display import HumanHand
 from study.workflows.views.send_request import send_request
 from study.workflows.views.view_home import describe_model_quality, make_home_view, make_protocol_line
 from study.workflows.views.view_session import make_session_view
@@ -174,7 +174,7 @@ class EngineCommands:
         display = RemoteDisplay(self._link, self._clock)
         try:
             connect = partial(self._connect_requests, device_name)
-            yield Participant(display, PersonsHand(), self._clock, self._link.requests, connect)
+            yield Participant(display, HumanHand(), self._clock, self._link.requests, connect)
         finally:
             self._link.stop_device = None
 

@@ -40,7 +40,7 @@ class ScreenRequest:
     """Number of the request, from 1 within a sitting; the reply has the same number."""
     call: DisplayCall
     content: Any
-    """Argument of the method."""
+    """Argument of the method, for the screen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class HandleUpdate:
 
 @dataclass(frozen=True, slots=True)
 class CloseRequest:
-    """Closes the screen of the request of this number, which needs no reply any more."""
+    """Request to close the screen of the request of this number, which needs no reply any more."""
 
     number: int
 
@@ -133,9 +133,9 @@ class CalibrationComputed:
     """The calibration is computed from all six positions, and not stored yet."""
 
     table: str
-    """The calibration as a TOML table for the lab's file."""
+    """The calibration as a TOML table for the laboratory's settings file."""
     file: str
-    """Path of the lab's file."""
+    """Path of the laboratory's settings file."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,8 @@ from study.workflows.checks.computer_load import get_load_per_processor
 from study.workflows.trial.display import SignOfLife
 
 KEEPALIVE_INTERVAL_S = 0.04
-"""Longest interval (s) between two calls of `sign_of_life`. Chosen: the port requires a call every 0.1 s."""
+"""Longest interval (s) between two calls of `sign_of_life`. Chosen: well below the 0.1 s that the port allows
+(`display.SignOfLife`)."""
 HANDLE_POLL_INTERVAL_S = 0.1
 """Interval (s) at which the wait for the handle reads its position again. Chosen by hand."""
 SHOW_WAIT_AFTER_S = 1.0

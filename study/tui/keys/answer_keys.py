@@ -1,6 +1,7 @@
 """Keyboard keys for the answers 1 and 2 in addition to the digits, as chosen by the option `--keys f,j`.
 
-The commands parse the option; the full-screen app and line mode use the keys for prompts and to parse answers.
+The commands of `study.cli` parse the option; `sitting_screens` and line mode use the keys for prompts and to parse
+answers.
 """
 
 from dataclasses import dataclass

@@ -21,12 +21,12 @@ class KeyPressDetector:
     key."""
 
     def __init__(self) -> None:
-        self._last_event_s: dict[int, float] = {}  # by answer
+        self._last_event_s: dict[int, float] = {}  # time of the last event, by answer
 
-    def is_press(self, answer: int, event_s: float, armed_s: float) -> bool:
-        """Whether an event is a press that may answer a question. False if it comes less than `MIN_PRESS_INTERVAL_S`
-        after the last event of any answer, or may be the first repetition of a key whose last event was before
-        `armed_s`.
+    def record_event(self, answer: int, event_s: float, armed_s: float) -> bool:
+        """Record a key event, and return whether it is a press that may answer a question. False if it comes less than
+        `MIN_PRESS_INTERVAL_S` after the last event of any answer, or may be the first repetition of a key whose last
+        event was before `armed_s`.
 
         answer: 1 or 2; event_s: time of the event (s); armed_s: time from which answers count (s), infinite while no
         question is shown. Call for every event of an answer key, also while no question is shown.
@@ -39,8 +39,9 @@ class KeyPressDetector:
 
 
 def get_arrival_time_s(event: Key) -> float:
-    """Time at which the key was read from the terminal (s), on the clock of `time.monotonic`. Textual's reading thread
-    stores it, so that a delay of the event loop does not change it; on Windows the present time is returned instead."""
+    """Get the time at which the key was read from the terminal (s), on the clock of `time.monotonic`. Textual's reading
+    thread stores it, so that a delay of the event loop does not change it; on Windows the present time is returned
+    instead."""
     now_s = time.monotonic()
     # On Windows, Textual takes the event's time from another clock.
     return event.time if sys.platform != "win32" and event.time <= now_s else now_s

@@ -1,4 +1,4 @@
-"""Dialogue of line mode: writes sentences to the terminal and waits for typed lines.
+"""Dialogue of line mode: write sentences to the terminal and wait for typed lines.
 
 While it waits, it calls the sign of life of the session, which keeps the device running and may end the wait. Used by
 `PlainDisplay` and the functions of `plain_forms`, `plain_demo`, `plain_question` and `plain_pause`.
@@ -25,17 +25,17 @@ class Line:
     """A line that was typed."""
 
     text: str
-    at_s: float
+    read_s: float
     """Time at which the line was read (s), on the session's clock."""
 
     @property
     def word(self) -> str:
-        """The text without regard to case, to compare with words."""
+        """The text, case-folded, for comparison with words."""
         return self.text.casefold()
 
 
 class WaitOver(Enum):
-    """Why a wait ended without a line."""
+    """Reason why a wait ended without a line; the values are logged as the reason of the unanswered trial."""
 
     INPUT_ENDED = "the input ended"
     CUT_SHORT = "the stimulus ended early"
@@ -53,7 +53,7 @@ class Conversation:
         self.words = words
 
     def say(self, *sentences: str) -> None:
-        """Write each sentence on a line of its own, wrapped at `LINE_WIDTH` between words."""
+        """Write each sentence on a new line, wrapped at `LINE_WIDTH` between words."""
         for text in sentences:
             # Lines of a drawing are never longer, so that only sentences are wrapped.
             lines = textwrap.wrap(text, LINE_WIDTH) if len(text) > LINE_WIDTH else [text]
@@ -61,11 +61,11 @@ class Conversation:
         self._output.flush()
 
     def say_texts(self, *keys: str) -> None:
-        """Write the texts with these keys, each on a line of its own."""
+        """Write the texts with these keys, each on a new line."""
         self.say(*(self.words[key] for key in keys))
 
     def refuse(self, key: str, line: Line) -> None:
-        """Write that a line was not understood. key: of the text in the words, which quotes the line."""
+        """Write that a line was not understood. key: key of the text, in which the line is quoted."""
         self.say(self.words.fill(key, {"typed": quote_line(line, self.words)}))
 
     def prompt(self, text: str) -> None:
@@ -78,8 +78,8 @@ class Conversation:
         self._lines.discard_early_lines()
 
     def wait(self, sign_of_life: SignOfLife, until_s: float = float("inf")) -> Line | WaitOver:
-        """Wait for the next line; return it, or why none came. until_s: end of the wait on the session's clock (s). If
-        the sign of life ends the wait, a line that arrives at the same time does not count."""
+        """Wait for the next line; return it, or the reason why there is none. until_s: end of the wait on the session's
+        clock (s). If the sign of life ends the wait, a line that arrives at the same time does not count."""
         while True:
             try:
                 text = self._lines.read(POLL_INTERVAL_S)
@@ -130,7 +130,7 @@ def remove_control_characters(text: str) -> str:
 
 
 def quote_line(line: Line, words: Words = ENGLISH_WORDS) -> str:
-    """The typed line as quoted in a sentence, with at most 20 characters; words for an empty line."""
+    """Quote a typed line for a sentence, with at most 20 characters, chosen; an empty line is described in words."""
     shown_text = remove_control_characters(line.text)[:20]
     return f"'{shown_text}'" if shown_text else words["line_enter_alone"]
 

@@ -38,7 +38,8 @@ from study.workflows.trial.display import SignOfLife
 class PlainDisplay:
     """The display port (`study.workflows.trial.display.Display`) in lines of text; the docstrings of `Display` apply.
 
-    note: stores a note or an adverse event that is typed during a pause; if None, the pause offers no notes.
+    lines, output: the terminal or pipe; note: stores a note or an adverse event that is typed during a pause; if None,
+    the pause offers no notes.
     """
 
     def __init__(

@@ -102,7 +102,7 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
     case; None for any other line."""
     answer = keys.parse_answer(line.text)
     if answer is not None:
-        return Answered(answer, line.at_s)
+        return Answered(answer, line.read_s)
     return {"q": PARTICIPANT_LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
 
 

@@ -1,6 +1,6 @@
 """Confirmation before the experimenter's view opens on a screen that the participant may see.
 
-The view shows levels and which answers were right; a participant who has seen these is no longer a naive observer.
+The view shows levels and which answers were right; a participant who has seen these is no longer naive.
 Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view. Called by
 `study.tui.watch.watch_controller` and `study.tui.app.archive_screens`.
 """

@@ -1,4 +1,7 @@
-"""Screen with the findings of the device check, which measures before a session whether the device is in order."""
+"""Screen with the findings of the device check, which measures before a session whether the device is in order.
+
+Opened by `study.tui.app.sitting_screens` on request of the engine, which makes the check.
+"""
 
 from typing import ClassVar
 
@@ -79,5 +82,6 @@ def _format_conclusion(report: DeviceReport, words: Words) -> str:
 
 
 def _format_finding(finding: DeviceFinding, name_width: int) -> str:
-    """Format a finding: verdict, name padded to `name_width` characters, measured value."""
+    """Format a finding: verdict (LOOK where a value is out of order, padded to 4 characters), name padded to
+    `name_width` characters, measured value."""
     return f"{'LOOK' if finding.wrong else finding.verdict:<4}  {finding.name:<{name_width}}  {finding.value}"

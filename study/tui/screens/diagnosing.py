@@ -49,18 +49,20 @@ class DiagnosingScreen(Screen[bool]):
         self._started_s = now_s()
 
     def compose(self) -> ComposeResult:
-        with Vertical() as box:
-            box.border_title = "Diagnosing"
+        """Step, progress bar and elapsed time in a panel."""
+        with Vertical() as panel:
+            panel.border_title = "Diagnosing"
             yield Static(self._step, id="what", markup=False)
             yield ProgressBar(total=1.0, show_eta=False)
             yield Static(describe_elapsed(0.0), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self.set_interval(UPDATE_INTERVAL_S, self._tick)
+        self.set_interval(UPDATE_INTERVAL_S, self._update_elapsed_time)
 
     def show_progress(self, step: str, share: float) -> None:
-        """Show the current step and progress. step: sentence without capital letter and full stop; share: 0 to 1."""
+        """Show the current step and progress, if the screen is composed. step: sentence without capital letter and full
+        stop; share: fraction of the work that is done, 0 to 1."""
         if self.query("#what"):
             self.query_one("#what", Static).update(f"{step[:1].upper()}{step[1:]}.")
             self.query_one(ProgressBar).update(progress=share)
@@ -69,6 +71,6 @@ class DiagnosingScreen(Screen[bool]):
         """Leave the screen with True: the diagnosis is to be stopped."""
         dismiss_screen(self, True)
 
-    def _tick(self) -> None:
+    def _update_elapsed_time(self) -> None:
         """Draw the elapsed time; called every `UPDATE_INTERVAL_S`."""
         self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._started_s))

@@ -1,7 +1,8 @@
 """Screen of a form, such as consent, exclusion criteria, questionnaires or set-up.
 
 The rules of filling in (valid answers, movement of the cursor, changes to be confirmed) are in
-`study.session.views.form_entry`: each key turns a `FormEntry` into the next, and this screen draws the result.
+`study.session.views.form_entry`: each key turns a `FormEntry` into the next, and this screen draws the result. Opened
+by `study.tui.app.sitting_screens`.
 """
 
 from dataclasses import dataclass
@@ -35,9 +36,10 @@ from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.form_question import FormQuestion
 from study.tui.widgets.literal_text import LiteralText
 
-LONGEST_QUOTE = 48
-"""Longest quotation of a question or answer in a message, in characters; longer texts are cut."""
-KEYS = (
+MAX_QUOTE_CHARACTERS = 48
+"""Largest number of characters of a quoted question or answer in a message; longer texts are cut. Chosen: the message
+remains a single line."""
+FOOTER_ENTRIES = (
     ("1", "choice", "1 2 …", "Choose"),
     ("left", "choice", "← →", "Move"),
     ("space", "choice", "Space", "Choose"),
@@ -48,14 +50,14 @@ KEYS = (
     ("down", "", "↓", "Next"),
 )
 """Footer entries: key, kind of field where the entry applies (empty: everywhere), text of the key, description."""
-FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
+FOOTER_KEYS = frozenset(key for key, *_ in FOOTER_ENTRIES)
 """Keys that have a footer entry."""
 
 
 class FormScreen(TranslatedScreen[FormReply]):
-    """Draws a `FormEntry`: introduction, questions, and the button Continue; the keys are in `KEYS`. Returns the reply.
-    No widget has the focus: the screen itself receives keys, clicks and pastes, and applies them in order of
-    arrival."""
+    """Screen that draws a `FormEntry`: introduction, questions, and the button Continue; the keys are in
+    `FOOTER_ENTRIES`. Its result is the reply. No widget has the focus: the screen itself receives keys, clicks and
+    pastes, and applies them in order of arrival."""
 
     PAGE = "help_form"
     DEFAULT_CSS = """
@@ -70,8 +72,8 @@ class FormScreen(TranslatedScreen[FormReply]):
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
         *(
-            Binding(key, f"press('{key}', '{place}')", words, key_display=key_text)
-            for key, place, key_text, words in KEYS
+            Binding(key, f"press('{key}', '{field_kind}')", description, key_display=key_text)
+            for key, field_kind, key_text, description in FOOTER_ENTRIES
         ),
         Binding("pageup", "scroll(-1)", "Page up", show=False),
         Binding("pagedown", "scroll(1)", "Page down", show=False),
@@ -87,8 +89,8 @@ class FormScreen(TranslatedScreen[FormReply]):
     def __init__(self, form: Form, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
         self._entry = make_blank_entry(form)
-        self._alive: list[bool | None] = []
-        """Whether each entry of `KEYS` had an effect when the footer was last drawn."""
+        self._enabled_entries: list[bool | None] = []
+        """Whether each entry of `FOOTER_ENTRIES` had an effect when the footer was last drawn."""
 
     def compose(self) -> ComposeResult:
         form = self._entry.form
@@ -132,8 +134,9 @@ class FormScreen(TranslatedScreen[FormReply]):
         event.stop()
         self._apply(paste_text(self._entry, event.text))
 
-    def action_press(self, key: str, place: str) -> None:
-        """Apply the key of a footer entry. place: kind of field where the entry applies."""
+    def action_press(self, key: str, field_kind: str) -> None:
+        """Apply the key of a footer entry. field_kind: kind of field where the entry applies;
+        unused, because `check_action` disables the entry elsewhere."""
         self._apply(apply_key(self._entry, key, key if len(key) == 1 else None, self.stacked))
 
     def action_scroll(self, pages: int) -> None:
@@ -145,13 +148,15 @@ class FormScreen(TranslatedScreen[FormReply]):
         """Enable a footer entry only if its key has an effect at the present field."""
         if action != "press":
             return True
-        key, place = parameters
+        key, entry_field_kind = parameters
         field = self._entry.field
         field_kind = "continue" if field is None else "choice" if field.choices else "text"
         key_names = ("left", "right") if key == "left" else (str(key),)
         stacked = self.is_mounted and self.stacked
         next_entries = [apply_key(self._entry, name, name if len(name) == 1 else None, stacked) for name in key_names]
-        return place in ("", field_kind) and any(next_entry not in (None, self._entry) for next_entry in next_entries)
+        return entry_field_kind in ("", field_kind) and any(
+            next_entry not in (None, self._entry) for next_entry in next_entries
+        )
 
     def _forward_event(self, event: Event) -> None:
         """Post a click as a message to the screen, so that it stays in order with the keys."""
@@ -165,7 +170,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         super()._forward_event(event)
 
     def _locate_click(self, click: Click) -> Pointed | None:
-        """The choice row, button or question under the pointer; None elsewhere."""
+        """Find the choice row, button or question under the pointer; None elsewhere."""
         try:
             widget, region = self.get_widget_at(click.screen_x, click.screen_y)
         except NoWidget:
@@ -183,7 +188,11 @@ class FormScreen(TranslatedScreen[FormReply]):
             self._apply(click_continue(self._entry))
             return
         questions = list(self.query(FormQuestion))
-        index = next(i for i, question in enumerate(questions) if question in click_message.widget.ancestors_with_self)
+        index = next(
+            question_index
+            for question_index, question in enumerate(questions)
+            if question in click_message.widget.ancestors_with_self
+        )
         next_entry = (
             move_cursor(self._entry, index)
             if click_message.choice is None
@@ -216,14 +225,15 @@ class FormScreen(TranslatedScreen[FormReply]):
         status_text = self.words.fill("form_open" if missing_count else "form_complete", counts)
         self.query_one("#top", LiteralText).update(status_text)
         self.query_one("#message", LiteralText).update(_compose_message(entry, not missing_count, self.words))
-        enabled_entries = [self.check_action("press", key[:2]) for key in KEYS]
-        if enabled_entries != self._alive:
-            self._alive = enabled_entries
+        enabled_entries = [self.check_action("press", key[:2]) for key in FOOTER_ENTRIES]
+        if enabled_entries != self._enabled_entries:
+            self._enabled_entries = enabled_entries
             self.refresh_bindings()
 
 
-def _compose_message(entry: FormEntry, all_answered: bool, words: Words) -> str:
-    """The line below the form: the first missing answer, or changed answers to be checked, or that it is complete."""
+def _compose_message(entry: FormEntry, is_complete: bool, words: Words) -> str:
+    """Compose the line below the form: the first missing answer, or changed answers to be checked, or that all
+    questions are answered; empty otherwise."""
     if entry.missing:
         remaining, field = len(entry.missing) - 1, entry.form.fields[entry.missing[0]]
         question_text = (
@@ -239,10 +249,10 @@ def _compose_message(entry: FormEntry, all_answered: bool, words: Words) -> str:
             for index in entry.unconfirmed
         )
         return words.fill("form_changed", {"changes": changes})
-    return words["form_done"] if all_answered else ""
+    return words["form_done"] if is_complete else ""
 
 
 def _quote_label(label: str, words: Words) -> str:
-    """The text in quotation marks, cut to `LONGEST_QUOTE` characters."""
-    shortened = label if len(label) <= LONGEST_QUOTE else f"{label[: LONGEST_QUOTE - 1].rstrip()}…"
-    return words.fill("quoted", {"text": shortened})
+    """Quote a text in quotation marks, cut to `MAX_QUOTE_CHARACTERS` characters."""
+    shortened_label = label if len(label) <= MAX_QUOTE_CHARACTERS else f"{label[: MAX_QUOTE_CHARACTERS - 1].rstrip()}…"
+    return words.fill("quoted", {"text": shortened_label})

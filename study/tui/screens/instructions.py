@@ -1,4 +1,5 @@
-"""Screen of the instructions that a participant reads before the first trial of a sitting (`sitting_screens`)."""
+"""Screen of the instructions that a participant reads before the first trial of a sitting; opened by
+`sitting_screens`."""
 
 from typing import ClassVar
 
@@ -19,8 +20,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class InstructionsScreen(TranslatedScreen[None]):
-    """How to hold the handle, the two directions, how to answer, and the number of runs of the sitting. If the device
-    does not move, a note states that the answers are only practice. Enter closes the screen."""
+    """Screen that explains how to hold the handle, the two directions, how to answer, and the plan of the sitting. If
+    the device does not move, a note states that the answers are only practice. Enter closes the screen."""
 
     PAGE = "help_instructions"
     DEFAULT_CSS = """
@@ -31,7 +32,8 @@ class InstructionsScreen(TranslatedScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "begin", "Begin", key_display="Enter")]
 
     def __init__(self, welcome: Welcome, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
-        """welcome: facts about the sitting; keys: keys for the two answers; words: texts in its language."""
+        """welcome: facts about the sitting; keys: keys for the two answers; words: texts in the
+        language of the sitting."""
         super().__init__(words)
         self._welcome = welcome
         self._keys = keys

@@ -32,8 +32,8 @@ DECISION_TEXT_KEYS = {
 
 
 class PauseScreen(TranslatedScreen[AfterPause]):
-    """Shows the reason of the pause and the number of saved answers. Arrow keys and Enter choose a decision, which is
-    returned; n writes a note, e an adverse event (message `NoteWritten`). leave_requested: the participant asked to
+    """Screen with the reason of the pause and the number of saved answers. Arrow keys and Enter choose a decision, its
+    result; n writes a note, e an adverse event (message `NoteWritten`). leave_requested: the participant asked to
     leave, so that this choice is highlighted at first."""
 
     PAGE = "help_pause"
@@ -102,7 +102,7 @@ class PauseScreen(TranslatedScreen[AfterPause]):
             self.query_one("#message", LiteralText).update(self.words["nothing_erased"])
 
     def _take_note(self, note: NoteAsked | None) -> None:
-        """Post a written note; None if the dialog was cancelled."""
+        """Post a written note, and state that it is logged; None: the dialog was cancelled, and nothing is written."""
         if note is None:
             self.query_one("#message", LiteralText).update(self.words["nothing_written"])
             return

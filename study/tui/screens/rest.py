@@ -1,6 +1,7 @@
 """Screen of an enforced rest between runs: remaining time, number of remaining runs, and progress of the session.
 
-The rest cannot be shortened: Enter has no effect before its end.
+The rest cannot be shortened: Enter has no effect before its end. Opened by `study.tui.app.sitting_screens`; the engine
+enforces the duration as well (`remote_display`).
 """
 
 import math
@@ -19,8 +20,8 @@ from study.tui.trial_words import describe_progress
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
-UPDATE_INTERVAL_S = 0.2
-"""Interval (s) between updates of the remaining time."""
+COUNTDOWN_INTERVAL_S = 0.2
+"""Interval (s) between updates of the remaining time. Chosen: a fraction of the second that is displayed."""
 
 
 class RestScreen(TranslatedScreen[float]):
@@ -38,7 +39,7 @@ class RestScreen(TranslatedScreen[float]):
     def __init__(self, notice: RestNotice, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
         self._notice = notice
-        self._began_s = time.monotonic()
+        self._started_s = time.monotonic()
 
     def compose(self) -> ComposeResult:
         notice, words = self._notice, self.words
@@ -52,8 +53,8 @@ class RestScreen(TranslatedScreen[float]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._began_s = time.monotonic()
-        self._countdown_timer = self.set_interval(UPDATE_INTERVAL_S, self._update_countdown)
+        self._started_s = time.monotonic()
+        self._countdown_timer = self.set_interval(COUNTDOWN_INTERVAL_S, self._update_countdown)
         self._update_countdown()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
@@ -65,6 +66,7 @@ class RestScreen(TranslatedScreen[float]):
             dismiss_screen(self, self._measure_elapsed_s())
 
     def _update_countdown(self) -> None:
+        """Draw the remaining time, rounded up to seconds; at the end of the rest, stop and enable Enter."""
         remaining_s = max(0, math.ceil(self._notice.seconds - self._measure_elapsed_s()))
         self.query_one(Digits).update(f"{remaining_s // 60}:{remaining_s % 60:02d}")
         self.query_one("#message", LiteralText).update(
@@ -75,7 +77,9 @@ class RestScreen(TranslatedScreen[float]):
             self.refresh_bindings()
 
     def _measure_elapsed_s(self) -> float:
-        return time.monotonic() - self._began_s
+        """Measure the time (s) since the screen was shown."""
+        return time.monotonic() - self._started_s
 
     def _has_ended(self) -> bool:
+        """Whether the requested duration of the rest is over."""
         return self._measure_elapsed_s() >= self._notice.seconds

@@ -187,7 +187,9 @@ class TrialScreen(TranslatedScreen[None]):
         """Post an answer (1 or 2), unless the key is held down or arrived before the question. arrival_time_s: arrival
         of the key (s, monotonic clock)."""
         armed_s = self._armed_s
-        is_press = self._press_detector.is_press(answer, arrival_time_s, float("inf") if armed_s is None else armed_s)
+        is_press = self._press_detector.record_event(
+            answer, arrival_time_s, float("inf") if armed_s is None else armed_s
+        )
         if armed_s is None or arrival_time_s < armed_s:
             return
         if not is_press:

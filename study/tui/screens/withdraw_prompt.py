@@ -31,8 +31,9 @@ In a terminal: `hapteq withdraw SESSION`.
 
 
 class WithdrawPrompt(ModalScreen[bool]):
-    """Dialog that asks for the participant's code before all sessions with that code are erased. Enter compares the
-    typed text with the code and returns True if they are equal; Esc returns False. subject: the participant's code."""
+    """Dialog that asks for the participant's code before all sessions with that code are erased. Enter returns True if
+    the typed text without surrounding blanks is the code, and else shows a message; Esc returns False. subject: the
+    participant's code."""
 
     HELP = HELP
     CSS = """
@@ -53,8 +54,8 @@ class WithdrawPrompt(ModalScreen[bool]):
         self._subject = subject
 
     def compose(self) -> ComposeResult:
-        with Vertical() as box:
-            box.border_title = f"{self._subject} withdraws"
+        with Vertical() as panel:
+            panel.border_title = f"{self._subject} withdraws"
             yield Static(
                 f"All sessions of {self._subject} in this data folder are erased for good: answers, recordings, tables "
                 f"and figures, and the folder's analysis, which was made from them too.\n\n"
@@ -67,6 +68,7 @@ class WithdrawPrompt(ModalScreen[bool]):
 
     @on(Input.Submitted)
     def _check_input(self, event: Input.Submitted) -> None:
+        """Close the dialog with True if the code was typed; otherwise show that nothing was erased."""
         if event.value.strip() == self._subject:
             dismiss_screen(self, True)
         else:

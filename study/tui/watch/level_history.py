@@ -14,10 +14,12 @@ from study.session.watching.watch_view import StaircasePoint
 from study.tui.drawing.braille import Canvas
 from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK_MARK, RIGHT_MARK, VALLEY_MARK, WRONG_MARK
 
-LEAST_LEVEL_RATIO = 4.0
-"""Least ratio of the cap to the lower end of the level axis, so that small steps do not look large."""
+MIN_AXIS_RATIO = 4.0
+"""Least ratio of the cap to the lower end of the level axis, so that small steps do not look large. Chosen, as in
+`staircase_drawing`."""
 MAX_DOTS_PER_TRIAL = 4.0
-"""Largest horizontal distance of successive trials, in braille dots; with many trials it is smaller."""
+"""Largest horizontal distance of successive trials, in braille dots; with many trials it is smaller. Chosen, as in
+`staircase_drawing`."""
 
 MUTED = "$foreground 65%"
 """Style of labels and legend."""
@@ -26,7 +28,7 @@ NEXT_MARK = "?"
 LEGEND = f"{RIGHT_MARK} right {WRONG_MARK} wrong {PEAK_MARK}{VALLEY_MARK} reversal {NEXT_MARK}next ┄cap"
 """Meaning of the marks, on a single line."""
 
-_STYLES = {
+_MARK_STYLES = {
     RIGHT_MARK: "$text-success",
     WRONG_MARK: "bold $text-error",
     PEAK_MARK: "bold",
@@ -39,74 +41,80 @@ _MARK_PRIORITY = {WRONG_MARK: 1, RIGHT_MARK: 0, PEAK_MARK: 2, VALLEY_MARK: 2, NE
 
 
 class LevelHistory(Widget):
-    """Draws a staircase in the whole area of the widget: level over trials, answers and reversals as marks, the next
-    level, the cap as a dashed line."""
+    """Widget with the plot of a staircase: level over trials, answers and reversals as marks, the next level, the cap
+    as a dashed line."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._points: tuple[StaircasePoint, ...] = ()
-        self._next_n: float | None = None
+        self._next_level_n: float | None = None
         self._cap_n = 1.0
 
     def show(self, points: tuple[StaircasePoint, ...], next_n: float | None, cap_n: float) -> None:
         """Show a staircase; redraws only if something changed. points: trials so far; next_n: level of the next trial
         (N), None if unknown; cap_n: largest allowed level (N)."""
-        if (points, next_n, cap_n) != (self._points, self._next_n, self._cap_n):
-            self._points, self._next_n, self._cap_n = points, next_n, cap_n
+        if (points, next_n, cap_n) != (self._points, self._next_level_n, self._cap_n):
+            self._points, self._next_level_n, self._cap_n = points, next_n, cap_n
             self.refresh()
 
     def render(self) -> Content:
         width, height = self.content_size.width, self.content_size.height
         if width < LABEL_COLUMNS + 8 or height < 4:
             return Content("No room for the staircase.")
-        return draw_level_history(self._points, self._next_n, self._cap_n, (width, height))
+        return draw_level_history(self._points, self._next_level_n, self._cap_n, (width, height))
 
 
 def draw_level_history(
     points: Sequence[StaircasePoint], next_n: float | None, cap_n: float, size: tuple[int, int]
 ) -> Content:
-    """The staircase as text, with marks, labels of levels (N) and legend. points, next_n, cap_n: as in
-    `LevelHistory.show`. size: columns and rows in character cells, labels and legend included."""
+    """Draw the staircase as text, with marks, labels of levels (N) and legend. points, next_n, cap_n: as in
+    `LevelHistory.show`. size: columns and rows in character cells, labels and legend included. The level axis ends at
+    least 15 % below the lowest level, so that its mark is not on the edge."""
     columns, rows = size[0] - LABEL_COLUMNS, size[1] - 1
-    levels = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
-    lowest_n = min([cap_n / LEAST_LEVEL_RATIO, *(0.85 * level for level in levels)])
+    levels_n = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
+    lowest_n = min([cap_n / MIN_AXIS_RATIO, *(0.85 * trial_level_n for trial_level_n in levels_n)])
     canvas = Canvas(columns, rows)
-    dots_per_trial = min(MAX_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(levels) - 1))
+    dots_per_trial = min(MAX_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(levels_n) - 1))
 
     def locate_level(trial_index: int, level_n: float) -> tuple[float, float]:
-        """Position (x, y) of a trial in dots: the cap is at the top, the lowest level at the bottom."""
+        """Compute the position (x, y) of a trial in dots: y is 1 at the cap, and canvas.height - 2 at the lower end of
+        the axis."""
         depth = math.log(cap_n / level_n) / math.log(cap_n / lowest_n)
         return trial_index * dots_per_trial, 1 + depth * (canvas.height - 3)
 
     canvas.draw_line(locate_level(0, cap_n), (canvas.width - 1, locate_level(0, cap_n)[1]), dashed=True)
-    points_in_dots = [locate_level(trial_index, level) for trial_index, level in enumerate(levels)]
+    points_in_dots = [locate_level(trial_index, trial_level_n) for trial_index, trial_level_n in enumerate(levels_n)]
     for start, end in itertools.pairwise(points_in_dots):
         canvas.draw_line(start, end)
-    marks: dict[tuple[int, int], str] = {}
+    marks_by_cell: dict[tuple[int, int], str] = {}
     for (x, y), mark in zip(points_in_dots, [*map(_choose_mark, points), NEXT_MARK], strict=False):
         cell = (round(y) // 4, round(x) // 2)
-        if cell not in marks or _MARK_PRIORITY[mark] >= _MARK_PRIORITY[marks[cell]]:
-            marks[cell] = mark
-    labels = {0: cap_n, rows - 1: lowest_n}
-    if levels:
-        labels[round(points_in_dots[-1][1]) // 4] = levels[-1]
-    lines = [_style_row(row, text, marks, labels.get(row)) for row, text in enumerate(canvas.render_lines())]
+        if cell not in marks_by_cell or _MARK_PRIORITY[mark] >= _MARK_PRIORITY[marks_by_cell[cell]]:
+            marks_by_cell[cell] = mark
+    level_labels = {0: cap_n, rows - 1: lowest_n}
+    if levels_n:
+        level_labels[round(points_in_dots[-1][1]) // 4] = levels_n[-1]
+    lines = [
+        _style_row(row, text, marks_by_cell, level_labels.get(row)) for row, text in enumerate(canvas.render_lines())
+    ]
     legend = Content.styled(f"{'':{LABEL_COLUMNS}}{LEGEND}"[: size[0]], MUTED)
     return Content("\n").join([*lines, legend])
 
 
 def _choose_mark(point: StaircasePoint) -> str:
-    """Mark of a trial. A reversal by a right answer is a peak of the staircase, by a wrong answer a valley."""
+    """Choose the mark of a trial. A reversal by a right answer is a peak of the staircase, by a wrong answer a
+    valley."""
     if point.reversal:
         return PEAK_MARK if point.correct else VALLEY_MARK
     return RIGHT_MARK if point.correct else WRONG_MARK
 
 
 def _style_row(row: int, text: str, marks: dict[tuple[int, int], str], label_n: float | None) -> Content:
-    """A row of characters as styled text, with its level label (N) before it and marks in place of their cells."""
+    """Convert a row of characters to styled text, with its level label (N; none for None) before it and marks in place
+    of their cells."""
     label = f"{label_n:5.3g} N" if label_n is not None else ""
     parts: list[Content | str | tuple[str, str]] = [(f"{label:>{LABEL_COLUMNS - 1}} ", MUTED)]
     for column, character in enumerate(text):
         mark = marks.get((row, column))
-        parts.append(character if mark is None else (mark, _STYLES[mark]))
+        parts.append(character if mark is None else (mark, _MARK_STYLES[mark]))
     return Content.assemble(*parts)

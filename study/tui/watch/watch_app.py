@@ -57,7 +57,7 @@ class WatchApp(App[None]):
         install_exit_handlers(self, self.exit)
         self.push_screen(WatchScreen(self._source, self._send_request, self._clock_s))
 
-    def on_watch_screen_left(self) -> None:
+    def on_watch_screen_closed(self) -> None:
         self.exit()
 
     def action_next_theme(self) -> None:

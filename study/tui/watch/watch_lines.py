@@ -1,6 +1,7 @@
-"""Format a running session as lines of text, for `hapteq watch --plain` and for a terminal without a screen program.
+"""Format the state of a running session as lines of text, for `hapteq watch --plain`, which works without a full-screen
+terminal.
 
-Called by `study.cli.watch`. `format_changes` gives one line for each difference between two views, `format_view` the
+Called by `study.cli.watch`. `format_changes` gives a line for each difference between two views, `format_view` the
 whole view. What a view may contain, so that the experimenter cannot give away an answer, is decided in `watch_view`.
 """
 
@@ -31,12 +32,14 @@ LABEL_CELLS = 11
 
 
 def format_changes(previous: WatchView | None, current: WatchView) -> list[str]:
-    """Format one line for each change from one view to the next: alarms first, each with a bell, then trials, notes
-    (oldest first), drifts, the staircase and the state of the session. previous: None at the start: the whole view
-    follows the alarms."""
-    reported_alarms = {(alarm.kind, alarm.since) for alarm in previous.alarms} if previous is not None else set()
+    """Format one line for each change from one view to the next: new alarms first, each with a bell, then closed trials
+    and notes (oldest first), drifts, the staircase of another run, and the session's status. previous: None for the
+    first view: its alarms are followed by the whole view."""
+    reported_alarm_keys = {(alarm.kind, alarm.since) for alarm in previous.alarms} if previous is not None else set()
     lines = [
-        f"{BELL}ALARM {alarm.sentence}" for alarm in current.alarms if (alarm.kind, alarm.since) not in reported_alarms
+        f"{BELL}ALARM {alarm.sentence}"
+        for alarm in current.alarms
+        if (alarm.kind, alarm.since) not in reported_alarm_keys
     ]
     if previous is None:
         return [*lines, *format_view(current)]
@@ -45,8 +48,8 @@ def format_changes(previous: WatchView | None, current: WatchView) -> list[str]:
     lines += [
         f"Note by the {note.who}: {note.text}" for note in current.notes[: len(current.notes) - known_note_count][::-1]
     ]
-    known_drifts = {drift.sentence for drift in previous.drifts}
-    lines += [f"Drift: {drift.sentence}" for drift in current.drifts if drift.sentence not in known_drifts]
+    known_drift_sentences = {drift.sentence for drift in previous.drifts}
+    lines += [f"Drift: {drift.sentence}" for drift in current.drifts if drift.sentence not in known_drift_sentences]
     if current.shown_run != previous.shown_run and current.shown_run is not None:
         lines.append(format_staircase_title(current))
     if current.standing != previous.standing:
@@ -55,8 +58,8 @@ def format_changes(previous: WatchView | None, current: WatchView) -> list[str]:
 
 
 def format_view(view: WatchView) -> list[str]:
-    """Format the whole view: a labelled line for each of its parts, with the three latest trials and the three latest
-    notes."""
+    """Format the whole view: a labelled line for each of its parts, with the three latest trials and notes, latest
+    first."""
     lines = [
         f"{STATUS_SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
         f"Protocol   {view.protocol}; {view.answers} answers",
@@ -85,21 +88,21 @@ def format_view(view: WatchView) -> list[str]:
 
 
 def _select_new_trials(previous: WatchView, current: WatchView) -> list[ClosedTrial]:
-    """Select the trials that were not in the previous view, oldest first. A trial that is still being measured is
-    reported from a later view. The latest trial of each view comes first."""
-    reported_trials = {
-        (trial.run, trial.trial, trial.attempt) for trial in previous.last if trial.status != "measuring"
-    }
+    """Select the trials that were closed since the previous view, oldest first. A trial that is still being measured is
+    left to a later view. Both views list their latest trial first."""
+    reported_keys = {(trial.run, trial.trial, trial.attempt) for trial in previous.last if trial.status != "measuring"}
     unreported_trials = [
         trial
         for trial in current.last
-        if (trial.run, trial.trial, trial.attempt) not in reported_trials and trial.status != "measuring"
+        if (trial.run, trial.trial, trial.attempt) not in reported_keys and trial.status != "measuring"
     ]
     # A view holds the latest trials only: one before the newest of the previous view was reported long ago.
-    newest_reported = (
+    newest_reported_key = (
         (previous.last[0].run, previous.last[0].trial, previous.last[0].attempt) if previous.last else (-1, 0, 0)
     )
-    return [trial for trial in unreported_trials[::-1] if (trial.run, trial.trial, trial.attempt) >= newest_reported]
+    return [
+        trial for trial in unreported_trials[::-1] if (trial.run, trial.trial, trial.attempt) >= newest_reported_key
+    ]
 
 
 def _format_trial(trial: ClosedTrial) -> str:

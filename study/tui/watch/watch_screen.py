@@ -1,7 +1,5 @@
-"""Screen of `hapteq watch`: the experimenter's view of a running session, without the direction of the open trial.
-
-It reads the session's files; it can request a stop or a pause, and add notes. Shown by `watch_app`, `watch_controller`.
-"""
+"""Screen of `hapteq watch`: the experimenter's view of a running session, without the direction of the open trial, with
+keys to request a stop or a pause and to add notes. Shown by `watch_app` and `watch_controller`."""
 
 from __future__ import annotations
 
@@ -87,7 +85,7 @@ def _make_key(alarm: Alarm) -> AlarmKey:
 
 
 POLL_EVERY_S = 0.1
-"""Interval (s) at which the session's files are read. Chosen."""
+"""Interval (s) at which the source is asked for a new view, and the alarms are updated. Chosen."""
 STOP_TIMEOUT_S = 2.0
 """Time (s) after which a stop without effect is an alarm. Chosen: a session reads requests twenty times a second."""
 STALE_AFTER_S = 3.0
@@ -105,8 +103,7 @@ class WatchMessage(Message):
 
 
 class WatchScreen(Screen[None]):
-    """The experimenter's view: status, alarms, staircase, last trials, runs, exposure and device; redrawn with each new
-    view. `BINDINGS` lists its keys."""
+    """The experimenter's view: status, alarms, staircase, trials, runs, exposure and device; redrawn with each view."""
 
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
@@ -123,8 +120,8 @@ class WatchScreen(Screen[None]):
     ]
     view: reactive[WatchView | None] = reactive(None)
 
-    class Left(Message):
-        """Sent when the experimenter closes the view; the session continues."""
+    class Closed(Message):
+        """Posted when the experimenter closes the view; the session continues."""
 
     def __init__(
         self, source: WatchSource, deliver: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
@@ -195,6 +192,7 @@ class WatchScreen(Screen[None]):
         self.call_after_refresh(self._fill_tables)
 
     def _fill_tables(self) -> None:
+        """Fill the tables of runs and trials with the rows that fit into their panels; nothing without a view."""
         if self.view is None:
             return
         runs, trials = self.query_one("#runs", Static), self.query_one("#trials", Static)
@@ -202,6 +200,7 @@ class WatchScreen(Screen[None]):
         trials.update(watch_panels.format_trials(self.view, trials.content_size.height, trials.content_size.width))
 
     def _redraw(self) -> None:
+        """Update the alarms, ring the bell if it is due, and replace an expired message by the key guide."""
         now_s = self._clock_s()
         alarms = (*self._find_view_alarms(now_s), *self._filter_session_alarms())
         if self._alarm_book.update(alarms, now_s):
@@ -277,9 +276,10 @@ class WatchScreen(Screen[None]):
         self.app.push_screen(HelpScreen(HELP))
 
     def action_leave(self) -> None:
-        self.post_message(self.Left())
+        self.post_message(self.Closed())
 
     def _send_request(self, request: Request, text: str) -> None:
+        """Send a request and show `text`, or the reason why it was not sent or has no effect."""
         try:
             self._deliver(request)
         except StudyError as error:

@@ -39,15 +39,15 @@ def format_duration(duration_s: float) -> str:
     whole_seconds = int(duration_s)
     if whole_seconds < 60:
         return f"{whole_seconds} s"
-    minutes, seconds_left = divmod(whole_seconds, 60)
+    minutes, remaining_seconds = divmod(whole_seconds, 60)
     if minutes < 60:
-        return f"{minutes} min {seconds_left:02d} s"
+        return f"{minutes} min {remaining_seconds:02d} s"
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
 def describe_activity(view: WatchView) -> str:
-    """Describe the present activity and its duration, such as "trial 12 at 0.5 N: waiting for the answer, 4 s"; where
-    the view has a reason (the session does not run), return it."""
+    """Describe the present activity and its duration, such as "trial 12 at 0.5 N: waiting for the answer, 4 s". If the
+    session does not run, return the reason that the view states instead."""
     if view.reason:
         return view.reason
     trial, run = view.open_trial, view.present_run
@@ -124,23 +124,23 @@ def describe_catch_trials(view: WatchView) -> str:
 def describe_handle(view: WatchView) -> str:
     """Describe the distance of the handle from its start position (mm), and the largest distance at which a trial may
     start (mm) if there is a limit; "not read now" without a reading."""
-    live = view.live
-    if live is None or live.offset_mm is None:
+    live_state = view.live
+    if live_state is None or live_state.offset_mm is None:
         return "not read now"
-    if not live.handle_ready:
-        return f"{live.offset_mm:.1f} mm: OUT of place"
+    if not live_state.handle_ready:
+        return f"{live_state.offset_mm:.1f} mm: OUT of place"
     limit_text = f", {view.gate_radius_mm:g} allowed" if view.gate_radius_mm else ""
-    return f"{live.offset_mm:.1f} mm off{limit_text}"
+    return f"{live_state.offset_mm:.1f} mm off{limit_text}"
 
 
 def describe_sensor(view: WatchView) -> str:
     """Describe the magnitude of the measured acceleration (m/s²), and whether the sensor's signal is clipped; "not read
     now" without a reading."""
-    live = view.live
-    if live is None or live.acceleration_mps2 is None:
+    live_state = view.live
+    if live_state is None or live_state.acceleration_mps2 is None:
         return "not read now"
-    clipping_text = " CLIPPED" if live.sensor_clipped else ""
-    return f"{live.acceleration_mps2:.1f} m/s²{clipping_text}"
+    clipping_text = " CLIPPED" if live_state.sensor_clipped else ""
+    return f"{live_state.acceleration_mps2:.1f} m/s²{clipping_text}"
 
 
 def describe_device(view: WatchView) -> str:
@@ -156,10 +156,10 @@ def describe_device(view: WatchView) -> str:
 
 def describe_drifts(view: WatchView) -> str:
     """Describe the number of drifts that the probes show (friction, gain, delay, grip), and how many exceed their
-    limits; empty without probes."""
+    limits; "none in 3 probes" without a drift, empty without probes."""
     if not view.probes:
         return ""
-    over_limit = sum(drift.beyond for drift in view.drifts)
+    over_limit_count = sum(drift.beyond for drift in view.drifts)
     if not view.drifts:
         return f"none in {view.probes} probes"
-    return f"{len(view.drifts)} changed, {over_limit} beyond what is allowed"
+    return f"{len(view.drifts)} changed, {over_limit_count} beyond what is allowed"

@@ -29,10 +29,10 @@ class HandleTarget(Widget):
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
-        rows = max(1, min(height, width // 2))
-        drawing = _draw_target(self.view, 2 * rows, rows) if self.view is not None else []
+        rows = max(1, min(height, width // 2))  # a character cell is twice as high as wide
+        drawing_lines = _draw_target(self.view, 2 * rows, rows) if self.view is not None else []
         row = y - (height - rows) // 2
-        text = drawing[row] if 0 <= row < len(drawing) else ""
+        text = drawing_lines[row] if 0 <= row < len(drawing_lines) else ""
         return Strip([Segment((" " * ((width - 2 * rows) // 2) + text).ljust(width), self.rich_style + BOLD)], width)
 
 
@@ -42,19 +42,22 @@ BOLD = Style(bold=True)
 
 def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:
     """Draw the target as lines of braille characters. columns, rows: size in character cells. Lengths without a unit
-    are in braille dots; the circle is two dots thick, and the disc has 1/14 of the available radius, at least 2
-    dots."""
+    are in braille dots: the circle is two dots thick, the arms of the cross are 3 dots long, and the disc has 1/14 of
+    the available radius, at least 2 dots."""
     canvas = Canvas(columns, rows)
-    x, y = canvas.centre
-    max_distance = min(x, y)
-    dots_per_mm = 0.4 * max_distance / max(view.radius_mm, 1e-9)
+    centre_x, centre_y = canvas.centre
+    max_radius = min(centre_x, centre_y)
+    # 1e-9 avoids a division by zero if a trial may start at no distance.
+    dots_per_mm = 0.4 * max_radius / max(view.radius_mm, 1e-9)
     for radius in (dots_per_mm * view.radius_mm, dots_per_mm * view.radius_mm + 1):
-        canvas.draw_circle((x, y), radius)
-    canvas.draw_line((x - 3, y), (x + 3, y))
-    canvas.draw_line((x, y - 3), (x, y + 3))
+        canvas.draw_circle((centre_x, centre_y), radius)
+    canvas.draw_line((centre_x - 3, centre_y), (centre_x + 3, centre_y))
+    canvas.draw_line((centre_x, centre_y - 3), (centre_x, centre_y + 3))
     right_mm, up_mm = view.offset_mm
-    disc_radius = max(2.0, max_distance / 14)
+    disc_radius = max(2.0, max_radius / 14)
     distance = dots_per_mm * math.hypot(right_mm, up_mm)
-    inward_factor = min(1.0, (max_distance - disc_radius) / distance) if distance > 0 else 1.0
-    canvas.draw_disc((x + inward_factor * dots_per_mm * right_mm, y - inward_factor * dots_per_mm * up_mm), disc_radius)
+    inward_factor = min(1.0, (max_radius - disc_radius) / distance) if distance > 0 else 1.0
+    canvas.draw_disc(
+        (centre_x + inward_factor * dots_per_mm * right_mm, centre_y - inward_factor * dots_per_mm * up_mm), disc_radius
+    )
     return canvas.render_lines()

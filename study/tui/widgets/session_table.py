@@ -34,12 +34,13 @@ _FIXED_WIDTHS = {_STATUS_TITLE: 12, _RUNS_TITLE: 5, _ANSWERS_TITLE: 7}
 """Fixed widths (character cells) of columns with short entries: measuring every entry of a long list would take time.
 The protocol's column gets the remaining width, and its entries are wrapped."""
 _MIN_PROTOCOL_WIDTH, _CELL_PADDING = 10, 2
-"""Least width of the protocol's column, and padding of a cell, in character cells."""
+"""Least width of the protocol's column, chosen so that a wrapped name stays readable, and padding that the table adds
+to a column, in character cells."""
 
 BATCH_ROWS = 60
 """Number of rows that are added at once; more than a terminal usually shows. Chosen."""
 _BATCH_PAUSE_S = 0.01
-"""Pause (s) between two batches of rows, in which keys are handled. Chosen."""
+"""Pause (s) between two batches of rows, in which keys are handled. Chosen: too short to be noticed."""
 
 
 class SessionTable(DataTable[Content | str]):
@@ -67,11 +68,14 @@ class SessionTable(DataTable[Content | str]):
         self._fitted_width = 0
 
     def show(self, lines: tuple[SessionLine, ...]) -> None:
-        """Replace the listed sessions; the cursor stays on its session if that is still listed."""
+        """Replace the listed sessions; the cursor stays on its session if that is still listed, else it is on the first
+        row."""
         selected_line = self._selected_line
         self._lines = lines
-        offset, self._start_times = format_times_in_zone([line.begun_utc for line in lines], convert_to_machine_zone)
-        self._widths = self._fit_columns(f"{_START_TITLE} ({offset})" if offset else _START_TITLE)
+        utc_offset, self._start_times = format_times_in_zone(
+            [line.begun_utc for line in lines], convert_to_machine_zone
+        )
+        self._widths = self._fit_columns(f"{_START_TITLE} ({utc_offset})" if utc_offset else _START_TITLE)
         self.clear(columns=True)
         for title, width in self._widths.items():
             self.add_column(title, width=width)
@@ -83,9 +87,10 @@ class SessionTable(DataTable[Content | str]):
             self.show(self._lines)
 
     def _fit_columns(self, start_title: str) -> dict[str, int]:
-        """Compute the column widths (cells) by title. The column of answers is left out where the protocols do not fit
-        on one line, that of runs where less than `_MIN_PROTOCOL_WIDTH` remains: the start screen states both below the
-        list. start_title: title of the column of times."""
+        """Compute the column widths (cells) by title, and store the table's width for which they hold. The column of
+        answers is left out where the protocols do not fit on one line, that of runs where less than
+        `_MIN_PROTOCOL_WIDTH` remains: the start screen states both below the list. start_title: title of the column of
+        times."""
         self._fitted_width = self.size.width
         names, protocols = ([getattr(line, attribute) for line in self._lines] for attribute in ("name", "protocol"))
         widths = {_NAME_TITLE: max(map(len, (_NAME_TITLE, *names))), _STATUS_TITLE: _FIXED_WIDTHS[_STATUS_TITLE]}
@@ -95,8 +100,8 @@ class SessionTable(DataTable[Content | str]):
             _ANSWERS_TITLE: _FIXED_WIDTHS[_ANSWERS_TITLE],
         }
         protocol_width = max(map(len, (_PROTOCOL_TITLE, *protocols)))
-        for title, least_width in ((_ANSWERS_TITLE, protocol_width), (_RUNS_TITLE, _MIN_PROTOCOL_WIDTH)):
-            if self._compute_protocol_width(widths) < least_width:
+        for title, min_width in ((_ANSWERS_TITLE, protocol_width), (_RUNS_TITLE, _MIN_PROTOCOL_WIDTH)):
+            if self._compute_protocol_width(widths) < min_width:
                 del widths[title]
         return widths | {
             _PROTOCOL_TITLE: min(protocol_width, max(_MIN_PROTOCOL_WIDTH, self._compute_protocol_width(widths)))
@@ -113,9 +118,9 @@ class SessionTable(DataTable[Content | str]):
         selected_name: name of the session to put the cursor on; empty for none."""
         if lines is not self._lines:
             return  # the list was replaced since this call was scheduled
-        start = self.row_count
-        batch = lines[start : start + BATCH_ROWS]
-        for index, line in enumerate(batch, start=start):
+        first_row = self.row_count
+        batch = lines[first_row : first_row + BATCH_ROWS]
+        for index, line in enumerate(batch, start=first_row):
             # Wrapped here, because the table truncates an entry that is too wide.
             protocol_lines = wrap(line.protocol, self._widths[_PROTOCOL_TITLE])
             self.add_row(
@@ -167,7 +172,7 @@ class SessionTable(DataTable[Content | str]):
         """Format the cells of a row, for the columns in `_widths`; counts only of sessions that can be read.
         start_time: local time at which the session began; protocol: its name, wrapped into lines."""
         has_counts = line.standing in ("finished", "unfinished", "running")
-        runs = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS_TITLE in self._widths else ()
-        answers = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS_TITLE in self._widths else ()
+        runs_cells = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS_TITLE in self._widths else ()
+        answers_cells = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS_TITLE in self._widths else ()
         status = Content.styled(format_status(line.standing), STYLES[line.standing])
-        return Content(line.name), status, start_time, *runs, *answers, Content(protocol)
+        return Content(line.name), status, start_time, *runs_cells, *answers_cells, Content(protocol)

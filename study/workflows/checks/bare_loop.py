@@ -23,23 +23,23 @@ SOURCE = Path(__file__).with_name("bare_loop.c")
 COMPILERS = ("cc", "gcc", "clang")
 """C compilers, in the order in which they are looked up on the search path."""
 PRIORITY = 40
-"""Real-time priority (SCHED_FIFO) of the C loop, if requested: that of a device's loop
-(`study.devices.drive.real_time_class.PRIORITY`)."""
+"""Real-time priority (SCHED_FIFO) of the C loop, if requested. Must equal that of a device's loop,
+`study.devices.drive.real_time_class.PRIORITY`, so that both compete for the processor on equal terms."""
 
 ACCEPTED_RATIO = 1.5
 """Accepted ratio of the late ticks of the device's loop to those of the C loop: the device's loop has more work (safety
 layer). Heuristic."""
-STANDARD_ERRORS = 3.0
+ACCEPTED_STANDARD_ERRORS = 3.0
 """Number of standard errors within which a difference of the two counts is attributed to chance; late ticks are taken
-as independent events (Poisson)."""
+as independent events (Poisson). Chosen: a loop at the accepted ratio is reported about once in 1000 measurements."""
 
 COMPILE_TIMEOUT_S = 120.0
-"""Time limit of the compilation (s)."""
+"""Time limit of the compilation (s). Chosen: long enough for a busy computer."""
 EXTRA_TIMEOUT_S = 30.0
-"""Time (s) after the planned end of the C loop at which it is taken to have failed."""
-NAME = "Bare C loop"
+"""Time (s) after the planned end of the C loop at which it is taken to have failed. Chosen."""
+FINDING_NAME = "Bare C loop"
 """Name of the finding in the report."""
-ADVICE = (
+LATE_TICKS_ADVICE = (
     "The computer can do better than this loop did: close other programs, measure again, and report it if it persists."
 )
 """Advice in the finding if the device's loop has too many late ticks."""
@@ -69,12 +69,12 @@ class BareLoopRun:
 
 
 @contextlib.contextmanager
-def run_bare_loop_in_parallel(seconds: float, rate_hz: float, raised_priority: bool) -> Iterator[BareLoopRun]:
+def run_bare_loop_in_parallel(duration_s: float, rate_hz: float, raised_priority: bool) -> Iterator[BareLoopRun]:
     """Context manager that runs the C loop while the `with` block is executed. At the end of the block it waits for the
-    end of the loop and stores the result in the `BareLoopRun`.
+    end of the loop and stores the result in the `BareLoopRun`; after an exception in the block the loop is killed.
 
-    seconds: duration of the loop. rate_hz: its tick rate. raised_priority: whether to request real-time priority. A
-    missing compiler or a failed start raises no exception: `BareLoopRun.failure_reason` states it.
+    duration_s: duration of the loop (s). rate_hz: its tick rate. raised_priority: whether to request real-time
+    priority. A missing compiler or a failed start raises no exception: `BareLoopRun.failure_reason` states it.
     """
     run = BareLoopRun()
     with tempfile.TemporaryDirectory() as folder:
@@ -82,7 +82,7 @@ def run_bare_loop_in_parallel(seconds: float, rate_hz: float, raised_priority: b
         if program is None:
             yield run
             return
-        command = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if raised_priority else 0)]
+        command = [str(program), f"{duration_s:g}", f"{rate_hz:g}", str(PRIORITY if raised_priority else 0)]
         try:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
         except OSError as error:
@@ -92,18 +92,18 @@ def run_bare_loop_in_parallel(seconds: float, rate_hz: float, raised_priority: b
         with process:
             try:
                 yield run
-                _read_timing(process, seconds, run)
+                _read_timing(process, duration_s, run)
             finally:
                 process.kill()
 
 
-def _read_timing(process: "subprocess.Popen[bytes]", seconds: float, run: BareLoopRun) -> None:
+def _read_timing(process: "subprocess.Popen[bytes]", duration_s: float, run: BareLoopRun) -> None:
     """Wait for the end of the C loop and read what it prints: ticks, late ticks, largest lateness (s), and priority
     (0 = not granted)."""
     try:
-        output, _ = process.communicate(timeout=seconds + EXTRA_TIMEOUT_S)
-        ticks, late, latest_s, granted = output.split()
-        run.result = BareLoopTiming(int(ticks), int(late), float(latest_s), int(granted) > 0)
+        output, _ = process.communicate(timeout=duration_s + EXTRA_TIMEOUT_S)
+        ticks, late_ticks, latest_s, granted_priority = output.split()
+        run.result = BareLoopTiming(int(ticks), int(late_ticks), float(latest_s), int(granted_priority) > 0)
     except (subprocess.TimeoutExpired, ValueError):
         run.failure_reason = "it gave no result"
 
@@ -112,29 +112,29 @@ def compare_with_bare_loop(late_ticks: int, ticks: int, run: BareLoopRun) -> Dev
     """Compare the late ticks of the device's loop with those of the C loop. late_ticks, ticks: counts of the device's
     loop, missed ticks included. Too many late ticks give a warning, which prevents no session."""
     if run.result is None:
-        return DeviceFinding(NAME, f"not compared: {run.failure_reason}", fine=True)
+        return DeviceFinding(FINDING_NAME, f"not compared: {run.failure_reason}", fine=True)
     reference = run.result
     late_limit = _compute_late_limit(ACCEPTED_RATIO * reference.late_ticks * ticks / max(reference.ticks, 1))
     fine = late_ticks <= late_limit
-    value = (
+    comparison_text = (
         f"{reference.late_ticks} of {reference.ticks} late "
         f"({reference.late_ticks / max(reference.ticks, 1):.2%}) at the same time, the latest by "
         f"{1000 * reference.latest_s:.1f} ms; this loop: {late_ticks} of {ticks} "
         f"({late_ticks / max(ticks, 1):.2%}), where up to {late_limit} are fine ({ACCEPTED_RATIO:g} times as many, and "
         "chance)"
     )
-    return DeviceFinding(NAME, value, fine, "" if fine else ADVICE, warning=not fine)
+    return DeviceFinding(FINDING_NAME, comparison_text, fine, "" if fine else LATE_TICKS_ADVICE, warning=not fine)
 
 
-def _compute_late_limit(expected: float) -> int:
-    """Largest accepted count n of late ticks of the device's loop, if `expected` = r k, with r = ACCEPTED_RATIO and the
-    count k of the C loop.
+def _compute_late_limit(expected_late_ticks: float) -> int:
+    """Compute the largest accepted count n of late ticks of the device's loop. expected_late_ticks: r k, with r =
+    ACCEPTED_RATIO and the count k of the C loop, scaled to the number of ticks of the device's loop.
 
-    n is the larger root of (n - r k)² = STANDARD_ERRORS² (n + r² k): the variance of a Poisson count is estimated by
-    the count itself, and that of r k by r² k = r expected, for loops of equal length.
+    n is the larger root of (n - r k)² = z² (n + r² k), z = ACCEPTED_STANDARD_ERRORS: the variance of a Poisson count is
+    estimated by the count itself, and that of r k by r² k, for loops of equal length.
     """
-    root_term = math.sqrt((1.0 + ACCEPTED_RATIO) * expected + STANDARD_ERRORS**2 / 4.0)
-    return math.floor(expected + STANDARD_ERRORS**2 / 2.0 + STANDARD_ERRORS * root_term)
+    root_term = math.sqrt((1.0 + ACCEPTED_RATIO) * expected_late_ticks + ACCEPTED_STANDARD_ERRORS**2 / 4.0)
+    return math.floor(expected_late_ticks + ACCEPTED_STANDARD_ERRORS**2 / 2.0 + ACCEPTED_STANDARD_ERRORS * root_term)
 
 
 def _compile_loop(folder: Path, run: BareLoopRun) -> Path | None:
@@ -161,7 +161,7 @@ def _compile_loop(folder: Path, run: BareLoopRun) -> Path | None:
 
 
 def _find_compiler() -> list[str] | None:
-    """Command of a C compiler: of the system, else of the Python package `ziglang`; None without either."""
+    """Find the command of a C compiler: of the system, else of the Python package `ziglang`; None without either."""
     compiler_path = next((path for name in COMPILERS if (path := shutil.which(name))), None)
     if compiler_path is not None:
         return [compiler_path]

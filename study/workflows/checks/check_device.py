@@ -16,9 +16,9 @@ from study.session.stimulus.limits import describe_forces
 from study.session.views.participant_views import DeviceFinding, DeviceReport
 
 READING_COUNT = 50
-"""Number of readings. Chosen."""
+"""Number of readings. Chosen: enough for a mean position and a noise level, within half a second."""
 READING_INTERVAL_S = 0.01
-"""Interval between two readings (s). Chosen."""
+"""Interval between two readings (s). Chosen: ten ticks of the device's loop, so that every reading is a new one."""
 
 MIN_ANSWER_FRACTION = 0.9
 """Smallest accepted fraction of valid readings (with a position or an acceleration). Chosen below 1, because a busy
@@ -29,8 +29,8 @@ MAX_DISTANCE_MM = 20.0
 of the shipped protocols pulls with a few newtons."""
 
 MAX_NOISE_MPS2 = 1.0
-"""Largest accepted acceleration at rest (m/s², rms over the three axes). The noise of an accelerometer over 500 Hz is
-about 0.1 m/s²; a trembling hand on the handle gives up to 0.5."""
+"""Largest accepted acceleration at rest (m/s², root of the summed variances of the three axes). Chosen above the
+typical noise of an accelerometer over 500 Hz, about 0.1 m/s², and the tremor of a hand on the handle, up to 0.5."""
 
 REQUIRED_RATE_HZ = 1000.0
 """Sample rate of the device's loop for which stimuli are made (Hz)."""
@@ -61,7 +61,9 @@ def check_device(
     for _ in range(READING_COUNT):
         readings.append(device.look())
         clock.sleep(READING_INTERVAL_S)
-    valid_readings = [look for look in readings if look.position_m is not None or look.acceleration_mps2 is not None]
+    valid_readings = [
+        reading for reading in readings if reading.position_m is not None or reading.acceleration_mps2 is not None
+    ]
     sensor_findings = (_check_handle(valid_readings, place_m),) if valid_readings else ()
     if valid_readings and with_sensor:
         sensor_findings = (
@@ -90,15 +92,15 @@ def _check_kind(info: DeviceInfo) -> DeviceFinding:
 
 
 def _check_answers(valid_count: int) -> DeviceFinding:
-    """Judge the number of valid readings out of `READING_COUNT`."""
+    """Judge the number of valid readings out of `READING_COUNT`; fine from `MIN_ANSWER_FRACTION` on."""
     fine = valid_count >= MIN_ANSWER_FRACTION * READING_COUNT
     advice = "Check its power and its cable, then open it again."
     return DeviceFinding("Answers", f"{valid_count} of {READING_COUNT} times", fine, "" if fine else advice)
 
 
 def _check_handle(valid_readings: list[Look], place_m: tuple[float, float, float]) -> DeviceFinding:
-    """Judge the distance of the mean position from the place where trials start (m); too few positions indicate an
-    uncalibrated device."""
+    """Judge the distance of the mean position from the place where trials start (x, y, z; m), at most
+    `MAX_DISTANCE_MM`; too few positions indicate an uncalibrated device."""
     positions_m = [reading.position_m for reading in valid_readings if reading.position_m is not None]
     if len(positions_m) < MIN_ANSWER_FRACTION * len(valid_readings):
         advice = "Switch the device off and on, and calibrate it as its manual says."
@@ -114,12 +116,12 @@ def _check_accelerometer(valid_readings: list[Look]) -> DeviceFinding:
     accelerations_mps2 = np.array(
         [reading.acceleration_mps2 for reading in valid_readings if reading.acceleration_mps2 is not None]
     )
-    clipped = sum(reading.sensor_clipped for reading in valid_readings)
+    clipped_count = sum(reading.sensor_clipped for reading in valid_readings)
     if len(accelerations_mps2) < MIN_ANSWER_FRACTION * len(valid_readings):
         return _report_accelerometer_problem("its reading is no number", "Check the sensor's cable and its power.")
-    if clipped:
+    if clipped_count:
         return _report_accelerometer_problem(
-            f"at its limit in {clipped} of {len(valid_readings)} readings",
+            f"at its limit in {clipped_count} of {len(valid_readings)} readings",
             "Lay the handle at rest. If that does not help, check the sensor's range, cable and mounting.",
         )
     return _check_noise(accelerations_mps2)
@@ -150,9 +152,9 @@ def _check_noise(accelerations_mps2: FloatArray) -> DeviceFinding:
     return DeviceFinding("Accelerometer", f"{rms_mps2:.2f} m/s² rms at rest", fine=True)
 
 
-def _report_accelerometer_problem(value: str, advice: str) -> DeviceFinding:
-    """Make the finding of a faulty accelerometer. value: the fault in words."""
-    return DeviceFinding("Accelerometer", value, fine=False, advice=advice)
+def _report_accelerometer_problem(problem_text: str, advice: str) -> DeviceFinding:
+    """Make the finding of a faulty accelerometer. problem_text: the fault in words."""
+    return DeviceFinding("Accelerometer", problem_text, fine=False, advice=advice)
 
 
 def _check_rate(info: DeviceInfo) -> DeviceFinding:

@@ -31,7 +31,8 @@ ZERO_FORCE_PERIOD_S = 0.1
 FADE_S = 0.05
 """Duration of fade-in and fade-out of the held stimulus (s); without effect on zero force."""
 KEEP_ALIVE_TICKS = 50
-"""Number of ticks between two keep-alive calls, which reset the device's watchdog: 50 ms at 1 kHz."""
+"""Number of ticks between two keep-alive calls, which reset the device's watchdog: 50 ms at 1 kHz. Chosen well below
+the watchdog times of the shipped protocols."""
 
 COMPUTER_CHECK_S = 1.0
 """Duration of the check before a sitting (s). At 1 kHz it has a thousand wake-ups, enough for a 99th percentile: about
@@ -40,10 +41,10 @@ ten are later."""
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Result of `check_timing`: lateness of the device's loop and of the program's wake-ups."""
+    """Result of `check_timing`."""
 
     seconds: float
-    """Requested duration."""
+    """Requested duration of the measurement (s)."""
     health: Health
     """Counts of the device's own loop: ticks, late and missed ticks, fault."""
     lateness: Lateness
@@ -55,24 +56,27 @@ class Timing:
 def check_timing(
     device: Device,
     clock: Clock,
-    seconds: float,
+    duration_s: float,
     on_progress: Callable[[float], None],
     load_per_processor: float | None = None,
 ) -> Timing:
-    """Hold zero force for `seconds`, which the device's settings must allow, and judge the timing.
+    """Hold zero force for duration_s, and judge the timing. The device's limit of a hold (`Limits.longest_hold_s`) must
+    not be shorter.
 
     on_progress: called with the seconds done. load_per_processor: measured before; None if unknown. The force is zero
     only if the device was opened without a centring spring. Raises DeviceError for a lost device.
     """
     rate_hz = device.info.sample_rate_hz
-    zeros = Signal(np.zeros((round(ZERO_FORCE_PERIOD_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
-    device.hold(HeldStimulus(zeros, FADE_S, FADE_S, "linear"))
+    zero_forces = Signal(np.zeros((round(ZERO_FORCE_PERIOD_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
+    device.hold(HeldStimulus(zero_forces, FADE_S, FADE_S, "linear"))
     try:
-        late_s = _measure_loop_lateness_s(device, clock, seconds, partial(_keep_device_alive, device, on_progress))
+        lateness_s = _measure_loop_lateness_s(
+            device, clock, duration_s, partial(_keep_device_alive, device, on_progress)
+        )
     finally:
         health = device.release().health
-    lateness = measure_lateness(late_s, rate_hz)
-    return Timing(seconds, health, lateness, _judge_timing(device, seconds, health, lateness, load_per_processor))
+    lateness = measure_lateness(lateness_s, rate_hz)
+    return Timing(duration_s, health, lateness, _judge_timing(device, duration_s, health, lateness, load_per_processor))
 
 
 def check_computer(
@@ -80,33 +84,33 @@ def check_computer(
 ) -> tuple[DeviceFinding, ...]:
     """Check the computer before a sitting: wake-ups at rate_hz, load, and for a real device the priority of the loop.
     Takes `COMPUTER_CHECK_S`; no device is commanded. load_per_processor: None if unknown."""
-    late_s = measure_wake_lateness_s(clock, rate_hz, COMPUTER_CHECK_S, lambda done_s: True)
-    lateness = judge_lateness(measure_lateness(np.array(late_s), rate_hz), simulated)
-    return (lateness, judge_load(load_per_processor), *(() if simulated else (check_loop_priority(),)))
+    lateness_s = measure_wake_lateness_s(clock, rate_hz, COMPUTER_CHECK_S, lambda done_s: True)
+    lateness_finding = judge_lateness(measure_lateness(np.array(lateness_s), rate_hz), simulated)
+    return (lateness_finding, judge_load(load_per_processor), *(() if simulated else (check_loop_priority(),)))
 
 
 def measure_wake_lateness_s(
-    clock: Clock, rate_hz: float, seconds: float, should_continue: Callable[[float], bool]
+    clock: Clock, rate_hz: float, duration_s: float, should_continue: Callable[[float], bool]
 ) -> list[float]:
-    """Sleep until each tick (1 / rate_hz) for `seconds`. Returns the lateness of each wake-up (s), not negative.
+    """Sleep until each tick (1 / rate_hz) for duration_s. Returns the lateness of each wake-up (s), not negative.
     `should_continue(done_s)` is called every `KEEP_ALIVE_TICKS` wake-ups; the measurement stops if it returns False."""
-    late_s: list[float] = []
+    lateness_s: list[float] = []
     tick_s = 1.0 / rate_hz
     started_s = clock.now_s()
-    while len(late_s) * tick_s < seconds:
-        due_s = started_s + (len(late_s) + 1) * tick_s
+    while len(lateness_s) * tick_s < duration_s:
+        due_s = started_s + (len(lateness_s) + 1) * tick_s
         clock.sleep(due_s - clock.now_s())
-        late_s.append(max(0.0, clock.now_s() - due_s))
-        if len(late_s) % KEEP_ALIVE_TICKS == 0 and not should_continue(len(late_s) * tick_s):
+        lateness_s.append(max(0.0, clock.now_s() - due_s))
+        if len(lateness_s) % KEEP_ALIVE_TICKS == 0 and not should_continue(len(lateness_s) * tick_s):
             break
-    return late_s
+    return lateness_s
 
 
 def _measure_loop_lateness_s(
-    device: Device, clock: Clock, seconds: float, should_continue: Callable[[float], bool]
+    device: Device, clock: Clock, duration_s: float, should_continue: Callable[[float], bool]
 ) -> FloatArray:
     """Measure the lateness (s), (n,), of the readings of a real device's loop, from the time stamps of its telemetry;
-    without telemetry, and for a simulated device, of this program's wake-ups. A single value, `seconds`, where no tick
+    without telemetry, and for a simulated device, of this program's wake-ups. A single value, duration_s, where no tick
     was read.
 
     The lateness of tick k is its time stamp minus k / rate, relative to the smallest such difference. After missed
@@ -114,22 +118,22 @@ def _measure_loop_lateness_s(
     """
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated or not device.telemetry:
-        return np.array(measure_wake_lateness_s(clock, rate_hz, seconds, should_continue))
-    reader, after_due_s, missed_counts = open_telemetry(device.telemetry), [], []
+        return np.array(measure_wake_lateness_s(clock, rate_hz, duration_s, should_continue))
+    reader, raw_lateness_blocks_s, missed_count_blocks = open_telemetry(device.telemetry), [], []
     started_s = clock.now_s()
-    while should_continue(done_s := clock.now_s() - started_s) and done_s < seconds:
+    while should_continue(done_s := clock.now_s() - started_s) and done_s < duration_s:
         clock.sleep(KEEP_ALIVE_TICKS / rate_hz)
         ticks = reader.read()
-        after_due_s.append(ticks.time_s - ticks.tick / rate_hz)
-        missed_counts.append(ticks.missed)
-    raw_lateness_s = np.concatenate(after_due_s or [np.zeros(0)])
+        raw_lateness_blocks_s.append(ticks.time_s - ticks.tick / rate_hz)
+        missed_count_blocks.append(ticks.missed)
+    raw_lateness_s = np.concatenate(raw_lateness_blocks_s or [np.zeros(0)])
     if not len(raw_lateness_s):
-        return np.array([seconds])  # no tick was read: late by the whole time
-    missed_total: FloatArray = np.concatenate(missed_counts)
-    late_s: FloatArray = (
-        raw_lateness_s - raw_lateness_s.min() + np.diff(missed_total, prepend=missed_total[:1]) / rate_hz
+        return np.array([duration_s])  # no tick was read: late by the whole time
+    cumulative_missed: FloatArray = np.concatenate(missed_count_blocks)
+    lateness_s: FloatArray = (
+        raw_lateness_s - raw_lateness_s.min() + np.diff(cumulative_missed, prepend=cumulative_missed[:1]) / rate_hz
     )
-    return late_s
+    return lateness_s
 
 
 def _keep_device_alive(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
@@ -141,13 +145,13 @@ def _keep_device_alive(device: Device, on_progress: Callable[[float], None], don
 
 
 def _judge_timing(
-    device: Device, seconds: float, health: Health, lateness: Lateness, load_per_processor: float | None
+    device: Device, duration_s: float, health: Health, lateness: Lateness, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
     """Judge loop, missed ticks, for a real device late ticks, lateness, and whether no force was commanded."""
     simulated, late_ticks = device.info.simulated, health.late_ticks + health.missed_ticks
     late_finding = judge_late_ticks(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
     return (
-        _judge_loop(seconds, health),
+        _judge_loop(duration_s, health),
         judge_missed_ticks(health.missed_ticks, health.ticks, simulated, load_per_processor),
         *(() if simulated else (late_finding,)),
         judge_lateness(lateness, simulated),
@@ -155,9 +159,9 @@ def _judge_timing(
     )
 
 
-def _judge_loop(seconds: float, health: Health) -> DeviceFinding:
+def _judge_loop(duration_s: float, health: Health) -> DeviceFinding:
     """Judge whether the loop held the zero force to the end, without a fault of the device."""
     if health.fault is not Fault.NONE:
         advice = "Check the device's power and cable and what else runs on this computer, then measure again."
         return DeviceFinding("Loop", f"it let go: {health.fault.value}", fine=False, advice=advice)
-    return DeviceFinding("Loop", f"{health.ticks} ticks in {seconds:g} s, zero force held to the end", fine=True)
+    return DeviceFinding("Loop", f"{health.ticks} ticks in {duration_s:g} s, zero force held to the end", fine=True)

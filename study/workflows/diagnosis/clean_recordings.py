@@ -28,13 +28,13 @@ class InputWithReference:
 
 
 def read_clean_reference(
-    diagnosis_input: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int
+    diagnosis_input: DiagnosisInput, sources: Sequence[Path], clean_paths: Sequence[Path], seed: int
 ) -> InputWithReference:
-    """Read the reference and reduce both inputs to their common signals. sources: files of `diagnosis_input`; clean:
-    reference recordings, or the folder of a session; seed: of the choice among a session's trials (`read_input`).
-    Raises StudyError where a file is in both, cannot be read, or channels, units or rates differ."""
+    """Read the reference and reduce both inputs to their common signals. sources: files of `diagnosis_input`.
+    clean_paths: reference recordings, or the folder of a session. seed: for the choice among a session's trials
+    (`read_input`). Raises StudyError where a file is in both, cannot be read, or channels, units or rates differ."""
     diagnosed_paths = {source.resolve() for source in sources}
-    if (shared_path := next((path for path in clean if path.resolve() in diagnosed_paths), None)) is not None:
+    if (shared_path := next((path for path in clean_paths if path.resolve() in diagnosed_paths), None)) is not None:
         raise StudyError(
             f"{shared_path} cannot be diagnosed and be clean at the same time",
             "Its differences from the model would be learned as those of a device in order, so that none would be "
@@ -42,7 +42,7 @@ def read_clean_reference(
             "Give another recording with --clean, of the device when it was in order.",
             saved="Nothing was written.",
         )
-    clean_input = read_input(clean, seed, constants=diagnosis_input.constants)
+    clean_input = read_input(clean_paths, seed, constants=diagnosis_input.constants)
     try:
         require_comparable(
             (diagnosis_input.recordings[0], *clean_input.recordings),

@@ -75,7 +75,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         **gather_provenance(parents=diagnosis_input.parents).as_dict(),
         "structure": choice.fit.kind,
         "reason": choice.reason,
-        "compared": choice.fit.compared,
+        "compared": choice.fit.error_signal,
         "held_out_error": max(choice.fit.held_out),
     }
     write_mechanical_model(
@@ -95,7 +95,7 @@ def format_first_model(first_model: FittedFirstModel) -> tuple[str, ...]:
     choice, fit = first_model.choice, first_model.choice.fit
     parameter_lines = [_format_parameter(parameter) for parameter in fit.parameters]
     error_lines = [
-        f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
+        f"Held-out error at {name}: {100 * error:.3g} % of the {fit.error_signal}"
         for name, error in zip(fit.channels, fit.held_out, strict=True)
     ]
     attempt_lines = [
@@ -125,7 +125,7 @@ def summarise_first_model(first_model: FittedFirstModel) -> dict[str, Any]:
              else [parameter.value - parameter.half_width, parameter.value + parameter.half_width]}
             for parameter in fit.parameters
         ],
-        "compared": fit.compared,
+        "compared": fit.error_signal,
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
         "tried": [
             {"structure": attempt.kind, "error": attempt.error, "why_not": attempt.refusal} for attempt in choice.tried

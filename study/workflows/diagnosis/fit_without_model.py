@@ -1,7 +1,7 @@
 """Fit of a first mechanical model to the recordings of a diagnosis to which no model was given.
 
 Runs the fits of `analysis.diagnosis.first_model` and converts their error for unsuitable recordings into a StudyError
-with a remedy. Called by `diagnose_recordings` and `study.evaluation.real`.
+with a remedy. Called by `diagnose_recordings` and `study.evaluation.real.diagnose_real`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,20 +25,21 @@ MODEL_REMEDY = "Give a model of the device alone with --model, or a recording th
 def fit_first_model(
     diagnosis_input: DiagnosisInput,
     excluded_effects: Sequence[str],
-    bounds: tuple[TimeBudget, Guard],
+    time_budget_and_guard: tuple[TimeBudget, Guard],
     on_progress: Progress,
     discovery: bool = True,
 ) -> FirstModel:
     """Fit a first model by force balance or, if that crashes or gives no model, a linear one to the spectra.
-    excluded_effects: names of effects that are left out. discovery: whether laws outside the catalogue are tried.
-    bounds: function that tells whether time is left, and the guard that catches crashes. on_progress: called with the
-    step's name and its completed share. Raises StudyError for unsuitable recordings."""
-    time_left, guard = bounds
-    excluded = (*excluded_effects, *(() if discovery else FREE_LAWS))
+    excluded_effects: names of effects that are left out. on_progress: called with the step's name and its completed
+    share, 0 to 1. discovery: whether laws outside the catalogue are tried. Raises StudyError for unsuitable
+    recordings."""
+    has_time_left, guard = time_budget_and_guard  # the time limit of the search, and the guard that catches crashes
+    excluded_names = (*excluded_effects, *(() if discovery else FREE_LAWS))
 
     def fit_by_balance() -> FirstModel | None:
+        """Fit by force balance; None where this gives no model."""
         return fit_without_model.fit_first_model(
-            diagnosis_input.recordings, excluded, time_left, on_progress, map_forked
+            diagnosis_input.recordings, excluded_names, has_time_left, on_progress, map_forked
         )
 
     with _translate_refusals():
@@ -51,8 +52,8 @@ def fit_first_model(
 def fit_linear_model(
     diagnosis_input: DiagnosisInput, on_progress: Callable[[float], None], origin: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """Fit a linear model to the spectra; returns it with remarks. on_progress: called with the completed share, 0 to 1.
-    origin: origin of the recordings, for the model's name. Raises StudyError for unsuitable recordings."""
+    """Fit a linear model to the spectra. Returns the model and remarks. on_progress: called with the completed share, 0
+    to 1. origin: origin of the recordings, for the model's name. Raises StudyError for unsuitable recordings."""
     with _translate_refusals():
         return fit_without_model.fit_first_linear_model(diagnosis_input.recordings, on_progress, origin)
 

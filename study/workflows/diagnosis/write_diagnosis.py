@@ -1,7 +1,7 @@
-"""Writes the result folder of a diagnosis: document (JSON), improved model, figures and report (HTML), in this order.
+"""Write the result folder of a diagnosis: document (JSON), improved model, figures and report (HTML), in this order.
 
-Figures are drawn in parallel. A figure whose drawing crashes is left out, with a remark in the report. Called by
-`diagnose_recordings` and `study.evaluation.real.real_recordings`.
+A `Picture` is a figure with title and caption; a drawing makes one or more. Drawings run in parallel; one that crashes
+is left out, with a remark in the report. Called by `diagnose_recordings` and `study.evaluation.real.real_recordings`.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,11 +25,11 @@ from study.workflows.picture_files import DrawnPicture, draw_picture, write_draw
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
     """Write all files into an existing `folder`. parents: input files, for the provenance. Returns the findings with a
-    remark for each figure that could not be drawn. Raises StudyError where a file exists or cannot be written."""
+    remark for each drawing that crashed. Raises StudyError where a file exists or cannot be written."""
     provenance = gather_provenance(parents=parents)
     write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, provenance)
-    improved = replace(findings.improved, provenance=provenance.as_dict())
-    write_mechanical_model(folder / MODEL_NAME, improved)
+    improved_model = replace(findings.improved, provenance=provenance.as_dict())
+    write_mechanical_model(folder / MODEL_NAME, improved_model)
     guard = make_crash_guard()
     drawing_parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in list_drawings(findings)]
     drawn_pictures = [
@@ -48,7 +48,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
 
 
 def _draw_pictures(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
-    """Draw the pictures of one drawing part."""
+    """Make the pictures of a drawing and render them, in a worker process."""
     return [draw_picture(picture) for picture in draw()]
 
 

@@ -1,5 +1,5 @@
-"""Identification of a device's nominal mechanical model (digital twin) from recordings made for this purpose; the
-workflow of `hapteq twin`.
+"""Identify a device's nominal mechanical model (digital twin) from recordings made for this purpose. Called by
+`study.cli.twin` (`hapteq twin`).
 
 Steps: record multisines at two amplitudes well above friction; fit masses, dampings, stiffnesses and modes to the
 stronger recording; estimate the equivalent viscous damping of dry friction from the increase of damping at the lower
@@ -25,7 +25,7 @@ from equalizer.identification.mechanical.rigid_body import RigidBody, fit_rigid_
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
-from study.devices.opening import CALIBRATED, SIMULATED
+from study.devices.opening import CALIBRATED_PREFIX, SIMULATED
 from study.errors import StudyError, WrongUseError
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
@@ -47,8 +47,8 @@ filter capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
 """Assumed bandwidth (Hz) of the motors' current loops: a typical value, not measured."""
 WEAKER_AMPLITUDE_RATIO = 0.6
-"""Amplitude of the second recording relative to the first: the equivalent viscous damping of dry friction is inversely
-proportional to the amplitude of motion, true viscous damping does not depend on it."""
+"""Amplitude of the second recording relative to the first. Chosen: the equivalent viscous damping of dry friction is
+inversely proportional to the amplitude of motion, and true viscous damping does not depend on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class TwinPlan:
     def opened_device(self) -> str:
         """Name under which the device is opened."""
         as_calibrated = self.calibration is not None and self.device == SIMULATED
-        return f"{CALIBRATED}{self.calibration}" if as_calibrated else self.device
+        return f"{CALIBRATED_PREFIX}{self.calibration}" if as_calibrated else self.device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +104,7 @@ def write_twin(
             RecordingPlan(level, plan.opened_device, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
             for name, level in (("strong", protocol), ("weaker", _reduce_amplitudes(protocol)))
         ]
+        # Shares of the progress, chosen: 0.15 for each recording, 0.6 for the fits, the rest for writing.
         stronger = _record_and_read(recording_plans[0], lambda share: on_progress(0.15 * share), before_moving)
         if calibration is not None and plan.opened_device == plan.device:
             check_same_device(calibration, stronger.device, TITLE)
@@ -128,7 +129,8 @@ def write_twin(
 def _fit_models(
     plan: TwinPlan, stronger: Recording, weaker: Recording, on_progress: Callable[[float], None]
 ) -> tuple[MechanicalFit, RigidBody]:
-    """Fit the whole band, and a rigid body to both recordings. Raises StudyError where a fit is refused."""
+    """Fit the model over the whole band, and a rigid body to both recordings. Raises StudyError where a fit is
+    refused."""
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
@@ -145,7 +147,8 @@ def _fit_models(
 
 
 def check_output_and_band(plan: TwinPlan) -> None:
-    """Check the output path and the band, before anything moves. Raises StudyError."""
+    """Check the output path and the band, before anything moves. Raises StudyError where the output exists or its
+    folder does not, WrongUseError for a band that does not rise from above 0 Hz."""
     require_new_outputs(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
     low_hz, high_hz = plan.band_hz
     if not (math.isfinite(low_hz) and math.isfinite(high_hz) and 0 < low_hz < high_hz):
@@ -171,7 +174,7 @@ def _require_three_axes(plan: TwinPlan, protocol: RecordingProtocol) -> None:
 
 
 def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
-    """The protocol with all amplitudes multiplied by `WEAKER_AMPLITUDE_RATIO`."""
+    """Multiply all amplitudes of the protocol by `WEAKER_AMPLITUDE_RATIO`."""
     weaker_segments = tuple(
         replace(segment, amplitude_n=WEAKER_AMPLITUDE_RATIO * segment.amplitude_n) for segment in protocol.segments
     )
@@ -182,7 +185,7 @@ def _record_and_read(
     plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving
 ) -> Recording:
     """Record by the plan and read the recording back. on_progress: called with the fraction done, 0 to 1."""
-    total_s = max(plan.total_s, 1e-9)
+    total_s = max(plan.total_s, 1e-9)  # not 0, which would be divided by
     record_device(plan, lambda seconds: on_progress(min(seconds / total_s, 1.0)), before_moving)
     return _assign_test_roles(read_recording(plan.out))
 
@@ -206,7 +209,7 @@ def _assign_test_roles(recording: Recording) -> Recording:
 def _gather_model_provenance(
     plan: TwinPlan, protocol: RecordingProtocol, stronger: Recording, fit: MechanicalFit
 ) -> dict[str, Any]:
-    """Origin of the model: software, seed, device, protocol, band and quality of the fit."""
+    """Gather the origin of the model: software, seed, device, protocol, band and quality of the fit."""
     parents = () if plan.calibration is None else (plan.calibration,)
     return {
         **gather_provenance(seeds={"device": plan.seed}, parents=parents).as_dict(),
@@ -225,7 +228,7 @@ def _gather_model_provenance(
 
 
 def _describe_assumptions(stronger: Recording, fit: MechanicalFit, rigid_body: RigidBody) -> tuple[str, ...]:
-    """Sentences for the user on the assumptions of the model and on the damping that was subtracted."""
+    """Describe the assumptions of the model and the damping that was subtracted, as sentences for the user."""
     feedback = stronger.meta.get("feedback") or {}
     stiffness_n_per_m = float(feedback.get("stiffness_n_per_m", 0.0))
     return (

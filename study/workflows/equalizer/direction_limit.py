@@ -21,6 +21,7 @@ FORMAT = "hapteq-anova"
 KIND = "analysis of a study"
 """Kind of the file, as stated in error messages."""
 ANALYSIS_ADVICE = "Give the anova.json that `hapteq analyze` writes for a study with two participants or more."
+"""Remedy in the messages about a file that is no such analysis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,7 @@ class StudyBand:
 
     band_hz: tuple[float, float]
     origin: str
-    """Source of the upper end, with its confidence interval, in a sentence or two."""
+    """Source of the upper end, with its confidence interval: a sentence, and another for simulated participants."""
 
 
 def read_study_band(path: Path, lowest_hz: float) -> StudyBand:

@@ -1,8 +1,8 @@
-"""Computes the feedforward forces that make a device follow a table of target accelerations (`hapteq equalize`).
+"""Compute the feedforward forces that make a device follow a table of target accelerations (`hapteq equalize`).
 
 The forces are the feedforward of a finite-horizon LQR tracker (`equalizer.tracking.feedforward`) for identified models
-of the device, under a force cap. With `--physics`, the forces of known nonlinear effects along the predicted motion are
-added along it. Called by `study.cli.equalize` and, for solving without writing, by `repeat_trajectory`.
+of the device, under a force cap. With `--physics`, forces that compensate known nonlinear effects along the predicted
+motion are added. Called by `study.cli.equalize` and, for solving without writing, by `repeat_trajectory`.
 """
 
 import math
@@ -18,7 +18,7 @@ from equalizer.tracking.compensation.effect_compensation import Compensation, co
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
 from equalizer.tracking.lqr.limits import ForceLimitError, ForcePeaks, require_under_cap
-from equalizer.tracking.workspace.feedforward_at_place import compute_feedforward_at
+from equalizer.tracking.workspace.feedforward_at_place import compute_feedforward_at_place
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
@@ -69,7 +69,7 @@ class EqualizedTrajectory:
     peaks: ForcePeaks
     """Force peaks of `forces`."""
     bands: BandPredictions | None
-    """Facts about the bands of a narrow and a wide model; None with a single band."""
+    """Edges and predicted errors of the bands of a narrow and a wide model; None with a single band."""
     compensation: Compensation | None
     """Compensation of known effects; None without `EqualizePlan.physics`."""
 
@@ -77,7 +77,7 @@ class EqualizedTrajectory:
 def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     """Read the inputs, solve for the forces and write them. Raises StudyError, before anything is written, where an
     output exists, an input is not valid, or the forces are refused (`solve_trajectory`)."""
-    check_free(plan.out)
+    require_new_output(plan.out)
     equalized = solve_trajectory(plan)
     write_trajectory(plan.out, equalized.forces)
     return equalized
@@ -85,14 +85,14 @@ def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     """Read the inputs and solve for the forces, without writing. Raises StudyError where an input cannot be read or
-    used, forces exceed the cap, or the tracking error exceeds `MAX_TRACKING_ERROR`."""
+    used, forces exceed the cap, or the predicted tracking error exceeds `MAX_TRACKING_ERROR`."""
     reference = _read_reference(plan.trajectory)
     models = read_playback_models(plan.models, plan.at_m, plan.weight)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     amplitude_n = None if physics is None else _read_amplitude_n(models.nearest)
     try:
         require_rate(reference, models.most_weighted.sample_rate_hz)
-        feedforward, bands = _solve_feedforward(plan, reference, models)
+        feedforward, band_predictions = _solve_feedforward(plan, reference, models)
     except ForceLimitError as limit_error:
         raise StudyError(
             "The forces would be too strong",
@@ -103,7 +103,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     except ValueError as error:
         _require_weight(plan, models)
         raise _make_table_error(f"{plan.trajectory.name}: {error}.") from error
-    _require_accuracy(plan, feedforward, in_bands=bands is not None)
+    _require_accuracy(plan, feedforward, in_bands=band_predictions is not None)
     compensation = None
     if physics is not None:
         compensation = _compensate_known_effects(plan, feedforward, models.most_weighted, physics, amplitude_n)
@@ -111,18 +111,25 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     forces = replace(feedforward.forces, samples=samples)
     peaks = require_under_cap(samples, plan.cap_n, forces.sample_rate_hz)
     return EqualizedTrajectory(
-        plan, reference, Trajectory(forces, reference.start_s), models, feedforward, peaks, bands, compensation
+        plan,
+        reference,
+        Trajectory(forces, reference.start_s),
+        models,
+        feedforward,
+        peaks,
+        band_predictions,
+        compensation,
     )
 
 
-def check_free(out_path: Path, *further_paths: Path) -> None:
-    """Check, before any work, that no output path exists. Raises StudyError where one does."""
+def require_new_output(out_path: Path, *further_paths: Path) -> None:
+    """Check, before any work, that no output path exists and that their folder does. Raises StudyError."""
     require_new_outputs(out_path, *further_paths, title="The forces were not computed", kind="tables")
 
 
 def _read_reference(path: Path) -> Trajectory:
-    """Read the table of target accelerations (m/s²). Raises StudyError for another table, or for a value that is NaN or
-    above `MAX_ACCELERATION_MPS2` in magnitude."""
+    """Read the table of target accelerations (m/s²). Raises WrongUseError for another kind of table, StudyError for a
+    value that is NaN or above `MAX_ACCELERATION_MPS2` in magnitude."""
     trajectory = read_trajectory(path)
     if trajectory.kind is not TRAJECTORY:
         raise WrongUseError(
@@ -132,9 +139,10 @@ def _read_reference(path: Path) -> Trajectory:
             saved="Nothing was written.",
         )
     magnitudes = np.abs(trajectory.signal.samples)
-    if not magnitudes.max() <= MAX_ACCELERATION_MPS2:
+    if not magnitudes.max() <= MAX_ACCELERATION_MPS2:  # true for NaN as well
         row, axis = np.unravel_index(int(magnitudes.argmax()), magnitudes.shape)
         acceleration = trajectory.signal.samples[row, axis]
+        # Column 0 of the table is the time; line 1 is the header, and lines are counted from 1.
         raise _make_table_error(
             f"{path.name} wants {acceleration:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; the largest "
             f"acceleration that is accepted is {MAX_ACCELERATION_MPS2:g} m/s^2."
@@ -179,13 +187,13 @@ def _require_accuracy(plan: EqualizePlan, feedforward: Feedforward, in_bands: bo
 def _solve_feedforward(
     plan: EqualizePlan, reference: Trajectory, models: PlaybackModels
 ) -> tuple[Feedforward, BandPredictions | None]:
-    """Solve for the feedforward forces, with the facts about the bands where narrow and wide models are combined.
-    Raises ForceLimitError where the cap is exceeded, ValueError for unsuitable models."""
+    """Solve for the feedforward forces; where narrow and wide models are combined, return also the predicted errors of
+    the bands, else None. Raises ForceLimitError where the cap is exceeded, ValueError for unsuitable models."""
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two_bands is None:
-        return compute_feedforward_at(models.at_place, reference.signal, settings), None
-    banded = solve_banded_feedforward(models.two_bands, reference.signal, settings)
-    return banded.feedforward, banded.predictions
+        return compute_feedforward_at_place(models.at_place, reference.signal, settings), None
+    banded_solution = solve_banded_feedforward(models.two_bands, reference.signal, settings)
+    return banded_solution.feedforward, banded_solution.predictions
 
 
 def _read_amplitude_n(model: IdentifiedModel) -> float | None:

@@ -18,7 +18,7 @@ MIN_REPORTED_SHARE = 0.01
 
 
 def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:
-    """Return the results as plain values for a JSON document. Units are stated by the suffix of a key; errors and
+    """Collect the results as plain values for a JSON document. Units are stated by the suffix of a key; errors and
     shares are fractions, not percentages."""
     feedforward, bands, compensation = equalized.feedforward, equalized.bands, equalized.compensation
     values: dict[str, Any] = {
@@ -58,8 +58,8 @@ def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:
 
 
 def _summarise_interpolation(equalized: EqualizedTrajectory) -> dict[str, Any]:
-    """Return the method by which models of several places are interpolated, and the errors of both available methods at
-    places left out of the interpolation (leave-one-out cross-validation). Empty where the models are of a single
+    """Collect the method by which models of several places are interpolated, and the errors of both available methods
+    at places left out of the interpolation (leave-one-out cross-validation). Empty where the models are of a single
     place."""
     choice = equalized.models.choice
     if choice is None:
@@ -107,22 +107,21 @@ def format_equalization_lines(equalized: EqualizedTrajectory) -> tuple[str, ...]
 
 
 def _format_quality_lines(equalized: EqualizedTrajectory) -> list[str]:
-    """Format lines on the measured quality of the models. Of several models: that of the model nearest to the place, or
-    of the narrower of two bands, and that of the worst model where it differs."""
+    """Format lines on the measured quality: of a single model with its remarks; of several models that of the model
+    nearest to the place, or of the narrower of two bands, then that of the worst model where it differs, then the
+    remarks of both."""
     models = equalized.models
-    worst_quality = models.quality
+    combined_quality = models.quality
     if len(models.all_models) == 1:
-        return [write_quality_sentence(worst_quality), *(worst_quality.remarks if worst_quality else ())]
+        return [write_quality_sentence(combined_quality), *(combined_quality.remarks if combined_quality else ())]
     model_role = "narrower" if models.two_bands is not None else "nearest"
-    nearest_quality, poorest_quality = models.nearest.quality, worst_quality
+    nearest_quality, worst_quality = models.nearest.quality, combined_quality
     lines = [f"Of the {model_role} model: {write_quality_sentence(nearest_quality)}"]
-    if poorest_quality != nearest_quality:
-        lines.append(f"Of the worst of the {len(models.all_models)} models: {write_quality_sentence(poorest_quality)}")
+    if worst_quality != nearest_quality:
+        lines.append(f"Of the worst of the {len(models.all_models)} models: {write_quality_sentence(worst_quality)}")
     return [
         *lines,
-        *dict.fromkeys(
-            remark for quality in (nearest_quality, poorest_quality) if quality for remark in quality.remarks
-        ),
+        *dict.fromkeys(remark for quality in (nearest_quality, worst_quality) if quality for remark in quality.remarks),
     ]
 
 
@@ -134,7 +133,7 @@ def get_predicted_error(equalized: EqualizedTrajectory) -> float:
 
 
 def _format_prediction_line(equalized: EqualizedTrajectory) -> str:
-    """Line on the predicted error, on what the cap adds to it, and on the peak force (N)."""
+    """Format a line on the predicted error, on what the cap adds to it, and on the peak force (N)."""
     loss, (low_hz, high_hz) = equalized.feedforward.loss, equalized.models.band_hz
     subject = "the model itself predicts" if len(equalized.models.all_models) == 1 else "the models themselves predict"
     cap_text = ""
@@ -151,14 +150,15 @@ def _format_prediction_line(equalized: EqualizedTrajectory) -> str:
 
 
 def _compute_out_of_band_force_share(equalized: EqualizedTrajectory) -> float:
-    """Compute the fraction (rms) of the forces outside the model's frequency band."""
+    """Compute the fraction (rms) of the forces outside the band of the nearest model; NaN for forces that are all
+    zero."""
     forces = equalized.forces.signal.samples
     out_of_band_forces = forces - extract_band(equalized.models.nearest, forces)
     return float(np.linalg.norm(out_of_band_forces) / np.linalg.norm(forces))
 
 
 def _format_band_lines(equalized: EqualizedTrajectory) -> list[str]:
-    """Lines on the edges (Hz) and errors of the three bands; empty where a single band was solved for."""
+    """Format lines on the edges (Hz) and errors of the three bands; empty where a single band was solved for."""
     bands, two_bands = equalized.bands, equalized.models.two_bands
     if bands is None or two_bands is None:
         return []
@@ -179,7 +179,8 @@ def _format_band_lines(equalized: EqualizedTrajectory) -> list[str]:
 
 
 def _format_compensation_lines(equalized: EqualizedTrajectory) -> list[str]:
-    """Lines on the nonlinear effects that the forces compensate, and on those that they do not, with the reason."""
+    """Format lines on the nonlinear effects that the forces compensate, and on those that they do not, with the reason;
+    empty without compensation."""
     compensation = equalized.compensation
     if compensation is None:
         return []
@@ -190,8 +191,8 @@ def _format_compensation_lines(equalized: EqualizedTrajectory) -> list[str]:
 
 
 def _describe_spring_force(equalized: EqualizedTrajectory) -> str:
-    """Sentence on whether the forces act together with the virtual spring. For a model from the excitation alone, the
-    recording's spring is part of the model; else the forces are all that enters the device."""
+    """Describe whether the forces act together with the virtual spring. For a model from the excitation alone, the
+    recording's spring is part of the model; else the forces are the whole command."""
     if equalized.models.nearest.provenance.get("input") == "excitation":
         return "These forces are for the device under the spring that it was recorded with."
     return "These forces are all that enters the device: a spring that holds the handle is not counted."

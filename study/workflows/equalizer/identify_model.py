@@ -1,4 +1,5 @@
-"""`hapteq identify`: identify a linear state-space model of a device from recordings, and write it to a file.
+"""Identify a linear state-space model of a device from recordings, and write it to a file. Called by
+`study.cli.identify` (`hapteq identify`) and `reproduce_paper`.
 
 Steps: subtract the effects of a mechanical model, if one is given; estimate the frequency response and fit the model
 (`identify_recordings`); test it by free simulation of held-out segments (`validate_on_test`); write it with its
@@ -40,7 +41,7 @@ from study.workflows.output_paths import require_new_outputs
 
 SAME_PLACE_TOLERANCE_M = 0.001
 """Largest difference (m) per coordinate of handle positions that count as the same place: a model is valid at a single
-place, because the device's dynamics depend on its position. Chosen by hand."""
+place, because the device's dynamics depend on its position. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     """Read recordings, identify a model and write it. on_progress: called with the completed share, 0 to 1. Raises
     StudyError if no model can be made from the recordings; nothing is written then."""
     settings = _make_settings(plan)
-    check_free(plan.out)
+    require_new_output(plan.out)
     recordings = tuple(read_recording(path) for path in plan.recordings)
     _require_same_system(recordings, plan.with_spring)
     if plan.with_spring:
@@ -131,8 +132,8 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
 def _assess_quality(
     identification: IdentifiedRecordings, recordings: Sequence[Recording], held_out_test: HeldOutValidation | None
 ) -> ModelQuality:
-    """Quality of the model: misfit, scatter and held-out error. The misfit is computed against the estimated frequency
-    response, even if the model was fitted to its local averages."""
+    """Assess the quality of the model: misfit, scatter and held-out error. The misfit is computed against the estimated
+    frequency response, even if the model was fitted to its local averages."""
     identified, estimate = identification.identified, identification.estimate
     misfit = compute_estimate_misfit(identified.model, estimate)
     remarks = (*identified.remarks, *describe_test_error_causes(held_out_test, identified.cost, misfit, recordings))
@@ -143,13 +144,13 @@ def _assess_quality(
     return summarise_quality(misfit.error, identified.scatter, held_out_figures, remark_sentences, misfit.upper_bound)
 
 
-def check_free(out_path: Path) -> None:
+def require_new_output(out_path: Path) -> None:
     """Check, before any work, that the output file does not exist and its folder does. Raises StudyError."""
     require_new_outputs(out_path, title="The model was not made", kind="models")
 
 
 def _make_settings(plan: IdentifyPlan) -> IdentificationSettings:
-    """Settings of the fit. Raises WrongUseError for an invalid band, order or decay."""
+    """Make the settings of the fit. Raises WrongUseError for an invalid band, order or decay."""
     try:
         return IdentificationSettings(plan.band_hz, plan.order, plan.longest_decay_s)
     except ValueError as error:
@@ -164,8 +165,8 @@ def _make_settings(plan: IdentifyPlan) -> IdentificationSettings:
 def _add_provenance(
     plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel, physics: MechanicalModel | None
 ) -> IdentifiedModel:
-    """The model with the place of its recordings, and with its provenance: files, whether a hand was on the handle,
-    spring, input, subtracted effects."""
+    """Add to the model the place of its recordings and its provenance: files, whether a hand was on the handle, spring,
+    input, subtracted effects."""
     provenance = {
         **model.provenance,
         **gather_provenance(parents=(*plan.recordings, *([plan.physics] if plan.physics else []))).as_dict(),
@@ -181,8 +182,8 @@ def _add_provenance(
 
 
 def _find_peak_amplitude_n(recordings: Sequence[Recording]) -> float:
-    """Largest amplitude (N) of the fitted segments; 0 without any. The model contains the equivalent linearisation of
-    friction at this amplitude."""
+    """Find the largest amplitude (N) of the fitted segments; 0 without any. The model contains the equivalent
+    linearisation of friction at this amplitude."""
     segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
     return max((segment.amplitude for segment in segments), default=0.0)
 
@@ -191,10 +192,12 @@ def _require_same_system(recordings: Sequence[Recording], with_spring: bool) -> 
     """Raise StudyError unless all recordings are of the same system: all with a hand or all without, and, where the
     spring becomes part of the model, all under the same spring."""
     values_by_name = {
-        "the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}
+        "the hand on the handle": {
+            str(recording.meta["hand"]) for recording in recordings if recording.meta.get("hand") is not None
+        }
     }
     if with_spring:
-        values_by_name["the spring"] = {_describe_spring(r.meta.get("feedback")) for r in recordings}
+        values_by_name["the spring"] = {_describe_spring(recording.meta.get("feedback")) for recording in recordings}
     for name, values in values_by_name.items():
         if len(values) > 1:
             raise _make_error(
@@ -203,15 +206,17 @@ def _require_same_system(recordings: Sequence[Recording], with_spring: bool) -> 
 
 
 def _describe_spring(feedback: object) -> str:
-    """Stiffness and damping of the virtual spring as text, from a recording's `feedback`; "none" without a spring."""
+    """Describe stiffness and damping of the virtual spring, from a recording's `feedback`; "none" without a spring."""
     if not isinstance(feedback, dict):
         return "none"
-    stiffness, damping = (float(feedback.get(key, 0.0)) for key in ("stiffness_n_per_m", "damping_n_s_per_m"))
-    return f"{stiffness:.3g} N/m, {damping:.3g} N s/m"
+    stiffness_n_per_m, damping_n_s_per_m = (
+        float(feedback.get(key, 0.0)) for key in ("stiffness_n_per_m", "damping_n_s_per_m")
+    )
+    return f"{stiffness_n_per_m:.3g} N/m, {damping_n_s_per_m:.3g} N s/m"
 
 
 def _use_excitation_as_input(recording: Recording) -> Recording:
-    """The recording with its excitation in place of the command, which makes the spring's feedback a part of the model.
+    """Replace the command of the recording by its excitation, which makes the spring's feedback a part of the model.
     Raises StudyError if the recording contains no excitation."""
     if recording.excitation is None:
         raise _make_error("The recording does not hold its excitation, so the spring's share is not known.")
@@ -219,8 +224,8 @@ def _use_excitation_as_input(recording: Recording) -> Recording:
 
 
 def _find_common_place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
-    """Position of the handle (x, y, z; m) in the first recording that states it; None if none does. Raises ValueError
-    if the places differ."""
+    """Find the position of the handle (x, y, z; m) in the first recording that states it; None if none does. Raises
+    ValueError if the places differ by more than `SAME_PLACE_TOLERANCE_M`."""
     places = [recording.meta["place_m"] for recording in recordings if recording.meta.get("place_m") is not None]
     if not places:
         return None
@@ -231,7 +236,7 @@ def _find_common_place(recordings: Sequence[Recording]) -> tuple[float, float, f
 
 
 def _make_error(explanation: str) -> StudyError:
-    """The error for recordings from which no model can be made."""
+    """Make the error for recordings from which no model can be made."""
     return StudyError(
         "No model can be made from these recordings",
         capitalise(explanation),

@@ -43,10 +43,10 @@ from study.workflows.equalizer.play_forces import (
 from study.workflows.equalizer.playback_models import PlaybackModels, Vector, read_playback_models
 
 GAIN_LINES = 100  # frequencies in the band, a geometric series, over which the gain of the comparison is averaged
-PADDING = Padding(after_s=0.5)  # played after the recording, for the handle to come to rest. Times: chosen by hand
-FADE_S = 0.2  # fade-out at the end, where a solution with a free end has forces of no use that would end with a step
+PADDING = Padding(after_s=0.5)  # played after the recording, for the handle to come to rest; chosen
+FADE_S = 0.2  # fade-out (s) at the end, where the forces of the solution with a free end would stop with a step; chosen
 RESTART, UNSAVED = "Start again.", "Nothing was written."  # remedy and saved data in the error of an interrupted play
-SETTLE_S = 1.0  # time without stimulus before and after each play
+SETTLE_S = 1.0  # time (s) without stimulus before and after each play; chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,8 @@ class ContactPlay:
 def play_contact(
     plan: ContactPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving = refuse_unannounced
 ) -> ContactPlay:
-    """Solve, play with and without the model, and write. on_progress: takes the share played, 0 to 1. before_moving:
-    see `BeforeMoving`. Raises StudyError, before any motion where the input is unsuitable; nothing is written then."""
+    """Solve, play with and without the model, and write. on_progress: called with the share played, 0 to 1. Raises
+    StudyError; for unsuitable input before any motion, and nothing is written then."""
     require_new_folder(plan.out)
     normal = _normalise(plan.normal)
     transient = _read_transient(plan)
@@ -179,10 +179,10 @@ def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> Float
     try:
         require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as error:
-        largest_scale = np.floor(1e3 * plan.scale * error.peaks.largest_scale) / 1e3
+        max_scale = np.floor(1e3 * plan.scale * error.peaks.largest_scale) / 1e3
         raise _make_play_error(
             f"The forces would reach {error.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
-            f"Give --scale {largest_scale:g} or less, or raise --cap for a device that no hand holds.",
+            f"Give --scale {max_scale:g} or less, or raise --cap for a device that no hand holds.",
         ) from error
     return forces
 
@@ -233,8 +233,8 @@ def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[Floa
 def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
     """Play forces (N, 3), N, and return the measured acceleration, (N, 3) in m/s^2. on_share: called with 0 to 1."""
     rest_rows = round(SETTLE_S * device.info.sample_rate_hz)
-    padded = np.pad(forces, ((rest_rows, rest_rows), (0, 0)))
-    return read_measured_acceleration(play_forces(device, padded, on_share))[rest_rows : rest_rows + len(forces)]
+    padded_forces = np.pad(forces, ((rest_rows, rest_rows), (0, 0)))
+    return read_measured_acceleration(play_forces(device, padded_forces, on_share))[rest_rows : rest_rows + len(forces)]
 
 
 def _write_play(play: ContactPlay, models: PlaybackModels) -> None:  # tables, figure and contact.json in a new folder

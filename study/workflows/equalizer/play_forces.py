@@ -35,7 +35,8 @@ FORCE_RELEASE_S = 0.05
 
 
 def require_device_alone(models: PlaybackModels) -> None:
-    """Raise StudyError where a model was identified with a hand on the handle: it is not valid for the free handle."""
+    """Raise StudyError where any model was identified with a hand on the handle: it is not valid for the free
+    handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.all_models):
         raise _make_refusal(
             "The model was recorded with a hand on the handle: its forces are valid only for that hand at that moment.",
@@ -45,7 +46,7 @@ def require_device_alone(models: PlaybackModels) -> None:
 
 def find_acting_spring(models: PlaybackModels) -> VirtualSpring:
     """Find the virtual spring that acts in addition to the commanded forces and is not part of the nearest model.
-    Raises StudyError where the model does not state its spring."""
+    Raises StudyError where that model does not state its spring."""
     feedback = _read_recorded_spring(models)
     spring = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
     if not feedback:
@@ -72,12 +73,12 @@ def make_playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettin
     sums of sines and learned corrections are steeper than one sine; the slew of the spring is added.
     """
     feedback = _read_recorded_spring(models)
-    steepest_n_per_s = 2 * math.pi * models.band_hz[1] * cap_n
+    max_slope_n_per_s = 2 * math.pi * models.band_hz[1] * cap_n
     return DeviceSettings(
         limits=Limits(
             stimulus_cap_n=cap_n,
             total_cap_n=cap_n + SPRING_RESERVE_N,
-            slew_n_per_s=2 * steepest_n_per_s + SPRING_SLEW_N_PER_S,
+            slew_n_per_s=2 * max_slope_n_per_s + SPRING_SLEW_N_PER_S,
             longest_hold_s=LONGEST_HOLD_S,
             watchdog_s=WATCHDOG_S,
             release_s=FORCE_RELEASE_S,
@@ -86,7 +87,7 @@ def make_playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettin
         ),
         spring_frequency_hz=float(feedback.get("natural_frequency_hz", DEFAULT_SPRING_HZ)),
         spring_damping_n_s_per_m=float(feedback.get("damping_n_s_per_m", 0.0)),
-        keep_s=1.0,
+        keep_s=1.0,  # without effect: it limits the recording of held stimuli only
         hand_on_handle=False,
         place_m=models.at_place.place_m,
         beyond_hand_ceiling=cap_n > HAND_STIMULUS_CAP_N,
@@ -114,7 +115,7 @@ def read_measured_acceleration(play_result: PlaybackResult) -> FloatArray:
     health = play_result.health
     if play_result.recording is None or health.fault is not Fault.NONE:
         raise DeviceError("The device let go", f"While playing: {health.fault.value}.", "Check the device.")
-    sample_counts = {
+    counts_by_problem = {
         "the accelerometer clipped": health.sensor_clipped,
         "the force was limited": health.stimulus_clipped
         + health.feedback_clipped
@@ -122,7 +123,7 @@ def read_measured_acceleration(play_result: PlaybackResult) -> FloatArray:
         + health.slew_limited,
         "ticks were missed": health.missed_ticks,
     }
-    if problems := [f"{problem} ({count} samples)" for problem, count in sample_counts.items() if count]:
+    if problems := [f"{problem} ({count} samples)" for problem, count in counts_by_problem.items() if count]:
         raise DeviceError(
             "The measured acceleration is not that of the forces",
             f"While playing, {' and '.join(problems)}.",

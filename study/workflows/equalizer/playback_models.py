@@ -110,7 +110,7 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
 
 
 def _combine_single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
-    """Make the playback models of one file. The place of playback defaults to that of the model, then to the centre."""
+    """Make the playback models of one file. The place of playback defaults to that of the model, then to the origin."""
     models_at_place = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
     return PlaybackModels(
         (model,), models_at_place, None, None, _warn_of_distance(paths[0], model, at_m), (), _compute_sha256(paths)
@@ -151,13 +151,13 @@ def _combine_places(
     """Combine models of several places: whether forces or models are interpolated is chosen by cross-validation. Raises
     WrongUseError without a place of playback, WorkspaceError for models that do not fit together."""
     if at_m is None:
-        places = "; ".join(
+        places_text = "; ".join(
             f"{path.name} {_format_place_mm(model.place_m)}"
             for path, model in zip(paths, workspace.models, strict=True)
         )
         raise WrongUseError(
             "At which place shall it be played?",
-            f"The models are of several places: {places}.",
+            f"The models are of several places: {places_text}.",
             "Say where with --at X Y Z, in metres.",
             saved="Nothing was written.",
         )
@@ -181,10 +181,10 @@ def _combine_places(
 
 def _describe_held_out_error(check: PlaceCheck) -> str:
     """Describe the errors at a place whose model was left out, with interpolated forces and with interpolated modes."""
-    modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
+    modal_error_text = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
     return (
         f"Held out {_format_place_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with "
-        f"blended forces, {modal} with resonances interpolated."
+        f"blended forces, {modal_error_text} with resonances interpolated."
     )
 
 
@@ -206,9 +206,9 @@ def _read_checked_model(path: Path) -> IdentifiedModel:
             f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
             "Identify it again with hapteq identify, which makes stable ones only.",
         )
-    if not (gain := compute_peak_gain(model)) <= MAX_PLAUSIBLE_GAIN:
+    if not (peak_gain := compute_peak_gain(model)) <= MAX_PLAUSIBLE_GAIN:
         raise _make_unfit_error(
-            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; models up to "
+            f"By {path.name} 1 N accelerates the handle with up to {peak_gain:.2g} m/s^2; models up to "
             f"{MAX_PLAUSIBLE_GAIN:g} m/s^2 are accepted.",
             "Check the units of the recording that it was made from, and identify it again.",
         )
@@ -218,8 +218,8 @@ def _read_checked_model(path: Path) -> IdentifiedModel:
 def _are_axes_in_order(names: tuple[str, ...]) -> bool:
     """Whether there are three names that end in x, y, z in this order, or three names none of which ends in x, y or
     z."""
-    letters = [name[-1:].lower() for name in names]
-    return len(names) == 3 and (letters == ["x", "y", "z"] or not set(letters) & set("xyz"))
+    last_letters = [name[-1:].lower() for name in names]
+    return len(names) == 3 and (last_letters == ["x", "y", "z"] or not set(last_letters) & set("xyz"))
 
 
 def compute_peak_gain(model: IdentifiedModel) -> float:

@@ -38,7 +38,7 @@ class RepeatPlan:
     settings: DeviceSettings
     """Settings without a hand on the handle. Every correction respects the cap of the stimulus."""
     device: str
-    """Name of the device, as of the option `--device`."""
+    """Name of the device, as given with `--device`."""
     repeats: int = 10
     """Number of corrections after the first play."""
     first_gain: float = 1.0
@@ -64,7 +64,7 @@ class RepeatResult:
     noise_floor: float
     """Relative error that noise alone causes; 0 where it is not known."""
     verdict: Verdict
-    """Reason for which the repetition ended."""
+    """Reason why the repetition ended."""
     best_play: int
     """Index of the play with the smallest residual, from 0: that of the best forces."""
     remark: str
@@ -74,8 +74,8 @@ class RepeatResult:
 
 
 def make_result(plan: RepeatPlan, state: IterationState, plays: list[PlaybackResult]) -> RepeatResult:
-    """Make the result after the last play, of at least one; a repetition that could continue counts as ended with the
-    best forces."""
+    """Make the result after the last play, of at least one. A repetition that could have continued (its number of
+    corrections is used up) ends with the verdict BEST_KEPT."""
     verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
     return RepeatResult(
         forces=_make_force_table(plan, state),
@@ -127,10 +127,10 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
     write_repeats(get_repeats_path(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
 
 
-def read_earlier_forces(forces: Path, reference: Trajectory, model_sha256: str) -> FloatArray:
-    """Read the forces, (N, 3) in N, that an earlier run found for the same trajectory and model. forces: path of their
+def read_earlier_forces(forces_path: Path, reference: Trajectory, model_sha256: str) -> FloatArray:
+    """Read the forces, (N, 3) in N, that an earlier run computed for the same trajectory and model. forces_path: their
     table. Raises StudyError if trajectory or model differ, the table was changed, or a file cannot be read."""
-    document, table = read_repeats(get_repeats_path(forces)), read_trajectory(forces)
+    document, table = read_repeats(get_repeats_path(forces_path)), read_trajectory(forces_path)
     matches_by_subject = {
         "another trajectory": document.trajectory_sha256 == hash_trajectory(reference),
         "another model": document.model_sha256 == model_sha256,
@@ -139,7 +139,7 @@ def read_earlier_forces(forces: Path, reference: Trajectory, model_sha256: str) 
     if differing_subjects := [subject for subject, is_match in matches_by_subject.items() if not is_match]:
         raise StudyError(
             "The repeats cannot continue from the earlier forces",
-            f"{get_repeats_path(forces).name} belongs to {' and '.join(differing_subjects)}.",
+            f"{get_repeats_path(forces_path).name} belongs to {' and '.join(differing_subjects)}.",
             "Leave it out to begin with the model's own forces.",
             saved="Nothing moved.",
         )

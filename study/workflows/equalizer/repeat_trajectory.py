@@ -19,13 +19,13 @@ from equalizer.tracking.learning.convergence import Convergence
 from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, find_largest_share
 from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.workspace.convergence_at_place import predict_convergence_at
-from equalizer.tracking.workspace.feedforward_at_place import make_inverse_at
+from equalizer.tracking.workspace.feedforward_at_place import make_inverse_at_place
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import get_repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
     EqualizedTrajectory,
     EqualizePlan,
-    check_free,
+    require_new_output,
     solve_trajectory,
 )
 from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
@@ -81,7 +81,7 @@ def repeat_trajectory(
     Raises StudyError: before anything moves where an output exists or where cap, models or convergence test do not
     allow repeats; later where the device fails or the user interrupts.
     """
-    check_free(plan.out, get_repeats_path(plan.out))
+    require_new_output(plan.out, get_repeats_path(plan.out))
     equalized = solve_trajectory(plan)
     _require_repeatable(equalized.models)
     if equalized.feedforward.loss is not None:
@@ -93,7 +93,7 @@ def repeat_trajectory(
     gain, convergence = _choose_gain(equalized, spring)
     repeat_plan = RepeatPlan(
         reference=equalized.reference,
-        inverse=make_inverse_at(equalized.models.at_place, plan.weight),
+        inverse=make_inverse_at_place(equalized.models.at_place, plan.weight),
         band_hz=equalized.models.band_hz,
         model_sha256=equalized.models.sha256,
         settings=make_playback_settings(plan.cap_n, equalized.models),

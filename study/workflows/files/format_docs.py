@@ -18,7 +18,7 @@ from analysis.diagnosis import document
 from analysis.diagnosis.real_answer import real_answer
 from analysis.evaluation.reproduction import document as reproduction_document
 from analysis.psychophysics.thresholds import Threshold
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EffectParameter
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 from equalizer.tracking.feedforward.trajectory import TABLE_KINDS
 from protocols.document.schema import make_protocol_schema
@@ -205,7 +205,7 @@ def _format_parameter(parameter: EffectParameter) -> str:
 def _format_effects() -> str:
     """Format the Markdown table of the effects of a mechanical model, with the units of their parameters."""
     rows = []
-    for effect in EFFECT_NAMES:
+    for effect in EFFECT_ENTRIES:
         parameters_text = ", ".join(_format_parameter(parameter) for parameter in effect.parameters)
         rotational_units = ", ".join(parameter.find_unit(ROTATIONAL, _RESPONSE_UNIT) for parameter in effect.parameters)
         rows.append((f"`{effect.name}`", effect.place, parameters_text, rotational_units))
@@ -245,9 +245,10 @@ def _format_layout(entries: Iterable[Entry]) -> str:
 
 
 def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """Format a Markdown table. The cells must not contain a vertical bar, which would end them."""
-    rows_with_header = [header, tuple("---" for _ in header), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows_with_header)
+    """Format a Markdown table. header: a cell per column; rows: a tuple of cells each. The cells must not contain a
+    vertical bar, which would end them."""
+    table_rows = [header, tuple("---" for _ in header), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in table_rows)
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@
 files, so that page and code agree.
 """
 
-from equalizer.laws.parse import FUNCTIONS, MEMORY_OPERATORS, MOST_CHARACTERS, MOST_NODES
+from equalizer.laws.parse import FUNCTIONS, MAX_CHARACTERS, MAX_NODES, MEMORY_OPERATORS
 from equalizer.laws.program import MAX_CELLS, STACK_SIZE
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
-from equalizer.signals.units import ALLOWED
+from equalizer.signals.units import UNITS_CLAUSE
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE
 from study.session.facts import log_chain
 
@@ -20,7 +20,7 @@ GENERATED_PAGE_NOTE = (
 INTRODUCTION = (
     f"{GENERATED_PAGE_NOTE} `hapteq validate FILE` checks any of these files and lists its problems.",
     "Every HDF5 file and every JSON document states its `format` and `version`. TOML and CSV files are recognised by "
-    f"their keys or header. Units: {ALLOWED}. `g` is standard gravity. Time is the first dimension of each array.",
+    f"their keys or header. Units: {UNITS_CLAUSE}. `g` is standard gravity. Time is the first dimension of each array.",
 )
 """Paragraphs at the top of the page."""
 
@@ -47,6 +47,7 @@ EFFECTS_NOTES = (
 """Paragraph above the table of effects."""
 
 _FUNCTION_NAMES = ", ".join(f"`{name}`" for name in FUNCTIONS if name not in MEMORY_OPERATORS)
+"""Names of the functions without memory that a formula may use, in Markdown."""
 
 LAW_SECTION = "\n\n".join(
     (
@@ -71,8 +72,8 @@ LAW_SECTION = "\n\n".join(
         "has another meaning. A law of a command may use commands and `t`; a law of a response may use responses and "
         "`t`.",
         "**Free parameters.** Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters: a fit may "
-        f"change them. Whole numbers (`2`) are part of the form. A formula has at most {MOST_CHARACTERS} characters, "
-        f"{MOST_NODES} parts, and {STACK_SIZE} numbers at once.",
+        f"change them. Whole numbers (`2`) are part of the form. A formula has at most {MAX_CHARACTERS} characters, "
+        f"{MAX_NODES} parts, and {STACK_SIZE} numbers at once.",
     )
 )
 """Section on laws that are no effect of the catalogue: syntax, functions, signals and parameters of their formulas."""

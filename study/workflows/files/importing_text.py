@@ -5,7 +5,7 @@ from the constants of the code that reads the files, so that page and code agree
 """
 
 from equalizer.signals.resampling import PASSBAND
-from equalizer.signals.units import ALLOWED
+from equalizer.signals.units import UNITS_CLAUSE
 from study.importing.arrays.csv_arrays import MAX_ROWS
 from study.importing.expressions.budget import (
     COMPUTED_NUMBERS,
@@ -149,7 +149,7 @@ _CHANNELS = f"""\
 
 * **Units** are never guessed. A channel without a unit keeps its numbers and has the unit `1`, which is reported. The
   assumed unit of each computed channel is reported, too.
-  {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
+  {UNITS_CLAUSE[0].upper()}{UNITS_CLAUSE[1:]}; `lb` and `oz` are masses.
   In headers other spellings are understood (`RPM`, `rad/sec`, `m/sec2`, `m/s²`, `°/s`, `kgf·cm`, `oz-in`, `lbf-in`,
   `force / N`, `force, N`). `ms-2` is m/s^2; `m/s-2` is refused. Numbers in `A rms` or `A (peak)` are kept unchanged,
   which is reported. An error about an unknown unit names the nearest known one.

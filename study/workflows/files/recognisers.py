@@ -1,4 +1,4 @@
-"""Recognisers of hapteq's own file formats, for `hapteq validate`: one function per format.
+"""Recognisers of hapteq's own file formats, one function per format. Called by `validate` (`hapteq validate`).
 
 A recogniser identifies a format by its format attribute, its top-level keys or its header, then reads the whole file
 with the reader of that format and returns a description in words. A new format adds its function to `RECOGNISERS`.
@@ -12,7 +12,7 @@ from analysis.evaluation.reproduction.document import FORMAT as REPRODUCTION_FOR
 from analysis.look.driven_band import find_silent_segments
 from equalizer.plant.model_quality import write_quality_brief
 from equalizer.signals.recording import Recording
-from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
+from equalizer.signals.units import NO_UNIT, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.loading import ProtocolError
@@ -46,7 +46,7 @@ if the file has this format but its content is wrong."""
 
 
 def recognise_recording(content: FileContent) -> str | None:
-    """An HDF5 recording, by its format attribute. Raises UnusableFileError also for segments that
+    """Recognise an HDF5 recording by its format attribute. Raises UnusableFileError also for segments that
     `find_silent_segments` reports."""
     if content.hdf5_format != recording_layout.FORMAT:
         return None
@@ -57,75 +57,79 @@ def recognise_recording(content: FileContent) -> str | None:
 
 
 def describe_recording(recording: Recording) -> str:
-    """Duration and channels of a recording, in words."""
+    """Describe duration, sample rate, and the numbers of channels and segments of a recording."""
     parts = [
         f"{recording.response.duration_s:g} s at {recording.sample_rate_hz:g} Hz",
-        _count(len(recording.command.channels), "command"),
-        _count(len(recording.response.channels), "response"),
+        _format_count(len(recording.command.channels), "command"),
+        _format_count(len(recording.response.channels), "response"),
     ]
     if recording.position is not None:
-        parts.append(_count(len(recording.position.channels), "position"))
+        parts.append(_format_count(len(recording.position.channels), "position"))
     if recording.condition is not None:
-        parts.append(_count(len(recording.condition.channels), "condition"))
+        parts.append(_format_count(len(recording.condition.channels), "condition"))
     if recording.segments:
-        parts.append(_count(len(recording.segments), "segment"))
+        parts.append(_format_count(len(recording.segments), "segment"))
     return ", ".join(parts)
 
 
 def recognise_identified_model(content: FileContent) -> str | None:
-    """An identified model in HDF5, by its format attribute."""
+    """Recognise an identified model in HDF5 by its format attribute."""
     if content.hdf5_format != identified_model_file.FORMAT:
         return None
     model = read_identified_model(content.path)
-    stable = "stable" if model.spectral_radius < 1 else f"unstable (spectral radius {model.spectral_radius:.6g})"
+    stability_text = (
+        "stable" if model.spectral_radius < 1 else f"unstable (spectral radius {model.spectral_radius:.6g})"
+    )
     return (
         f"identified model of order {model.order}, {model.band_hz[0]:g} to {model.band_hz[1]:g} Hz at "
-        f"{model.sample_rate_hz:g} Hz, {_count(len(model.input_channels), 'input')}, "
-        f"{_count(len(model.output_channels), 'output')}, {stable}, {write_quality_brief(model.quality)}"
+        f"{model.sample_rate_hz:g} Hz, {_format_count(len(model.input_channels), 'input')}, "
+        f"{_format_count(len(model.output_channels), 'output')}, {stability_text}, {write_quality_brief(model.quality)}"
     )
 
 
 def recognise_calibration(content: FileContent) -> str | None:
-    """A calibration of a linkage in HDF5, by its format attribute."""
+    """Recognise a calibration of a linkage in HDF5 by its format attribute."""
     if content.hdf5_format != calibration_file.FORMAT:
         return None
     calibration = read_calibration(content.path)
     return (
-        f"calibration of the linkage of {calibration.device}, {_count(len(calibration.position_m), 'position')}, "
-        f"{int(calibration.filled.sum())} of them filled in, mirrored inertia within {calibration.asymmetry.max():.1%}"
+        f"calibration of the linkage of {calibration.device}, "
+        f"{_format_count(len(calibration.position_m), 'position')}, {int(calibration.filled.sum())} of them filled in, "
+        f"mirrored inertia within {calibration.asymmetry.max():.1%}"
     )
 
 
 def recognise_mechanical_model(content: FileContent) -> str | None:
-    """A mechanical model in TOML, by any of its top-level keys."""
+    """Recognise a mechanical model in TOML by any of its top-level keys."""
     if content.toml is None or not content.toml.keys() & {"model", "sensor", "actuator", "effect", "tolerance"}:
         return None
     model = read_mechanical_model(content.path)
-    effects = ", ".join(effect.kind for effect in model.effects) or "no effects"
+    effects_text = ", ".join(effect.kind for effect in model.effects) or "no effects"
     return (
-        f"mechanical model '{model.name}', {_count(model.coordinates, 'coordinate')}, {_count(model.inputs, 'input')}, "
-        f"{_count(model.outputs, 'output')} ({model.quantity}), {effects}"
+        f"mechanical model '{model.name}', {_format_count(model.coordinates, 'coordinate')}, "
+        f"{_format_count(model.inputs, 'input')}, {_format_count(model.outputs, 'output')} ({model.quantity}), "
+        f"{effects_text}"
     )
 
 
 def recognise_import_map(content: FileContent) -> str | None:
-    """An import map in TOML. Raises UnusableFileError also for unknown units."""
+    """Recognise an import map in TOML by its list of channels. Raises UnusableFileError also for unknown units."""
     if content.toml is None or not is_map(content.toml):
         return None
     import_map = parse_map(content.text or "", content.path)
     channels: list[ChannelMap | ComputedMap] = [*import_map.channel, *import_map.computed]
-    if problems := tuple(problem for channel in channels if (problem := _unit_problem(channel))):
+    if problems := tuple(problem for channel in channels if (problem := _find_unit_problem(channel))):
         raise UnusableFileError(content.path, MAP_KIND, problems)
     return (
-        f"import map for {import_map.device}: {_count(len(channels), 'channel')}, "
-        f"{_count(len(import_map.clock), 'clock')}"
+        f"import map for {import_map.device}: {_format_count(len(channels), 'channel')}, "
+        f"{_format_count(len(import_map.clock), 'clock')}"
     )
 
 
-def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
-    """Problem with the unit; empty if it is known or not stated."""
+def _find_unit_problem(channel: ChannelMap | ComputedMap) -> str:
+    """Find the problem with a channel's unit; empty if the unit fits the quantity, or is not stated."""
     try:
-        check_quantity(channel.quantity, parse_unit(channel.unit.strip() or UNSTATED))
+        check_quantity(channel.quantity, parse_unit(channel.unit.strip() or NO_UNIT))
     except UnknownUnitError as error:
         return f"{channel.role} '{channel.name}': {error}"
     return ""
@@ -136,7 +140,7 @@ _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in make_protocol_schema(kind)
 
 
 def recognise_protocol(content: FileContent) -> str | None:
-    """A study or recording protocol in TOML, by any of its top-level keys."""
+    """Recognise a study or recording protocol in TOML by any of its top-level keys."""
     if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
         return None
     try:
@@ -148,7 +152,7 @@ def recognise_protocol(content: FileContent) -> str | None:
 
 
 def recognise_diagnosis(content: FileContent) -> str | None:
-    """A diagnosis in JSON, by its `format` entry."""
+    """Recognise a diagnosis in JSON by its `format` entry."""
     if content.json_format != DIAGNOSIS_FORMAT:
         return None
     diagnosis = read_diagnosis(content.path)
@@ -156,7 +160,7 @@ def recognise_diagnosis(content: FileContent) -> str | None:
 
 
 def recognise_daily_check(content: FileContent) -> str | None:
-    """A daily check of a device in JSON, by its `format` entry."""
+    """Recognise a daily check of a device in JSON by its `format` entry."""
     if content.json_format != DAILY_CHECK_FORMAT:
         return None
     check = read_daily_check(content.path)
@@ -164,18 +168,18 @@ def recognise_daily_check(content: FileContent) -> str | None:
 
 
 def recognise_repeats(content: FileContent) -> str | None:
-    """The JSON document that accompanies a table of forces from repeated playback, by its `format` entry."""
+    """Recognise the JSON document that accompanies a table of forces from repeated playback, by its `format` entry."""
     if content.json_format != REPEATS_FORMAT:
         return None
     repeats = read_repeats(content.path)
     return (
-        f"repeats, {_count(len(repeats.errors), 'play')}, error {repeats.errors[0]:.2%} to "
+        f"repeats, {_format_count(len(repeats.errors), 'play')}, error {repeats.errors[0]:.2%} to "
         f"{repeats.errors[repeats.kept]:.2%}, noise {repeats.noise_floor:.2%}"
     )
 
 
 def recognise_real_answer(content: FileContent) -> str | None:
-    """The diagnosis of a real recording in JSON, by its `format` entry."""
+    """Recognise the diagnosis of a real recording in JSON by its `format` entry."""
     if content.json_format != REAL_ANSWER_FORMAT:
         return None
     answer = read_real_answer(content.path)
@@ -183,18 +187,18 @@ def recognise_real_answer(content: FileContent) -> str | None:
 
 
 def recognise_reproduction(content: FileContent) -> str | None:
-    """A reproduction of the published figures in JSON, by its `format` entry."""
+    """Recognise a reproduction of the published values in JSON by its `format` entry."""
     if content.json_format != REPRODUCTION_FORMAT:
         return None
     reproduction = read_reproduction(content.path)
     return (
-        f"reproduction of {_count(len(reproduction.figures), 'figure')} on the {reproduction.device}, "
+        f"reproduction of {_format_count(len(reproduction.figures), 'figure')} on the {reproduction.device}, "
         f"seed {reproduction.seed}"
     )
 
 
 def recognise_trajectory(content: FileContent) -> str | None:
-    """A CSV table of a trajectory, forces or a transient, by the first column of its header."""
+    """Recognise a CSV table of a trajectory, forces or a transient by the first column of its header."""
     if content.header[:1] != TRAJECTORY.header[:1]:
         return None
     trajectory = read_trajectory(content.path)
@@ -203,24 +207,24 @@ def recognise_trajectory(content: FileContent) -> str | None:
 
 
 def recognise_trials(content: FileContent) -> str | None:
-    """A CSV table of trials, by the first two columns of its header."""
+    """Recognise a CSV table of trials by the first two columns of its header."""
     # A header with an error in one column is still recognised, so that `read_trials` reports the error. Two columns are
     # compared, because tables of thresholds also begin with the subject.
     if content.header[:2] != TRIALS_HEADER[:2] and find_header_problem(content.header, TRIALS_HEADER):
         return None
-    return f"table of {_count(len(read_trials(content.path)), 'trial')}"
+    return f"table of {_format_count(len(read_trials(content.path)), 'trial')}"
 
 
 def recognise_thresholds(content: FileContent) -> str | None:
-    """A CSV table of thresholds, by the first two columns of its header."""
+    """Recognise a CSV table of thresholds by the first two columns of its header."""
     if content.header[:2] != THRESHOLDS_HEADER[:2] and find_header_problem(content.header, THRESHOLDS_HEADER):
         return None
     noun = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"
-    return f"table of {_count(len(read_thresholds(content.path)), noun)}"
+    return f"table of {_format_count(len(read_thresholds(content.path)), noun)}"
 
 
-def _count(number: int, noun: str) -> str:
-    """Number and noun, in the plural unless the number is 1."""
+def _format_count(number: int, noun: str) -> str:
+    """Format a number and its noun, in the plural unless the number is 1."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 

@@ -1,4 +1,4 @@
-"""Validation of one file or session folder (`hapteq validate`): determines its kind and lists its problems.
+"""Validate one file or session folder (`hapteq validate`): determine its kind and list its problems.
 
 The recognisers are tried in turn on the content. A file that none of them recognises, and that may be a recording of
 another program, is read as `hapteq import` would read it. Remarks on access rights and on idle commands are added.
@@ -50,12 +50,15 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
     """Validate one file or session folder. Wrong content and a missing file are returned as problems, not raised."""
     validation = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER_PATTERN.fullmatch(path.absolute().name) else (path,)
-    warnings = (format_privacy_warning(folder) for folder in folders if _is_folder(folder))
-    return replace(validation, notes=(*validation.notes, *filter(None, warnings), *_find_idle_commands(validation)))
+    privacy_warnings = (format_privacy_warning(folder) for folder in folders if _is_folder(folder))
+    return replace(
+        validation, notes=(*validation.notes, *filter(None, privacy_warnings), *_describe_idle_commands(validation))
+    )
 
 
-def _find_idle_commands(validation: Validation) -> tuple[str, ...]:
-    """Find the commands of a valid recording that are zero or missing in every sample; returns one remark, or none."""
+def _describe_idle_commands(validation: Validation) -> tuple[str, ...]:
+    """Describe, in one remark, the commands of a valid recording that are zero or missing in every sample; empty
+    without such commands."""
     if validation.problems or not validation.kind.startswith("recording, "):
         return ()
     command = read_recording(validation.path).command
@@ -117,8 +120,8 @@ def _validate_foreign(path: Path, kind: str = "", unknown_problems: tuple[str, .
     except StudyError as refusal:
         problem = f"{refusal.title}: {refusal.happened}"
         return Validation(path, kind or "recording of others", (*unknown_problems, problem))
-    text = f"recording of others, {describe_recording(imported.recording)}"
-    return Validation(path, text, tuple(find_silent_segments(imported.recording)), imported.notes)
+    description = f"recording of others, {describe_recording(imported.recording)}"
+    return Validation(path, description, tuple(find_silent_segments(imported.recording)), imported.notes)
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:

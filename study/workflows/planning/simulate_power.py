@@ -62,7 +62,7 @@ class PowerPlan:
 
 
 StudyChunk = tuple[int, int]
-"""Sample size, and number of the first study of a chunk."""
+"""Sample size, and number of the first study of a chunk, from 0."""
 
 
 def simulate_power(
@@ -88,7 +88,11 @@ def simulate_power(
         for first_study in range(0, plan.studies, STUDIES_PER_CHUNK)
         if (sample_size, first_study) not in verdicts_by_chunk
     ]
-    finished_count = sum(len(verdicts) for (size, _), verdicts in verdicts_by_chunk.items() if size in plan.people)
+    finished_count = sum(
+        len(verdicts)
+        for (chunk_sample_size, _), verdicts in verdicts_by_chunk.items()
+        if chunk_sample_size in plan.people
+    )
     on_finished(finished_count)
     for chunk, verdicts in run_tasks(executor, judge_chunk, ((chunk, (plan, chunk)) for chunk in remaining_chunks)):
         verdicts_by_chunk[chunk] = verdicts
@@ -207,6 +211,7 @@ def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVER
     of the 95 % interval of the difference; bias in dB. threshold_name: name of the thresholds of single runs, in the
     plural."""
     paired_heading = f"{threshold_name}, paired"
+    # 24 characters: the longest entry, "100.0 % (100.0 to 100.0)".
     paired_width = max(24, len(paired_heading))
     lines = [
         f"{'people':>6}  {'all answers in one model':>26}  {paired_heading:>{paired_width}}  "

@@ -43,9 +43,9 @@ ERROR_TITLE = "The linkage was not calibrated"
 NOTHING_DONE = "Nothing moved and nothing was written."
 """What each error states about the device and the files."""
 MAX_GRID_SIZE_M = 0.2
-"""Largest radius and depth of the grid (m); chosen by hand."""
+"""Largest accepted radius and depth of the grid (m). Chosen: larger values are mistyped or in another unit."""
 MAX_LISTED_PROBLEMS = 3
-"""Number of problems that an error lists; of the others only the number is given."""
+"""Number of problems that an error lists; of the others only the number is given. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,13 +134,13 @@ def summarise_calibration(result: CalibrationResult) -> dict[str, Any]:
 def format_calibration_lines(result: CalibrationResult) -> tuple[str, ...]:
     """Format the summary of a calibration as lines of text for the terminal."""
     summary = summarise_calibration(result)
-    positions, (least_kg, most_kg) = summary["positions"], summary["mass_kg"]
+    positions, (min_kg, max_kg) = summary["positions"], summary["mass_kg"]
     inertia_text = ", ".join(f"{summary['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
     gravity_text = ", ".join(f"{force_n:.2g}" for force_n in summary["centre"]["gravity_n"])
     return (
         f"{summary['device']}, {summary['details']}: {positions['read']} positions read, {positions['filled']} filled "
         f"in by mirror lines, {positions['unknown']} unknown",
-        f"Inertia at the centre along x, y, z: {inertia_text} kg; {least_kg:.3g} to {most_kg:.3g} kg over all "
+        f"Inertia at the centre along x, y, z: {inertia_text} kg; {min_kg:.3g} to {max_kg:.3g} kg over all "
         f"positions and directions; held against gravity by {gravity_text} N",
         "Mirror lines, largest difference of inertia: "
         + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in summary["lines"]),
@@ -153,10 +153,10 @@ def _read_grid(
 ) -> CalibrationResult:
     """Read the calibration over the whole grid, without writing it. All readings are checked before an error is raised,
     so that it can list all problems. Raises CalibrationError, DeviceError."""
-    azimuths = estimate_arm_azimuths(_read_centre_jacobian(linkage))
-    readings, unread_positions_m, largest_error = [], [], 0.0
+    azimuths_rad = estimate_arm_azimuths(_read_centre_jacobian(linkage))
+    readings, unread_positions_m, max_difference_error = [], [], 0.0
     problems: list[str] = []
-    grid_m = make_symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
+    grid_m = make_symmetric_grid(azimuths_rad, plan.radius_m, plan.depth_m)
     for index, position_m in enumerate(grid_m):
         reading = linkage.compute_reading_at(position_m)
         if reading is None:
@@ -164,15 +164,15 @@ def _read_grid(
         else:
             readings.append(reading)
             problems += check_reading(reading)
-            largest_error = max(largest_error, _compute_difference_error(linkage, reading))
+            max_difference_error = max(max_difference_error, _compute_difference_error(linkage, reading))
         on_progress(index / len(grid_m))
     if problems:
         raise CalibrationError(tuple(problems))
     filled_readings, unknown_positions_m = complete_by_symmetry(
-        readings, azimuths, np.array(unread_positions_m).reshape(-1, 3)
+        readings, azimuths_rad, np.array(unread_positions_m).reshape(-1, 3)
     )
-    asymmetry, worst_position_m = measure_line_asymmetry(readings, azimuths)
-    line_deg = np.degrees(azimuths)
+    asymmetry, worst_position_m = measure_line_asymmetry(readings, azimuths_rad)
+    line_deg = np.degrees(azimuths_rad)
     calibration = LinkageCalibration(
         device=linkage.info.name,
         details=linkage.info.details,
@@ -181,7 +181,7 @@ def _read_grid(
         filled=np.array([0.0] * len(readings) + [1.0] * len(filled_readings)),
         line_deg=line_deg,
         asymmetry=asymmetry,
-        difference=largest_error,
+        difference=max_difference_error,
         provenance=gather_provenance().as_dict(),
     )
     return CalibrationResult(
@@ -222,8 +222,8 @@ def _compute_difference_error(linkage: "LinkageSource", reading: LinkageReading)
 def _stack_readings(readings: list[LinkageReading]) -> dict[str, Any]:
     """Stack the arrays of all readings along a new first dimension, by the names of the fields of
     `LinkageCalibration`."""
-    names = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n")
-    return {name: np.stack([getattr(reading, name) for reading in readings]) for name in names}
+    field_names = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n")
+    return {name: np.stack([getattr(reading, name) for reading in readings]) for name in field_names}
 
 
 def _make_inconsistency_error(device_name: str, problems: tuple[str, ...]) -> DeviceError:

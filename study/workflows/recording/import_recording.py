@@ -27,7 +27,7 @@ from study.importing.map_format.map_errors import (
     MapNeededError,
 )
 from study.importing.map_library import (
-    NO_DATA,
+    NON_DATA_SUFFIXES,
     MapFile,
     find_map_for_files,
     find_maps_for_folder,
@@ -69,7 +69,7 @@ class ImportedRecording:
     """What was assumed, changed or left out, as sentences."""
 
 
-def check_free(out_path: Path) -> None:
+def require_new_output(out_path: Path) -> None:
     """Raise StudyError if `out_path` exists already, or its folder does not."""
     require_new_outputs(out_path, title="Nothing was imported", kind="recordings")
 
@@ -77,7 +77,7 @@ def check_free(out_path: Path) -> None:
 def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> ImportedRecording:
     """Import a recording and write it to `plan.out`, with the files' hashes and the map in its metadata. on_progress:
     share done, 0 to 1. Raises StudyError; nothing is written then."""
-    check_free(plan.out)
+    require_new_output(plan.out)
     foreign = read_foreign(plan.files, plan.map, on_progress)
     provenance = gather_provenance(parents=foreign.files).as_dict()
     import_metadata: dict[str, Any] = {"map": foreign.map, "notes": list(foreign.notes)}
@@ -127,7 +127,7 @@ def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path,
             file for file in folder_files if any(fnmatchcase(file.name, pattern) for pattern in import_map.files)
         ]
         data_files += (
-            [file for file in matching_files if file.is_file() and file.suffix not in NO_DATA]
+            [file for file in matching_files if file.is_file() and file.suffix not in NON_DATA_SUFFIXES]
             if folder_files
             else [path]
         )

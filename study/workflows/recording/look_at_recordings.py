@@ -1,7 +1,8 @@
-"""Inspect recordings without a model (`hapteq look`): write a page with figures, lines of text, and a JSON document.
+"""Inspect recordings without a model: a page with figures, lines of text, and a JSON document. Called by
+`study.cli.look` (`hapteq look`) and `study.cli.show`.
 
-The results (levels, driven bands, coherence, repeats, consistency checks) come from `analysis.look`; this
-module reads the files and writes the results.
+The results (levels, driven bands, coherence, repeats, consistency checks) come from `analysis.look`; this module reads
+the files and writes the results.
 """
 
 import json
@@ -27,8 +28,8 @@ Progress = Callable[[float], None]
 
 
 def inspect_recordings(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
-    """Overviews of hapteq recordings, and of foreign files that can be imported without a map. Raises StudyError for
-    other files."""
+    """Compute the overviews of hapteq recordings, and of foreign files that can be imported without a map. on_progress:
+    called after each file. Raises StudyError for other files."""
     overviews = []
     for count, path in enumerate(paths, start=1):
         recording, notes = read_any_recording(path)
@@ -44,60 +45,72 @@ def write_look_page(overviews: Sequence[Overview], folder: Path) -> Path:
     CannotWriteError."""
     pictures = make_recording_pictures(overviews)
     write_pictures(folder / "figures", [picture for recording_pictures in pictures for picture in recording_pictures])
-    provenance = {"recordings": ", ".join(entry.name for entry in overviews)}
+    provenance = {"recordings": ", ".join(overview.name for overview in overviews)}
     write_text(
         folder / PAGE_NAME, render_look_report(overviews, pictures, provenance, format_local_now()), overwrite=True
     )
     return folder / PAGE_NAME
 
 
-def list_recording_facts(entry: Overview) -> tuple[str, ...]:
-    """Lines about a recording: device, duration, sample rate, hold of the commands, metadata, remarks of the import."""
-    recording, meta = entry.recording, entry.recording.meta
-    parts = len(entry.stretches)
-    rate = f"{recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, " if recording.is_timed else ""
-    facts = [
-        f"{entry.name}: {recording.device}, {rate}{len(recording)} samples{f' in {parts} parts' if parts > 1 else ''}",
+def list_recording_facts(overview: Overview) -> tuple[str, ...]:
+    """Format lines about a recording: device, duration, sample rate, hold of the commands, metadata, remarks of the
+    import."""
+    recording, meta = overview.recording, overview.recording.meta
+    part_count = len(overview.stretches)
+    timing_text = (
+        f"{recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, " if recording.is_timed else ""
+    )
+    lines = [
+        f"{overview.name}: {recording.device}, {timing_text}{len(recording)} samples"
+        f"{f' in {part_count} parts' if part_count > 1 else ''}",
         f"hold: {recording.hold.value}",
     ]
     omitted_keys = ("provenance", "parts", "import")
-    facts += [
+    lines += [
         f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in meta.items() if key not in omitted_keys
     ]
-    origin = meta.get("import")
-    notes = origin.get("notes", ()) if isinstance(origin, dict) else ()
-    return (*facts, *(f"import: {note}" for note in notes))
+    import_metadata = meta.get("import")
+    notes = import_metadata.get("notes", ()) if isinstance(import_metadata, dict) else ()
+    return (*lines, *(f"import: {note}" for note in notes))
 
 
 def make_look_document(overviews: Sequence[Overview]) -> list[dict[str, Any]]:
-    """JSON document: one object per recording. sample_rate_hz is 1 where the time axis is unknown; see `Recording`."""
-    return [_describe_overview(entry) for entry in overviews]
+    """Make the JSON document: one object per recording. sample_rate_hz is 1 where the time axis is unknown; see
+    `Recording`."""
+    return [_describe_overview(overview) for overview in overviews]
 
 
-def _describe_overview(entry: Overview) -> dict[str, Any]:
-    """The results of one recording as plain values."""
-    recording = entry.recording
+def _describe_overview(overview: Overview) -> dict[str, Any]:
+    """Collect the results of one recording as plain values."""
+    recording = overview.recording
     return {
-        "recording": entry.name,
+        "recording": overview.name,
         "device": recording.device,
         "sample_rate_hz": recording.sample_rate_hz,
         "samples": len(recording),
         "hold": recording.hold.value,
         "time": "unknown" if recording.meta.get("time") == "unknown" else "known",
-        "channels": [_replace_nonfinite(asdict(summary)) for summary in entry.summaries],
-        "segments": [asdict(level) for level in entry.levels],
-        "driven": [asdict(band) for band in entry.bands],
+        "channels": [_replace_nonfinite(asdict(summary)) for summary in overview.summaries],
+        "segments": [asdict(level) for level in overview.levels],
+        "driven": [asdict(band) for band in overview.bands],
         "coherence": [
-            {"response": c.response, "share": c.share, "lowest_hz": c.lowest_hz, "lowest": c.lowest}
-            for c in entry.coherences
+            {
+                "response": coherence.response,
+                "share": coherence.share,
+                "lowest_hz": coherence.lowest_hz,
+                "lowest": coherence.lowest,
+            }
+            for coherence in overview.coherences
         ],
-        "derivatives": [asdict(pair) for pair in entry.pairs],
-        "found_period": entry.repeats.undeclared_period,
-        "repeats": [asdict(noise) for noise in entry.repeats.noise],
-        "checks": [asdict(check) for check in entry.checks],
+        "derivatives": [asdict(pair) for pair in overview.pairs],
+        "found_period": overview.repeats.undeclared_period,
+        "repeats": [asdict(noise) for noise in overview.repeats.noise],
+        "checks": [asdict(check) for check in overview.checks],
     }
 
 
-def _replace_nonfinite(entry: dict[str, Any]) -> dict[str, Any]:
-    """The entry with None in place of NaN and infinity, which JSON does not have."""
-    return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in entry.items()}
+def _replace_nonfinite(values: dict[str, Any]) -> dict[str, Any]:
+    """Replace NaN and infinity, which JSON does not have, by None in the values of a dictionary."""
+    return {
+        key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in values.items()
+    }

@@ -1,7 +1,8 @@
 """Play the pieces of a recording on a device one after another. Called by `record_device`.
 
 A piece is a sinusoid, a sweep or a multisine realisation; each play of a piece is a take. Where the sensor or the force
-reached its limit, the piece is played again with a lower amplitude; the last take is kept.
+reached its limit, and the protocol allows it (`lower_on_clip`), the piece is played again with a lower amplitude; the
+last take is kept.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from study.errors import DeviceError
 from study.session.stimulus.recording_pieces import RecordingPiece, make_pieces
 
 AMPLITUDE_REDUCTION = 0.7
-"""Factor of the amplitude from a take to the next (-3 dB): 0.17 after five. Chosen."""
+"""Factor of the amplitude from a take to the next (-3 dB): 0.17 after five reductions. Chosen."""
 
 MAX_TAKES = 6
 """Largest number of takes of a piece. Chosen: a sensor that clips at 0.17 of the amplitude is faulty, or configured for
@@ -58,7 +59,7 @@ def play_pieces(
     for later repetitions of the same segment and frequency.
 
     on_progress: called with the seconds played, repeated takes not counted; decreases where a piece is repeated. Raises
-    DeviceError where the device stopped; `kept_takes` then has the pieces before.
+    DeviceError where the device stopped; `kept_takes` then contains the pieces before.
     """
     total_s = 0.0
     amplitude_shares: dict[tuple[int, float | None], float] = {}
@@ -90,18 +91,20 @@ def _repeat_until_unclipped(
     amplitude. amplitude_share: amplitude of the first take relative to the requested one; on_progress: called with the
     share of the take that is played, 0 to 1."""
     requested_n = piece.segment.amplitude
-    least_n = min(protocol.least_amplitude_n, requested_n)
-    amplitude_n, sensor_clipped, total_clipped = amplitude_share * requested_n, 0, 0
+    min_amplitude_n = min(protocol.least_amplitude_n, requested_n)
+    amplitude_n, sensor_clipped_before, total_clipped_before = amplitude_share * requested_n, 0, 0
     for tries in range(1, MAX_TAKES + 1):
         scaled_piece = piece if amplitude_n == requested_n else piece.scale_to(amplitude_n)
         recording, health = _play_take(device, scaled_piece, on_progress)
-        is_last = tries == MAX_TAKES or amplitude_n <= least_n or not protocol.lower_on_clip
+        is_last = tries == MAX_TAKES or amplitude_n <= min_amplitude_n or not protocol.lower_on_clip
         if is_last or not is_clipped(health):
             break
-        sensor_clipped += health.sensor_clipped
-        total_clipped += health.total_clipped + health.feedback_clipped
-        amplitude_n = max(AMPLITUDE_REDUCTION * amplitude_n, least_n)
-    return RecordedTake(scaled_piece, requested_n, tries, sensor_clipped, total_clipped, recording, health)
+        sensor_clipped_before += health.sensor_clipped
+        total_clipped_before += health.total_clipped + health.feedback_clipped
+        amplitude_n = max(AMPLITUDE_REDUCTION * amplitude_n, min_amplitude_n)
+    return RecordedTake(
+        scaled_piece, requested_n, tries, sensor_clipped_before, total_clipped_before, recording, health
+    )
 
 
 def _play_take(device: Device, piece: RecordingPiece, on_progress: Callable[[float], None]) -> tuple[Recording, Health]:

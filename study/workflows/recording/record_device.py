@@ -1,7 +1,8 @@
 """Record a device: play all pieces of a recording protocol on it, and write commands and readings into one HDF5 file.
 
 Each piece is one excitation with a rest before and after it (`recording_pieces`). If the user interrupts or the device
-fails, the pieces that are complete are written.
+fails, the pieces that are complete are written. Called by `study.cli.record` (`hapteq record`), `write_twin`,
+`daily_check` and `reproduce_recordings`.
 """
 
 import contextlib
@@ -70,7 +71,7 @@ def record_device(
     Raises StudyError before anything moves if `out` exists already; UserInterruptError after KeyboardInterrupt, and
     DeviceError if the device fails, both after the complete pieces were written.
     """
-    require_free_output(plan.out)
+    require_new_output(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     with contextlib.closing(open_device(plan.device, make_recording_settings(plan), clock, plan.seed)) as device:
         return record_on_device(device, plan, on_progress, before_moving)
@@ -83,7 +84,7 @@ def record_on_device(
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """Record on an open device, whose settings are those of `make_recording_settings`. Arguments and errors are as for
-    `record_device`, but `require_free_output` is left to the caller."""
+    `record_device`, but `require_new_output` is left to the caller."""
     takes: list[RecordedTake] = []
     try:
         if not device.info.simulated:
@@ -101,13 +102,13 @@ def record_on_device(
     return _write_takes(plan, device, takes, interrupted=False)
 
 
-def require_free_output(out_path: Path) -> None:
+def require_new_output(out_path: Path) -> None:
     """Raise StudyError if a file of this name exists, or its folder does not."""
     require_new_outputs(out_path, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
 def _make_interrupted_error(plan: RecordingPlan, take_count: int) -> UserInterruptError:
-    """Error after an interruption with the force released. take_count: number of complete pieces."""
+    """Make the error after an interruption with the force released. take_count: number of complete pieces."""
     piece_count = len(make_pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",
@@ -118,7 +119,7 @@ def _make_interrupted_error(plan: RecordingPlan, take_count: int) -> UserInterru
 
 
 def _make_force_left_error(plan: RecordingPlan, take_count: int) -> DeviceError:
-    """Error where the device may still exert a force. take_count: number of complete pieces."""
+    """Make the error where the device may still exert a force. take_count: number of complete pieces."""
     return DeviceError(
         "The force may still be on",
         Fault.FORCE_LEFT.sentence,
@@ -128,7 +129,7 @@ def _make_force_left_error(plan: RecordingPlan, take_count: int) -> DeviceError:
 
 
 def _describe_saved(plan: RecordingPlan, take_count: int) -> str:
-    """Sentence on what was written. take_count: number of complete pieces."""
+    """Describe, in a sentence, what was written. take_count: number of complete pieces."""
     return f"The {take_count} whole pieces are in {plan.out}." if take_count else "Nothing was written."
 
 
@@ -139,12 +140,12 @@ def _write_complete_takes(plan: RecordingPlan, device: Device, takes: list[Recor
 
 
 def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
-    """Settings with which the device is opened: force limits, virtual spring, and place of the handle."""
+    """Make the settings with which the device is opened: force limits, virtual spring, and place of the handle."""
     return DeviceSettings(
         limits=make_recording_limits(plan.protocol),
         spring_frequency_hz=plan.protocol.spring.natural_frequency_hz,
         spring_damping_n_s_per_m=plan.protocol.spring.damping_n_s_per_m,
-        keep_s=1.0,
+        keep_s=1.0,  # without effect: it limits the recording of held stimuli only
         hand_on_handle=plan.protocol.hand == "held",
         place_m=plan.place_m,
     )
@@ -152,13 +153,13 @@ def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
 
 def _write_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> WrittenRecording:
     """Join the pieces into one recording with a segment each, and write it."""
-    parts = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
-    write_recording(plan.out, join(parts, _make_metadata(plan, device, takes, interrupted)))
+    piece_recordings = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
+    write_recording(plan.out, join(piece_recordings, _make_metadata(plan, device, takes, interrupted)))
     return WrittenRecording(plan.out, tuple(warning for take in takes for warning in list_warnings(take)))
 
 
 def _make_metadata(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> dict[str, Any]:
-    """Metadata of the recording's file: protocol, place, spring, facts on each segment, provenance."""
+    """Make the metadata of the recording's file: protocol, place, spring, description of each segment, provenance."""
     protocol = plan.protocol
     return {
         "protocol": protocol.name,

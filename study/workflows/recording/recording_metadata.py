@@ -1,5 +1,8 @@
-"""Metadata of a recording that `record_device` stores: parameters of the feedback, and facts about each played piece (a
-take). Also the warnings about each piece for the experimenter."""
+"""Metadata of a recording's file, and warnings for the experimenter about its pieces. Called by `record_device`.
+
+The metadata are the parameters of the virtual spring and a description of each played piece (`describe_segment`), that
+is of its kept take.
+"""
 
 import math
 from dataclasses import asdict
@@ -45,31 +48,34 @@ def describe_segment(take: RecordedTake) -> dict[str, Any]:
 def list_warnings(take: RecordedTake) -> list[str]:
     """List warnings for the experimenter, as sentences: lowered amplitude, clipping of the accelerometer, the spring
     and the force, missed ticks, lost packets, slew limit. Empty without any of these."""
-    health, description = take.health, _describe_piece(take)
+    health, piece_text = take.health, _describe_piece(take)
     warnings = []
     if take.played_n < take.requested_n:
         warnings.append(_describe_reduction(take))
     if health.sensor_clipped:
         warnings.append(
-            f"The accelerometer clipped in {health.sensor_clipped} samples at {take.played_n:.3g} N ({description})."
+            f"The accelerometer clipped in {health.sensor_clipped} samples at {take.played_n:.3g} N ({piece_text})."
         )
     if health.feedback_clipped:
-        warnings.append(f"The spring's pull was limited at its cap at {take.played_n:.3g} N ({description}).")
+        warnings.append(f"The spring's pull was limited at its cap at {take.played_n:.3g} N ({piece_text}).")
     if health.total_clipped or health.stimulus_clipped:
-        warnings.append(f"The force was limited at its cap at {take.played_n:.3g} N ({description}).")
+        warnings.append(f"The force was limited at its cap at {take.played_n:.3g} N ({piece_text}).")
     if health.missed_ticks:
-        warnings.append(f"{health.missed_ticks} ticks were missed ({description}); they are NaN.")
+        warnings.append(f"{health.missed_ticks} ticks were missed ({piece_text}); they are NaN.")
     if health.sensor is not None and health.sensor.missing:
-        warnings.append(_describe_lost_packets(health.sensor, description))
+        warnings.append(_describe_lost_packets(health.sensor, piece_text))
     if health.slew_limited:
-        warnings.append(f"The force was slowed by the slew limit ({description}).")
+        warnings.append(f"The force was slowed by the slew limit ({piece_text}).")
     return warnings
 
 
-def _describe_lost_packets(sensor: SensorFacts, description: str) -> str:
-    """Format the warning about lost packets of the accelerometer. description: the piece in words."""
-    packets = f"{sensor.lost} of {sensor.lost + sensor.packets} packets of the accelerometer were lost"
-    return f"{packets} ({description}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
+def _describe_lost_packets(sensor: SensorFacts, piece_text: str) -> str:
+    """Format the warning about lost packets of the accelerometer. piece_text: the piece in words."""
+    lost_packets_text = f"{sensor.lost} of {sensor.lost + sensor.packets} packets of the accelerometer were lost"
+    return (
+        f"{lost_packets_text} ({piece_text}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is "
+        "NaN."
+    )
 
 
 def _describe_piece(take: RecordedTake) -> str:

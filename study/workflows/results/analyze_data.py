@@ -8,7 +8,7 @@ import errno
 from pathlib import Path
 
 from analysis.figures.picture import Picture
-from analysis.figures.study_pictures import study_pictures
+from analysis.figures.study_pictures import draw_study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids, read_sensor_frame
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
@@ -56,7 +56,7 @@ def analyze_data(
         seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
         parents=input_paths,
     )
-    pictures = study_pictures(analysis, ellipses)
+    pictures = draw_study_pictures(analysis, ellipses)
     _create_private_folder(out_folder, data)
     note_written_folder(data, out_folder)
     _write_files(out_folder, analysis, pictures, ellipses, provenance, collected)
@@ -104,7 +104,7 @@ def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
         unit_text = " N" if median.lower_n is not None else ""
         interval_text = format_median_interval(median.lower_n, median.upper_n, median.above_cap, 3) + unit_text
         lines.append(f"{median.frequency_hz:7g} Hz  {median_text:>10}  {interval_text}")
-    return [*lines, describe_direction_limit(analysis.primary), analysis.compared]
+    return [*lines, describe_direction_limit(analysis.primary), analysis.comparison_text]
 
 
 def _compute_ellipses(path: Path | None) -> tuple[EllipsoidResult, ...]:

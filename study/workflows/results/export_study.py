@@ -1,4 +1,5 @@
-"""Export of a study's trials for other tools, and reading of exported datasets for an analysis.
+"""Export a study's trials for other tools (`study.cli.export`), and read exported datasets for an analysis
+(`analyze_data`).
 
 Four forms can be written: Psych-DS, BIDS behaviour, MATLAB (.mat) and tidy CSV, each with protocol, seeds and versions;
 Psych-DS and tidy CSV can be read back, and give the same results as the sessions.
@@ -36,7 +37,7 @@ from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.results.collected_trials import CollectedTrials
 
 MAX_LEFT_OUT = 10_000
-"""Largest plausible number of excluded items in a dataset; a larger one is ignored as an error of editing."""
+"""Largest plausible number of excluded items in a dataset; a larger one is ignored as an error of editing. Chosen."""
 EXPORT_AGAIN = "Export the study again, or restore the file from a copy."
 """Remedy for a damaged or edited dataset, for messages."""
 Form = Literal["psych-ds", "bids", "mat", "csv"]
@@ -65,13 +66,14 @@ class ExportResult:
 def export_study(
     collected: CollectedTrials, data: Path, out_folder: Path, form: Form, free_text: bool = False
 ) -> ExportResult:
-    """Write the dataset atomically into the new folder `out_folder`. collected: the sessions of `data` that belong
-    together. free_text: include answers that participants wrote in their own words. Raises StudyError."""
+    """Write the dataset atomically into the new folder `out_folder`. collected: the sessions of the data folder `data`
+    that belong together. free_text: include answers that participants wrote in their own words. Raises StudyError where
+    `out_folder` exists or cannot be written."""
     require_new_folder(out_folder)
-    facts, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
+    metadata, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
     with create_new_folder(out_folder) as folder:
         files = WRITERS[form](
-            folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), facts, answers
+            folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), metadata, answers
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
     note_written_folder(data, out_folder, always=True)
@@ -79,7 +81,8 @@ def export_study(
 
 
 def _gather_metadata(collected: CollectedTrials) -> dict[str, Any]:
-    """Metadata of the dataset: provenance, seeds, devices, and quality of the models."""
+    """Gather the metadata of the dataset: provenance, seeds, devices, observers, lock of the protocol, number of
+    exclusions, and quality of the models."""
     names = [folder.name for folder in collected.sessions]
     return {
         **gather_provenance(protocol_hash=collected.protocol_hash).as_dict(),
@@ -98,43 +101,44 @@ def _check_rows(folder: Path, trials: Sequence[Trial], kind: str) -> None:
     """Raise StudyError for a dataset without trials, UnusableFileError where a presentation occurs more than once."""
     if not trials:
         raise StudyError("There is nothing to analyse", f"{folder} holds no trial.", "Export the study again.")
-    rows = Counter((trial.session, trial.run, trial.trial, trial.attempt) for trial in trials)
-    twice = [
+    presentation_counts = Counter((trial.session, trial.run, trial.trial, trial.attempt) for trial in trials)
+    duplicates = [
         f"session {session}, run {run}, trial {trial}, attempt {attempt} is there {count} times"
-        for (session, run, trial, attempt), count in rows.items()
+        for (session, run, trial, attempt), count in presentation_counts.items()
         if count > 1
     ]
-    if twice:
-        raise UnusableFileError(folder, kind, tuple(twice))
+    if duplicates:
+        raise UnusableFileError(folder, kind, tuple(duplicates))
 
 
-def _write_exclusion_sentences(facts: Mapping[str, Any]) -> tuple[str, ...]:
-    """A sentence for each item that was excluded before the export; empty where the metadata do not state the
-    number."""
-    count = facts.get("left_out_count", 0)
+def _write_exclusion_sentences(metadata: Mapping[str, Any]) -> tuple[str, ...]:
+    """Write a sentence for each item that was excluded before the export; none where the metadata state no number, or
+    one that is not plausible (`MAX_LEFT_OUT`)."""
+    count = metadata.get("left_out_count", 0)
     if not isinstance(count, int) or not 0 <= count <= MAX_LEFT_OUT:
         return ()
     return tuple(f"Before the export, {number} of {count} was left out." for number in range(1, count + 1))
 
 
-def _read_qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """(sessions, sentence) on the quality of each model; malformed entries are ignored."""
-    entries = facts.get("model_qualities", [])
+def _read_qualities(metadata: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Read, for each model, its sessions and a sentence on its quality; malformed entries are ignored."""
+    entries = metadata.get("model_qualities", [])
     rows = entries if isinstance(entries, list) else []
     return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
-def _read_seeds(facts: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
-    """Seeds by session; empty where the metadata state none. Raises UnusableFileError for values that are no seeds."""
-    seeds = facts.get("seeds", {})
+def _read_seeds(metadata: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
+    """Read the seeds by session; empty where the metadata state none. Raises UnusableFileError for values that are no
+    seeds."""
+    seeds = metadata.get("seeds", {})
     if not isinstance(seeds, dict) or any(type(seed) is not int for seed in seeds.values()):
         raise UnusableFileError(path, kind, ("its seeds are no whole numbers by session",), EXPORT_AGAIN)
     return seeds
 
 
-def _read_names(facts: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[str, ...]:
-    """Texts under a key of the metadata; empty without that key. Raises UnusableFileError for another type."""
-    names = facts.get(key, [])
+def _read_names(metadata: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[str, ...]:
+    """Read the texts under a key of the metadata; empty without that key. Raises UnusableFileError for another type."""
+    names = metadata.get(key, [])
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise UnusableFileError(path, kind, (f"its {key} are no list of texts",), EXPORT_AGAIN)
     return tuple(names)
@@ -146,12 +150,15 @@ def is_exported(folder: Path) -> bool:
 
 
 def collect_exported(folder: Path) -> CollectedTrials:
-    """Read a dataset that `export_study` wrote as Psych-DS or tidy CSV. Raises StudyError, for example where the
-    protocol was changed after the export."""
-    psych_ds = is_psych_ds(folder)
-    dataset = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)
-    path, kind = folder / (PROTOCOL_NAME if psych_ds else tidy_csv.PROTOCOL_NAME), KIND if psych_ds else tidy_csv.KIND
-    facts_path = folder / (DESCRIPTION_NAME if psych_ds else tidy_csv.FACTS_NAME)
+    """Read a dataset that `export_study` wrote as Psych-DS or tidy CSV. A session without a seed in the metadata gets
+    the seed 0. Raises StudyError, for example where the protocol was changed after the export."""
+    has_psych_ds = is_psych_ds(folder)
+    dataset = read_psych_ds(folder) if has_psych_ds else tidy_csv.read_tidy_csv(folder)
+    path, kind = (
+        folder / (PROTOCOL_NAME if has_psych_ds else tidy_csv.PROTOCOL_NAME),
+        KIND if has_psych_ds else tidy_csv.KIND,
+    )
+    metadata_path = folder / (DESCRIPTION_NAME if has_psych_ds else tidy_csv.FACTS_NAME)
     try:
         protocol = load_protocol(dataset.protocol_text, path.name)
     except ProtocolError as error:
@@ -160,10 +167,13 @@ def collect_exported(folder: Path) -> CollectedTrials:
         raise UnusableFileError(path, kind, ("it is no protocol of a study",))
     if dataset.facts.get("protocol_hash", hash_protocol(protocol)) != hash_protocol(protocol):
         raise UnusableFileError(
-            path, kind, (f"it was changed since the export: its hash is not that of {facts_path.name}",), EXPORT_AGAIN
+            path,
+            kind,
+            (f"it was changed since the export: its hash is not that of {metadata_path.name}",),
+            EXPORT_AGAIN,
         )
     _check_rows(folder, dataset.trials, kind)
-    seeds = _read_seeds(dataset.facts, facts_path, kind)
+    seeds = _read_seeds(dataset.facts, metadata_path, kind)
     sessions = tuple(dict.fromkeys(trial.session for trial in dataset.trials))
     return CollectedTrials(
         protocol=protocol,
@@ -171,8 +181,8 @@ def collect_exported(folder: Path) -> CollectedTrials:
         trials=dataset.trials,
         sessions=tuple(SessionFolder(folder / name) for name in sessions),
         seeds=tuple(seeds.get(name, 0) for name in sessions),
-        devices=_read_names(dataset.facts, "devices", facts_path, kind),
-        observers=_read_names(dataset.facts, "observers", facts_path, kind),
+        devices=_read_names(dataset.facts, "devices", metadata_path, kind),
+        observers=_read_names(dataset.facts, "observers", metadata_path, kind),
         exclusions=_write_exclusion_sentences(dataset.facts),
         model_qualities=_read_qualities(dataset.facts),
         lock_statement=str(dataset.facts.get("locked", "not known")),

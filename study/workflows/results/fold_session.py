@@ -1,8 +1,10 @@
 """Read a session: compute its state from the events of its log, applied in order (a fold, as in event sourcing).
 
 Every line is checked against its checksum, every presentation against the rules of the protocol, and the log against
-its seals and, for an open session, the stored results. Nothing on disk is changed. All workflows that read a session
-call `fold_session`, so that damage is always detected."""
+its seals and, for an open session, the stored results. Nothing on disk is changed. The workflows that use the answers
+of a session call `fold_session`, so that damage is detected before; `watch_session`, which follows a log that is being
+written, calls only `load_logged_protocol`.
+"""
 
 from dataclasses import dataclass
 
@@ -81,12 +83,12 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
 def _require_complete_log(state: SessionState, folder: SessionFolder) -> None:
     """Raise StudyError where the stored results of an open session cover more presentations than the log, or a closed
     session: the end of the log was lost. Otherwise the log would look like that of an interrupted session."""
-    is_closed, presentations = read_closed_and_presentations(read_summary(folder.path))
-    if is_closed or presentations > len(state.trials):
-        covered = "a finished session" if is_closed else f"{presentations} presentations"
+    is_closed, presentation_count = read_closed_and_presentations(read_summary(folder.path))
+    if is_closed or presentation_count > len(state.trials):
+        covered_text = "a finished session" if is_closed else f"{presentation_count} presentations"
         raise StudyError(
             "The end of this session's log is missing",
-            f"{SUMMARY_NAME} of {folder.name} was made from {covered}; the log ends before that, after "
+            f"{SUMMARY_NAME} of {folder.name} was made from {covered_text}; the log ends before that, after "
             f"{len(state.trials)} presentations.",
             "Restore events.jsonl from a copy.",
             saved="Nothing was changed.",

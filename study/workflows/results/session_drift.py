@@ -24,7 +24,7 @@ DAILY_LIMITS = ChangeLimits()
 """Limits of the daily device check."""
 MAX_CHANGES = {
     "friction": DAILY_LIMITS.friction_n,
-    "gain": DAILY_LIMITS.share,
+    "gain": DAILY_LIMITS.relative_step,
     "delay": 1e-3,
     "mass": 0.05,
     "damping": 3.0,
@@ -35,7 +35,7 @@ mass in kg, damping in N s/m, stiffness in N/m. Beyond them a threshold may chan
 staircase. Friction and gain as in the daily check; delay: one tick of the control loop; hand: about half the values of
 a light grip."""
 
-WITHOUT_HAND = ("friction", "gain", "delay")
+HAND_FREE_QUANTITIES = ("friction", "gain", "delay")
 """Quantities that are estimated from references, which are recorded without a hand."""
 
 
@@ -56,21 +56,21 @@ class DriftReader:
         """folder: the session, whose recordings of probes are read."""
         self._folder = folder
         self._usable_probes: list[tuple[PlayedProbe, _ProbeLines]] = []
-        self._read_count = 0
+        self._read_probe_count = 0
         self._first_found_s: dict[tuple[str, str, str], float] = {}
         self._records_by_kind: dict[str, tuple[DriftRecord, ...]] = {}
 
     def update(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftRecord, ...]:
         """Read new probes and return the present drifts: of device and hand within the sitting, from probes; of the
         device alone over the session, from references. probes: all probes of the session so far, in their order."""
-        for probe in probes[self._read_count :]:
+        for probe in probes[self._read_probe_count :]:
             probe_lines = self._read_probe(probe)
             if probe_lines is not None and probe.kind in ("hand", "reference"):
                 self._usable_probes.append((probe, probe_lines))
                 self._records_by_kind[probe.kind] = tuple(
                     self._make_drift_records(probe.kind, self._compare_probe(probe))
                 )
-        self._read_count = len(probes)
+        self._read_probe_count = len(probes)
         return tuple(record for records in self._records_by_kind.values() for record in records)
 
     def _compare_probe(self, newest_probe: PlayedProbe) -> tuple[Drift, ...]:
@@ -84,7 +84,7 @@ class DriftReader:
                 find_drifts(
                     (*first_reference.timed_probes, last_reference.timed_probes[-1]),
                     _compute_period(last_reference),
-                    WITHOUT_HAND,
+                    HAND_FREE_QUANTITIES,
                 )
                 if last_reference is not first_reference
                 else ()

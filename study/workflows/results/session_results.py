@@ -1,7 +1,8 @@
 """Results that are derived from a session's log: seal, tables of trials and thresholds, and summary.
 
 The log is the only source: each result can be computed from it again, and `find_result_problems` compares the files
-with what the log gives.
+with what the log gives. Called by the workflows that end, resume, rehearse, simulate, view, validate or collect
+sessions.
 """
 
 from collections.abc import Callable
@@ -57,12 +58,12 @@ def write_tables(folder: SessionFolder) -> SessionState:
 
 
 def list_due_results(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
-    """Names of the results of a closed session that are missing or do not agree with the log, for example because the
-    program was killed before it wrote them. Empty for a session that is not closed."""
+    """List the names of the results of a closed session that are missing or do not agree with the log, for example
+    because the program was killed before it wrote them. Empty for a session that is not closed."""
     if not folded_session.state.closed:
         return ()
-    seal = (SEAL_NAME,) if folded_session.seal_due else ()
-    return (*seal, *(problem.file for problem in find_result_problems(folder, folded_session.state)))
+    seal_files = (SEAL_NAME,) if folded_session.seal_due else ()
+    return (*seal_files, *(problem.file for problem in find_result_problems(folder, folded_session.state)))
 
 
 def finish_tables(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
@@ -75,44 +76,46 @@ def finish_tables(folder: SessionFolder, folded_session: FoldedSession) -> tuple
 
 
 def find_result_problems(folder: SessionFolder, state: SessionState) -> tuple[ResultProblem, ...]:
-    """Tables and summary that are missing, damaged, or differ from the log."""
+    """Find the tables and the summary that are missing, damaged, or differ from the log."""
     problems = [
         _check_file(
             folder, TRIALS_NAME, lambda path: read_trials(path) == _drop_absent_columns(path, state.trials, Trial)
         )
     ]
     for name, rows in _compute_tables(state).items():
-        agrees = partial(_is_same_thresholds, rows)
-        problems.append(_check_file(folder, name, agrees))
-    problems.append(_check_file(folder, SUMMARY_NAME, lambda path: _is_same_summary(folder, state)))
+        agrees_with_log = partial(_has_same_thresholds, rows)
+        problems.append(_check_file(folder, name, agrees_with_log))
+    problems.append(_check_file(folder, SUMMARY_NAME, lambda path: _has_same_summary(folder, state)))
     return tuple(problem for problem in problems if problem is not None)
 
 
-def _check_file(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
-    """The problem of one file; None where it can be read and `agrees` is true of its path."""
+def _check_file(folder: SessionFolder, name: str, agrees_with_log: Callable[[Path], bool]) -> ResultProblem | None:
+    """Check one file. Returns its problem; None where it can be read and `agrees_with_log` is true of its path."""
     path = folder.path / name
     if not path.exists():
         return ResultProblem(name, True, ("is missing",))
     try:
-        return None if agrees(path) else ResultProblem(name, False, ("does not agree with the log",))
+        return None if agrees_with_log(path) else ResultProblem(name, False, ("does not agree with the log",))
     except UnusableFileError as error:
         return ResultProblem(name, False, error.problems)
     except CannotReadError as error:
         return ResultProblem(name, False, (error.happened.rstrip("."),))
 
 
-def _is_same_thresholds(rows: tuple[Threshold, ...], path: Path) -> bool:
+def _has_same_thresholds(thresholds: tuple[Threshold, ...], path: Path) -> bool:
     """Whether the file contains these thresholds."""
-    return read_thresholds(path) == _drop_absent_columns(path, rows, Threshold)
+    return read_thresholds(path) == _drop_absent_columns(path, thresholds, Threshold)
 
 
 def _drop_absent_columns(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row, ...]:
-    """The rows as the file can state them: columns that a file of an older version lacks have their defaults."""
+    """Set the columns that a file of an older version lacks to their defaults, so that the rows are as the file can
+    state them."""
     return drop_absent_columns(read_text(path), rows, row_type)
 
 
 def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
-    """Tables of thresholds of this session, by file name."""
+    """Compute the tables of thresholds of this session, by file name; that of detection thresholds only if there are
+    any."""
     tables = {
         THRESHOLDS_NAME: compute_thresholds(state.trials, state.protocol.staircase, state.protocol.stimulus.rove_db)
     }
@@ -121,16 +124,16 @@ def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
     return tables
 
 
-def _is_same_summary(folder: SessionFolder, state: SessionState) -> bool:
+def _has_same_summary(folder: SessionFolder, state: SessionState) -> bool:
     """Whether the summary on the disk agrees with the log in all keys that both have; a later version may add keys."""
-    stored, expected = read_summary(folder.path), _make_summary(state)
-    if stored is None or "session" not in stored:
+    stored_summary, expected_summary = read_summary(folder.path), _make_summary(state)
+    if stored_summary is None or "session" not in stored_summary:
         return False
-    return all(stored[key] == expected[key] for key in stored.keys() & expected.keys())
+    return all(stored_summary[key] == expected_summary[key] for key in stored_summary.keys() & expected_summary.keys())
 
 
 def _make_summary(state: SessionState) -> dict[str, Any]:
-    """Content of session.json as JSON values, without format, version and provenance."""
+    """Make the content of session.json as JSON values, without format, version and provenance."""
     session_opened = state.opened
     return {
         "session": session_opened.session,

@@ -52,8 +52,8 @@ def write_missing_results(folder: SessionFolder, folded_session: FoldedSession) 
     if folded_session.state.is_finally_ineligible:
         finish_tables(folder, folded_session)
         raise make_ineligible_error(folded_session.state)
-    due_report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
-    due_files = (*list_due_results(folder, folded_session), *due_report)
+    due_report_files = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
+    due_files = (*list_due_results(folder, folded_session), *due_report_files)
     if not due_files:
         raise make_finished_error(folded_session.state, folder)
     with hold_session_lock(folder.path):
@@ -65,7 +65,8 @@ def write_missing_results(folder: SessionFolder, folded_session: FoldedSession) 
 
 
 def _make_unfinished_error(sitting: ConductedSitting) -> StudyError:
-    """Error of an unfinished session: DeviceError if the device had a fault, otherwise UserInterruptError."""
+    """Make the error of an unfinished session: DeviceError if the device had a fault, otherwise UserInterruptError. The
+    advice names `hapteq doctor` for `FAULTS_FOR_DOCTOR`, or closing other programs if the computer was too busy."""
     error_type = UserInterruptError if sitting.fault is Fault.NONE else DeviceError
     device_advice = (
         f"Run hapteq doctor --device {sitting.device_name}, which says what is wrong with it, and correct that. "

@@ -3,7 +3,7 @@
 With the protocol's quantity "delivered_acceleration", forces are computed from required accelerations by a periodic
 inverse of the identified model (`ModelEqualizer`). Levels are still stated as forces in N: `compute_level_scales`
 returns for each frequency the level that corresponds to 1 m/s² (see `study.session.facts.level_scale`). Called by
-`conduct_session` and `open_session`, and before a device is opened by `plan_sitting` and `hapteq rehearse`.
+`conduct_session` and `open_session`, and before a device is opened by `plan_sitting` and `study.cli.rehearse`.
 """
 
 import math
@@ -33,7 +33,7 @@ from study.workflows.equalizer.spring_to_compensate import find_spring_to_compen
 
 MODEL_NAME = "model.h5"
 """File name of the copy of the model in the session folder."""
-LARGEST_PLACE_DISTANCE_M = 0.02
+MAX_PLACE_DISTANCE_M = 0.02
 """Largest distance (m) of the place of identification from the centre of the workspace, where stimuli are played.
 Chosen: models identified farther away leave a coupling between the axes as large as that without an equalizer."""
 
@@ -41,9 +41,9 @@ REQUIRED_CHANNELS = (("fx", "fy", "fz"), ("ax", "ay", "az"))
 """Channels that a model of a study needs: forces, then accelerations, in this order."""
 IDENTIFICATION_REMEDY = "Identify it again with hapteq identify."
 """Remedy for an unusable model, for messages."""
-LARGEST_RESPONSE_ERROR = 0.1
+MAX_RESPONSE_ERROR = 0.1
 """Largest error, relative to the required acceleration, of the acceleration that the model predicts for the equalized
-force of a stimulus. Chosen."""
+force of a stimulus. Chosen: within it the level in m/s² is right to 10 %."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,24 +61,24 @@ NO_EQUALIZER = SessionEqualizer(Identity(), None)
 """Identity equalizer of a study whose stimuli are commanded forces."""
 
 
-def check_model_for_protocol(protocol: StudyProtocol, model: Path | None) -> None:
+def check_model_for_protocol(protocol: StudyProtocol, model_path: Path | None) -> None:
     """Raise StudyError where a model is missing, not needed, or unusable for the protocol (`_check_model`). Called
     before a device is opened."""
     needs_model = protocol.stimulus.quantity == "delivered_acceleration"
-    if needs_model and model is None:
+    if needs_model and model_path is None:
         raise StudyError(
             "This protocol needs an equalizer",
             f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and no model was given.",
             "Give one with --model MODEL.h5; hapteq record and hapteq identify make it.",
         )
-    if model is not None and not needs_model:
+    if model_path is not None and not needs_model:
         raise StudyError(
             "This protocol does not use a model",
-            f"'{protocol.name}' moves the commanded force (stimulus.quantity), so {model} would change nothing.",
+            f"'{protocol.name}' moves the commanded force (stimulus.quantity), so {model_path} would change nothing.",
             "Take --protocol equalized_threshold, or leave out --model.",
         )
-    if model is not None:
-        _check_model(read_identified_model(model), protocol, model)
+    if model_path is not None:
+        _check_model(read_identified_model(model_path), protocol, model_path)
         load_equalizer()
 
 
@@ -88,19 +88,20 @@ def load_equalizer() -> None:
     import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 
-def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> SessionEqualizer:
-    """Make the equalizer for a protocol and a model that passed `check_model_for_protocol`. Raises StudyError where the
-    model does not match the device (another sample rate or spring), or the onset of a stimulus cannot be computed."""
-    if model is None:
+def equalize_stimuli(protocol: StudyProtocol, model_path: Path | None, info: DeviceInfo) -> SessionEqualizer:
+    """Make the equalizer for a protocol and a model that passed `check_model_for_protocol`; `NO_EQUALIZER` without a
+    model. Raises StudyError where the model does not match the device (another sample rate or spring), or the onset of
+    a stimulus cannot be computed."""
+    if model_path is None:
         return NO_EQUALIZER
-    identified = read_identified_model(model)
-    equalizer = _make_equalizer(identified, protocol, info)
+    model = read_identified_model(model_path)
+    equalizer = _make_equalizer(model, protocol, info)
     try:
         scales = compute_level_scales(protocol, equalizer, info.sample_rate_hz)
     except (ValueError, ArithmeticError) as error:  # numerical failure on an invalid model
         raise _make_refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFICATION_REMEDY) from error
-    facts = EqualizedFacts(MODEL_NAME, compute_sha256(model), scales, write_quality_sentence(identified.quality))
-    return SessionEqualizer(equalizer, facts, model)
+    facts = EqualizedFacts(MODEL_NAME, compute_sha256(model_path), scales, write_quality_sentence(model.quality))
+    return SessionEqualizer(equalizer, facts, model_path)
 
 
 def copy_model(equalized: SessionEqualizer, folder: SessionFolder) -> None:
@@ -111,8 +112,8 @@ def copy_model(equalized: SessionEqualizer, folder: SessionFolder) -> None:
 
 
 def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> SessionEqualizer:
-    """Make the equalizer of a resumed session from the model in its folder. Raises StudyError where the model is
-    missing or its SHA-256 differs from the log."""
+    """Make the equalizer of a resumed session from the model in its folder; `NO_EQUALIZER` where the log states none.
+    Raises StudyError where the model is missing or its SHA-256 differs from the log."""
     facts = state.opened.equalized
     if facts is None:
         return NO_EQUALIZER
@@ -186,7 +187,7 @@ def _make_equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: Devic
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
     """Raise StudyError for wrong units or channels, an unstable model, a band that lacks a frequency of the protocol, a
-    place of identification beyond `LARGEST_PLACE_DISTANCE_M`, or a prediction error above `LARGEST_RESPONSE_ERROR`."""
+    place of identification beyond `MAX_PLACE_DISTANCE_M`, or a prediction error above `MAX_RESPONSE_ERROR`."""
     shape_and_units = (model.D.shape, model.input_unit, model.output_unit)
     if shape_and_units != ((3, 3), "N", "m/s^2"):
         raise _make_refusal(
@@ -205,7 +206,7 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
             f"{path} was made for {low_hz:g} to {high_hz:g} Hz; the protocol also plays {', '.join(uncovered_hz)} Hz.",
             "Identify a model that covers the protocol, such as hapteq identify --band 5 50.",
         )
-    if model.place_m is not None and math.dist(model.place_m, (0.0, 0.0, 0.0)) > LARGEST_PLACE_DISTANCE_M:
+    if model.place_m is not None and math.dist(model.place_m, (0.0, 0.0, 0.0)) > MAX_PLACE_DISTANCE_M:
         raise _make_refusal(
             f"{path} was identified at {model.place_m} m, and the study is at the centre.",
             "Record and identify at the centre of the workspace.",
@@ -217,17 +218,19 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
 def _check_axes(model: IdentifiedModel, path: Path) -> None:
     """Raise StudyError for the channel names of `REQUIRED_CHANNELS` in another order: forces would act along wrong
     axes. Other names are accepted."""
-    for names, required in zip((model.input_channels, model.output_channels), REQUIRED_CHANNELS, strict=True):
-        if set(names) == set(required) and names != required:
+    for channels, required_channels in zip(
+        (model.input_channels, model.output_channels), REQUIRED_CHANNELS, strict=True
+    ):
+        if set(channels) == set(required_channels) and channels != required_channels:
             raise _make_refusal(
-                f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order "
-                f"{', '.join(required)}.",
+                f"The channels of {path} are {', '.join(channels)}; a stimulus has them in the order "
+                f"{', '.join(required_channels)}.",
                 "Identify a model from a recording whose channels are in that order.",
             )
 
 
 def _check_predicted_response(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
-    """Raise StudyError where the predicted acceleration G H w differs from w by more than `LARGEST_RESPONSE_ERROR` at a
+    """Raise StudyError where the predicted acceleration G H w differs from w by more than `MAX_RESPONSE_ERROR` at a
     frequency of the protocol. w: unit vector of a direction; G: response of the model; H: its regularised inverse."""
     from equalizer.plant.model_response import compute_model_response
     from equalizer.tracking.feedforward.periodic_inverse import compute_regularised_inverse
@@ -242,7 +245,7 @@ def _check_predicted_response(model: IdentifiedModel, protocol: StudyProtocol, p
         )
         errors = np.linalg.norm(predicted_acceleration - unit_vectors, axis=1).max(axis=1)
     unreachable_hz = [
-        f"{f:g}" for f, error in zip(frequency_hz, errors, strict=True) if not error <= LARGEST_RESPONSE_ERROR
+        f"{line_hz:g}" for line_hz, error in zip(frequency_hz, errors, strict=True) if not error <= MAX_RESPONSE_ERROR
     ]
     if unreachable_hz:
         raise _make_refusal(

@@ -29,7 +29,7 @@ from study.workflows.session.participant_number import find_participant_number
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What determines a new session, apart from the device: fixed before the participant starts."""
+    """Settings of a new session, apart from the device: fixed before the participant starts."""
 
     protocol: StudyProtocol
     protocol_text: str

@@ -39,9 +39,9 @@ def check_participant_code(data: Path, subject: str, simulated: bool) -> None:
             )
 
 
-def find_unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
+def find_unfinished_sessions(data: Path, subject: str, protocol_name: str) -> tuple[SessionFolder, ...]:
     """Find the sessions of this participant code and protocol name that can be resumed, in order of their folders."""
-    return tuple(folder for folder in _list_participant_folders(data, subject) if _is_resumable(folder, protocol))
+    return tuple(folder for folder in _list_participant_folders(data, subject) if _is_resumable(folder, protocol_name))
 
 
 def _list_participant_folders(data: Path, subject: str) -> tuple[SessionFolder, ...]:
@@ -49,14 +49,14 @@ def _list_participant_folders(data: Path, subject: str) -> tuple[SessionFolder, 
     return tuple(folder for folder in list_session_folders(data) if folder.subject == subject)
 
 
-def _is_resumable(folder: SessionFolder, protocol: str) -> bool:
+def _is_resumable(folder: SessionFolder, protocol_name: str) -> bool:
     """Whether the session can be read, follows the protocol of this name, is not closed, and its participant was
     neither excluded nor refused."""
     try:
         state = fold_session(folder).state
     except StudyError:
         return False
-    return not state.closed and not state.sitting.ineligibility and state.protocol.name == protocol
+    return not state.closed and not state.sitting.ineligibility and state.protocol.name == protocol_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ def plan_sitting(
     check_model_for_protocol(plan.protocol, model)
     check_participant_code(data, plan.subject, simulated=observer is not None)
     unfinished_notes = (
-        f"{unfinished.name} is not finished; hapteq resume {unfinished.path} continues it."
-        for unfinished in find_unfinished_sessions(data, plan.subject, protocol_source.protocol.name)
+        f"{folder.name} is not finished; hapteq resume {folder.path} continues it."
+        for folder in find_unfinished_sessions(data, plan.subject, protocol_source.protocol.name)
     )
     return SittingPlan(plan, (*unfinished_notes, *filter(None, [format_data_folder_warning(data)])))

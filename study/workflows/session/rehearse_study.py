@@ -1,7 +1,9 @@
 """Rehearsal of a whole study with simulated participants in parallel processes (`hapteq rehearse`).
 
 Sessions run on the simulated device in virtual time. The same call continues an interrupted rehearsal: unfinished
-sessions are resumed, finished ones are kept. Called by `study.cli.rehearse` and `study.evaluation.reproduction`.
+sessions are resumed, finished ones are kept. Called by `study.cli.rehearse`, by
+`study.evaluation.reproduction.reproduce_paper`, and as `study.rehearse_study` from Python. `number` is that of a
+participant, from 0.
 """
 
 from collections.abc import Callable
@@ -29,8 +31,8 @@ from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import make_observer_participant
 from study.workflows.worker_processes import open_worker_processes
 
-DEVICE = "simulated"
-"""Device of every rehearsal."""
+DEVICE_NAME = "simulated"
+"""Name under which the device of every rehearsal is opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,7 @@ class Rehearsal:
 
 
 def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
-    """Make the observer of participant `number` (from 0). Raises StudyError for an unknown name."""
+    """Make the observer of participant `number`. Raises StudyError for an unknown name."""
     kind = rehearsal.observer.replace("-", "_")
     if kind in MEMBER_KINDS:
         return make_member(kind, number + 1, rehearsal.seed)
@@ -86,7 +88,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
 
 def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished: Callable[[int], None]) -> None:
     """Run the sessions on an executor. Sessions that were begun in the folder are finished in this process first.
-    Raises StudyError where one does not finish."""
+    Raises StudyError where a session does not finish."""
     folders = list_session_folders(rehearsal.data)
     begun_numbers = {
         number
@@ -94,16 +96,19 @@ def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished:
         if any(folder.subject == make_subject_code(number) for folder in folders)
     }
     model_files = {} if rehearsal.model is None else read_file(rehearsal.model)
-    remaining = [number for number in range(rehearsal.subjects) if number not in begun_numbers]
+    remaining_numbers = [number for number in range(rehearsal.subjects) if number not in begun_numbers]
     for finished_count, number in enumerate(sorted(begun_numbers), start=1):
         _rehearse_sitting(rehearsal, number)
         on_finished(finished_count)
-    results = run_tasks(
+    finished_sessions = run_tasks(
         executor,
         rehearse_on_worker,
-        ((participant_number, (rehearsal, model_files, participant_number)) for participant_number in remaining),
+        (
+            (participant_number, (rehearsal, model_files, participant_number))
+            for participant_number in remaining_numbers
+        ),
     )
-    for finished_count, (_, (session, files, end_reason)) in enumerate(results, start=len(begun_numbers) + 1):
+    for finished_count, (_, (session, files, end_reason)) in enumerate(finished_sessions, start=len(begun_numbers) + 1):
         make_folder(rehearsal.data, private=True)
         with create_new_folder(rehearsal.data / session) as session_folder:
             write_files(session_folder, files)
@@ -112,7 +117,7 @@ def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished:
 
 
 def make_subject_code(number: int) -> str:
-    """Make the code of a simulated participant; `number` counts from 0, the code from S001."""
+    """Make the code of a simulated participant: S001 for the number 0."""
     return f"S{number + 1:03d}"
 
 
@@ -148,7 +153,7 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
         return
     else:
         clock = VirtualClock.resume_at(folded_session.state.sitting.last_moment.utc)
-        conducted = conduct_resumed(begun_session, DEVICE, make_observer_participant(observer, seed, clock))
+        conducted = conduct_resumed(begun_session, DEVICE_NAME, make_observer_participant(observer, seed, clock))
     write_tables(conducted.folder)
     _require_finished(conducted.folder.name, conducted.end_reason)
 
@@ -165,7 +170,7 @@ def rehearse_on_worker(rehearsal: Rehearsal, model_files: FileContents, number: 
 
 
 def _run_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
-    """Run a new session of participant `number` (from 0) on the simulated device. Raises StudyError."""
+    """Run a new session of participant `number` on the simulated device. Raises StudyError."""
     observer, seed = make_rehearsed_observer(rehearsal, number), derive_subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
         protocol=rehearsal.protocol,
@@ -178,7 +183,7 @@ def _run_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
         participant_number=number,
         model=rehearsal.model,
     )
-    return conduct_new(plan, DEVICE, make_observer_participant(observer, seed, VirtualClock()))
+    return conduct_new(plan, DEVICE_NAME, make_observer_participant(observer, seed, VirtualClock()))
 
 
 def _require_finished(session: str, end_reason: str) -> None:
@@ -207,8 +212,12 @@ def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
     """Raise StudyError where the folder holds other participants, or sessions with another model, observer, seed or
     protocol."""
     codes = list_subject_codes(rehearsal.subjects)
-    other_sessions = [entry.name for entry in list_session_folders(rehearsal.data) if entry.subject not in codes]
-    if other_sessions:
+    other_sessions = [
+        session_folder.name
+        for session_folder in list_session_folders(rehearsal.data)
+        if session_folder.subject not in codes
+    ]
+    if other_sessions:  # the error names five of them: enough to recognise the other study
         raise StudyError(
             "This folder holds other sessions",
             f"In addition to this rehearsal's participants there is {', '.join(other_sessions[:5])} in "
@@ -222,23 +231,23 @@ def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
         folder = _find_begun_session(rehearsal.data, make_subject_code(number))
         if folder is None:
             continue
-        opened = fold_session(folder).state.opened
-        if opened.equalized is not None and opened.equalized.sha256 != model_sha256:
+        session_opened = fold_session(folder).state.opened
+        if session_opened.equalized is not None and session_opened.equalized.sha256 != model_sha256:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another --model.",
                 "Choose another folder with --out, or the same --model to continue.",
                 saved="Nothing was changed.",
             )
-        if opened.observer != make_rehearsed_observer(rehearsal, number).name:
+        if session_opened.observer != make_rehearsed_observer(rehearsal, number).name:
             raise StudyError(
                 "This folder holds another rehearsal",
-                f"{folder.name} in {rehearsal.data} was begun with the observer {opened.observer}.",
+                f"{folder.name} in {rehearsal.data} was begun with the observer {session_opened.observer}.",
                 "Choose another folder with --out, or the same --observer and --seed to continue.",
                 saved="Nothing was changed.",
             )
-        is_same_seed = opened.seed == derive_subject_seed(rehearsal.seed, number)
-        if not is_same_seed or opened.protocol_text != rehearsal.protocol_text:
+        is_same_seed = session_opened.seed == derive_subject_seed(rehearsal.seed, number)
+        if not is_same_seed or session_opened.protocol_text != rehearsal.protocol_text:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with another seed or protocol.",

@@ -35,7 +35,7 @@ from study.store.sessions.event_log import EventLog, remove_incomplete_line
 from study.store.sessions.live_file import remove_live
 from study.store.sessions.request_inbox import RequestInbox
 from study.store.sessions.session_lock import hold_session_lock
-from study.store.sessions.trial_recordings import find_trial_recording, recording_name
+from study.store.sessions.trial_recordings import find_trial_recording, name_recording
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import write_tables
 from study.workflows.session.open_session import OpenedSession, collect_device_facts
@@ -71,7 +71,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
             _check_resumable(folded_session.state, device, folder)
             remove_incomplete_line(folder.log, folded_session.log_contents)
             utc, observer = clock.utc(), folded_session.state.opened.observer
-            resumed = SessionResumed(
+            resumed_event = SessionResumed(
                 utc=utc,
                 device=collect_device_facts(device),
                 versions=list_versions(),
@@ -79,10 +79,12 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
                 dose_elsewhere=compute_other_session_dose(folder, observer, device.simulated, utc),
                 monotonic_s=clock.now_s(),
             )
-            log.append(resumed)
+            log.append(resumed_event)
             # An interruption by Ctrl-C, which a participant may press too, has another cause than a crash.
             was_interrupted = isinstance(folded_session.log_contents.events[-1], SessionInterrupted)
-            state = _close_open_trial(apply_event(folded_session.state, resumed), folder, log, clock, was_interrupted)
+            state = _close_open_trial(
+                apply_event(folded_session.state, resumed_event), folder, log, clock, was_interrupted
+            )
             yield OpenedSession(folder, log, state)
         finally:
             log.close()
@@ -215,7 +217,7 @@ def _measure_from_recording(
 ) -> TrialMeasured | None:
     """Measure an answered trial from its recording; returns its event, or None if there is no recording. Raises
     StudyError or ValueError if the recording cannot be used."""
-    trial_recording = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
+    trial_recording = find_trial_recording(folder, name_recording(presented.run, presented.trial, presented.attempt))
     if trial_recording is None:
         return None
     saved_file, recording = trial_recording

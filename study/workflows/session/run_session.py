@@ -1,6 +1,5 @@
-"""Main loop of a session: gets the next action from the state machine, performs and logs it, until the session is
-finished or the sitting ends. A sitting is the time from the start or resumption of a session to its end or
-interruption.
+"""Main loop of a session: get the next action from the state machine, perform and log it, until the session is finished
+or the sitting ends. A sitting is the time from the start or resumption of a session to its end or interruption.
 
 `conduct_session` calls it for new and resumed sessions. The state machine is `study.session.state.machine`.
 """
@@ -75,9 +74,9 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
         raise
     # The session is over: Ctrl-C only ends the goodbye.
     with contextlib.suppress(KeyboardInterrupt):
-        outcome = session_end.state.sitting.ineligibility if session_end.state.closed else ""
+        ineligibility = session_end.state.sitting.ineligibility if session_end.state.closed else ""
         sitting.display.goodbye(
-            Goodbye(not session_end.end_reason, session_end.state.answers, session_end.end_reason, outcome)
+            Goodbye(not session_end.end_reason, session_end.state.answers, session_end.end_reason, ineligibility)
         )
     # Notes that were taken while the log was open are written before it is sealed.
     session_end = replace(session_end, state=write_notes(session_end.state, sitting))
@@ -92,7 +91,7 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     if state.is_finally_ineligible:
         return SessionEnd(close_ineligible_session(state, sitting), end_reason)
     if end_reason:
-        return _end_sitting(ActionResult(state, end_reason=end_reason), sitting)
+        return _log_sitting_end(ActionResult(state, end_reason=end_reason), sitting)
     state = start_masking(assign_place(state, sitting), sitting)
     sitting.supervisor.start_activity("instructions")
     sitting.display.welcome(_make_welcome(state, sitting))
@@ -120,12 +119,12 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
             )
         )
     resume_advice = f"Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}"
-    saved = f"{format_answer_count(state.answers)} on disk."
+    saved_text = f"{format_answer_count(state.answers)} on disk."
     if may_force_remain:
         raise DeviceError(
-            "The force may still be on", Fault.FORCE_LEFT.sentence, resume_advice, saved
+            "The force may still be on", Fault.FORCE_LEFT.sentence, resume_advice, saved_text
         ) from interruption
-    raise UserInterruptError("Interrupted", "The force was released.", resume_advice, saved) from interruption
+    raise UserInterruptError("Interrupted", "The force was released.", resume_advice, saved_text) from interruption
 
 
 def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
@@ -154,7 +153,8 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
             seal_log(sitting.folder.log)
             return SessionEnd(state, end_reason="")
         outcome = _perform_action(state, action, sitting)
-        if not isinstance(action, Probe | Reference):  # these neither void anything nor end a row of void trials
+        # A probe is never void, and does not interrupt a series of void trials.
+        if not isinstance(action, Probe | Reference):
             void_reasons = (*void_reasons, outcome.void) if outcome.void else ()
         if len(void_reasons) >= MAX_VOIDS_IN_A_ROW:
             outcome = replace(outcome, end_reason=outcome.end_reason or explain_many_voids(void_reasons))
@@ -165,11 +165,11 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
             state = start_masking(pause_outcome.state, sitting) if continues else pause_outcome.state
             outcome = replace(outcome, state=state, end_reason=pause_outcome.end_reason)
             if pause_outcome.withdrawn:
-                return replace(_end_sitting(outcome, sitting), withdrawn=True)
+                return replace(_log_sitting_end(outcome, sitting), withdrawn=True)
         if requester := sitting.supervisor.stop_requester:
             outcome = replace(outcome, end_reason=outcome.end_reason or f"the {requester} stopped the session")
         if outcome.end_reason:
-            return _end_sitting(outcome, sitting)
+            return _log_sitting_end(outcome, sitting)
         state = outcome.state
 
 
@@ -199,7 +199,7 @@ def _perform_action(state: SessionState, action: Action, sitting: Sitting) -> Ac
             return ActionResult(state)
 
 
-def _end_sitting(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
+def _log_sitting_end(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
     """Log why the sitting ended before the session was finished, and return its end."""
     state = stop_masking(_report_busy_voids(write_notes(outcome.state, sitting), sitting), sitting)
     ending_event = SessionInterrupted(utc=sitting.clock.utc(), reason=outcome.end_reason)

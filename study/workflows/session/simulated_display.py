@@ -1,4 +1,4 @@
-"""Simulated participant at a session: implements the protocols `Display` and `Hand` of `workflows.trial.display`.
+"""Simulated participant of a session: implements the protocols `Display` and `Hand` of `workflows.trial.display`.
 
 Questions are answered by an `Observer` after its response time; all waiting is done on the given clock, so that a
 session can run in virtual time. Methods that only return None continue at once. Made by `simulated_participant`.
@@ -34,10 +34,11 @@ from study.workflows.session.stimulus_sampler import StimulusSampler
 from study.workflows.trial.display import SignOfLife
 
 KEEPALIVE_INTERVAL_S = 0.1
-"""Interval (s) between two calls of `sign_of_life`, the keep-alive call of the device, while waiting."""
+"""Interval (s) between two calls of `sign_of_life` while waiting: the longest that `Display` allows."""
 
-LONGEST_HANDLE_WAIT_S = 60.0
-"""Longest wait (s) for the handle to return to its place: no person moves the handle of a simulated participant."""
+MAX_HANDLE_WAIT_S = 60.0
+"""Longest wait (s) for the handle to return to its place: no person moves the handle of a simulated participant.
+Chosen."""
 
 ENDED_EARLY = Unanswered("the stimulus ended early", ends_sitting=False)
 """Reply where `sign_of_life` returned False, which ends the wait."""
@@ -81,7 +82,7 @@ class SimulatedDisplay:
         )
 
     def fill_in(self, form: Form) -> FormReply:
-        """Fill each field with the first answer that it allows; a participant who takes part gives this answer."""
+        """Fill each field with the first answer that it allows; a participant who is eligible gives this answer."""
         return FormReply({field.key: _choose_first_answer(field) for field in form.fields})
 
     def device_checked(self, report: DeviceReport) -> bool:
@@ -100,8 +101,8 @@ class SimulatedDisplay:
         return None if self._wait(notice.seconds, sign_of_life) else ENDED_EARLY
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait until the handle is at its place; ends the sitting after `LONGEST_HANDLE_WAIT_S`."""
-        deadline_s = self._clock.now_s() + LONGEST_HANDLE_WAIT_S
+        """Wait until the handle is at its place; ends the sitting after `MAX_HANDLE_WAIT_S`."""
+        deadline_s = self._clock.now_s() + MAX_HANDLE_WAIT_S
         while not look().ready:
             if self._clock.now_s() > deadline_s:
                 return Unanswered("the handle did not come back", ends_sitting=True)
@@ -110,7 +111,7 @@ class SimulatedDisplay:
         return None
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """Answer of the observer after its response time. No answer where that exceeds the time limit, where
+        """Return the answer of the observer after its response time. No answer where that exceeds the time limit, where
         `sign_of_life` ended the wait, or where the observer asks for a repetition that is allowed. Raises RuntimeError
         before the first stimulus."""
         if self._on_question is not None:
@@ -133,15 +134,15 @@ class SimulatedDisplay:
         return Answered(reply.answer, self._clock.now_s())
 
     def _wait_and_feel(
-        self, perceived: PerceivedStimulus, seconds: float, sign_of_life: SignOfLife
+        self, perceived: PerceivedStimulus, duration_s: float, sign_of_life: SignOfLife
     ) -> PerceivedStimulus | None:
-        """Wait for `seconds`; returns the stimulus, with the delivered acceleration of its last periods where there is
+        """Wait for duration_s; return the stimulus, with the delivered acceleration of its last periods where there is
         a `StimulusSampler`. None where `sign_of_life` ended the wait. In a detection trial the stimulus ended before
         the question."""
         sampler, stimulus = self._sampler, self._stimulus
         if sampler is None or stimulus is None or perceived.phase is Phase.DETECTION:
-            return perceived if self._wait(seconds, sign_of_life) else None
-        if not self._wait(max(0.0, seconds - sampler.compute_duration_s(stimulus)), sign_of_life):
+            return perceived if self._wait(duration_s, sign_of_life) else None
+        if not self._wait(max(0.0, duration_s - sampler.compute_duration_s(stimulus)), sign_of_life):
             return None
         delivered = sampler.measure_stimulus(stimulus, sign_of_life)
         return replace(perceived, delivered=delivered) if sign_of_life() else None
@@ -171,11 +172,11 @@ class SimulatedDisplay:
     def trouble(self, sentence: str) -> None:
         return None
 
-    def _wait(self, seconds: float, sign_of_life: SignOfLife) -> bool:
-        """Wait for `seconds` on the clock, calling `sign_of_life` every `KEEPALIVE_INTERVAL_S`; False if that ended
+    def _wait(self, duration_s: float, sign_of_life: SignOfLife) -> bool:
+        """Wait for duration_s on the clock, calling `sign_of_life` every `KEEPALIVE_INTERVAL_S`; False if that ended
         the wait."""
-        end_s = self._clock.now_s() + seconds
-        while (remaining_s := end_s - self._clock.now_s()) > 1e-9:
+        end_s = self._clock.now_s() + duration_s
+        while (remaining_s := end_s - self._clock.now_s()) > 1e-9:  # s; above the rounding of sums of intervals
             self._clock.sleep(min(KEEPALIVE_INTERVAL_S, remaining_s))
             if not sign_of_life():
                 return False
@@ -183,8 +184,8 @@ class SimulatedDisplay:
 
 
 def _choose_first_answer(field: FormField) -> str:
-    """The first choice of a field with choices, the lowest number of a field with limits; else a placeholder text where
-    an answer is required, empty for an optional text."""
+    """Choose the first choice of a field with choices, the lowest number of a field with limits; else a placeholder
+    text where an answer is required, empty for an optional text."""
     if field.choices:
         return field.choices[0]
     if field.limits is not None:

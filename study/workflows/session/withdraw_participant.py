@@ -95,14 +95,14 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
             for folder in folders:
                 _lock_for_erasing(folder, locks)
             intent = read_intent(data, subject)
-            participants = {folder.name: read_begun_participant(folder) for folder in folders}
+            participants_by_session = {folder.name: read_begun_participant(folder) for folder in folders}
             withdrawn_utc = intent.withdrawn_utc if intent else utc
-            write_intent(data, WithdrawalIntent(subject, withdrawn_utc, participants, withdrawal.derived))
+            write_intent(data, WithdrawalIntent(subject, withdrawn_utc, participants_by_session, withdrawal.derived))
             for name in withdrawal.derived:
                 _erase_derived(data_folder, name)
             for folder in folders:
                 _erase_session(data_folder, folder)
-                write_tombstone(folder, withdrawn_utc, participants[folder.name])
+                write_tombstone(folder, withdrawn_utc, participants_by_session[folder.name])
             data_folder.sync()
             data_folder.erase(locate_withdrawal_record(data, subject).name)
             data_folder.sync()
@@ -113,8 +113,8 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     """List the analyses and exports outside the data folder that name or may name the participant, a sentence each, as
     far as their folders were recorded when they were written; the last sentence is a reminder of other copies."""
-    noted_paths = [path for path in read_written_folders(data) if path.exists()]
-    naming_paths = [path for path in noted_paths if is_subject_in_analysis(path, withdrawal.subject) is not False]
+    recorded_paths = [path for path in read_written_folders(data) if path.exists()]
+    naming_paths = [path for path in recorded_paths if is_subject_in_analysis(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in naming_paths), COPIES_REMINDER)
 
 
@@ -123,9 +123,9 @@ def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
     StudyError if the session is running."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
-    lock = folder.path / SESSION_LOCK_NAME
-    if lock.is_symlink():
-        lock.unlink()
+    lock_path = folder.path / SESSION_LOCK_NAME
+    if lock_path.is_symlink():
+        lock_path.unlink()
     locks.enter_context(hold_session_lock(folder.path))
     if is_real_file(folder.log):
         locks.enter_context(hold_log_lock(folder.log))
@@ -143,10 +143,10 @@ def _erase_session(data: OpenedFolder, folder: SessionFolder) -> None:
         session_folder.sync()
 
 
-def _erase_derived(data: OpenedFolder, name: str) -> None:
-    """Erase a file or folder, and those of its parent folders below the data folder that become empty. name: path
-    relative to the data folder."""
-    *parents, last_part = PurePosixPath(name).parts
+def _erase_derived(data: OpenedFolder, relative_path: str) -> None:
+    """Erase a file or folder, and those of its parent folders below the data folder that become empty. relative_path:
+    path relative to the data folder."""
+    *parents, last_part = PurePosixPath(relative_path).parts
     try:
         with open_folder(data, *parents) as parent_folder:
             parent_folder.erase(last_part)

@@ -1,5 +1,5 @@
-"""Write masking noise as a WAV file (`hapteq noise`), to be played during a sitting so that the participant cannot hear
-the device.
+"""Write masking noise as a WAV file, to be played during a sitting so that the participant cannot hear the device.
+Called by `study.cli.noise` (`hapteq noise`).
 
 The samples are those of `equalizer.signals.masking_noise`: pink noise between two corner frequencies that can be
 repeated without a discontinuity.

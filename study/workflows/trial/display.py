@@ -113,7 +113,7 @@ class Hand(Protocol):
         ...
 
 
-class PersonsHand:
+class HumanHand:
     """Hand of a person, who feels the device: `feel` does nothing."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:

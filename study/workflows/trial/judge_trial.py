@@ -41,8 +41,8 @@ def judge_trial(
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), get_void_cause(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
-        share = 100 * health.missed_ticks / max(health.ticks, 1)
-        return Judgement(f"{share:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
+        missed_percent = 100 * health.missed_ticks / max(health.ticks, 1)
+        return Judgement(f"{missed_percent:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
     if late_text := _describe_lateness(health_at_answer or health, settings):
         return Judgement(late_text, (), VoidCause.MISSED_TICKS)
     missing_text = _describe_missing_acceleration(health, settings)

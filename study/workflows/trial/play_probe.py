@@ -21,7 +21,7 @@ from study.session.views.form_views import FormKind
 from study.session.views.forms import judge_form, make_form, make_take_handle_form, make_words
 from study.session.views.participant_views import PlayingNotice, Unanswered
 from study.store.disk.provenance import list_versions
-from study.store.sessions.trial_recordings import probe_name, save_trial_recording
+from study.store.sessions.trial_recordings import name_probe_recording, save_trial_recording
 from study.workflows.trial.action_result import (
     ActionResult,
     check_end_request,
@@ -66,8 +66,8 @@ def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> ActionRes
         return make_early_end_result(state, early_reply)
     if (early_end := check_end_request(state, sitting)) is not None:
         return early_end
-    measured = _play_and_measure(state, "hand", probe.level_n, sitting)
-    return _conclude_probe(measured.state, measured.reply, measured.play_result, sitting)
+    measured_probe = _play_and_measure(state, "hand", probe.level_n, sitting)
+    return _conclude_probe(measured_probe.state, measured_probe.reply, measured_probe.play_result, sitting)
 
 
 def play_reference(state: SessionState, sitting: Sitting) -> ActionResult:
@@ -167,10 +167,10 @@ def _play_and_measure(state: SessionState, kind: ProbeKind, level_n: float, sitt
     if not trouble and missed_ticks > state.protocol.measurement.missed_ticks_limit * max(play_result.health.ticks, 1):
         trouble = f"{missed_ticks} ticks of it were missed"
     duration_s = play_result.health.ticks / sitting.device.info.sample_rate_hz
-    measured = _save_and_log_measurement(
+    measured_probe = _save_and_log_measurement(
         state, None if trouble else play_result.recording, duration_s, trouble, sitting
     )
-    return replace(measured, reply=reply, play_result=play_result)
+    return replace(measured_probe, reply=reply, play_result=play_result)
 
 
 def _log_probe_start(state: SessionState, kind: ProbeKind, level_n: float, sitting: Sitting) -> SessionState:
@@ -191,8 +191,10 @@ def _save_and_log_measurement(
         trouble = trouble or "too little of it was kept"
     else:
         mass_kg, trouble = _estimate_mass_kg(recording, trouble)
-        file_name = probe_name(probing.open.number)
-        saved_file = save_trial_recording(sitting.folder, file_name, recording, _list_conditions(probing.open, sitting))
+        file_name = name_probe_recording(probing.open.number)
+        saved_file = save_trial_recording(
+            sitting.folder, file_name, recording, _make_recording_metadata(probing.open, sitting)
+        )
         mean_square = float(np.mean(np.sum(recording.response.samples**2, axis=1)))
         rms_mps2 = math.sqrt(mean_square) if math.isfinite(mean_square) else None
     if trouble:
@@ -224,8 +226,8 @@ def _estimate_mass_kg(recording: Recording, trouble: str) -> tuple[float | None,
         return None, str(error)
 
 
-def _list_conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
-    """List the metadata of the recording of a probe: session, number and kind, peak force (N), hand, versions."""
+def _make_recording_metadata(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
+    """Make the metadata of the recording of a probe: session, number and kind, peak force (N), hand, versions."""
     return {
         "session": sitting.folder.name,
         "probe": {"number": probe.number, "kind": probe.kind, "period_s": PERIOD_S},

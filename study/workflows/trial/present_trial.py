@@ -1,4 +1,5 @@
-"""One trial of a session, from the wait for the handle to the logged result.
+"""Conduct one trial of a session, from the wait for the handle to the logged result. Called by `run_session`;
+`play_probe` uses the wait for the handle.
 
 Order: wait until the handle rests at the centre; log the presentation; play the stimulus and ask; log the answer;
 release the force; measure the delivered acceleration and log it. A detection trial releases the force before the
@@ -39,7 +40,8 @@ MASKING_STOPPED = Unanswered("the masking noise stopped during the trial", ends_
 
 
 def make_question(state: SessionState, due_trial: PresentTrial) -> Question:
-    """The question of a due trial as shown to the participant, without information that could reveal the answer."""
+    """Make the question of a due trial as shown to the participant, without information that could reveal the
+    answer."""
     run = state.runs[due_trial.run]
     phase_runs = [
         other_run.index
@@ -62,8 +64,9 @@ def make_question(state: SessionState, due_trial: PresentTrial) -> Question:
 
 
 def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
-    """Wait until the handle has stayed within the gate, `gate.radius_mm` around the centre, for `gate.still_s`. Returns
-    None when the trial may start, otherwise why the wait ended early. Does not wait if the gate is off (radius 0)."""
+    """Wait until the handle has stayed within the gate, `gate.radius_mm` around its start position, for `gate.still_s`.
+    Returns None when the trial may start, otherwise why the wait ended early. Does not wait if the gate is off (radius
+    0)."""
     gate = state.protocol.gate
     if gate.radius_mm <= 0:
         return None
@@ -83,10 +86,12 @@ def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
 
 def _make_handle_reader(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
     """Make a function that reads the handle's position and returns whether it has been inside the gate for
-    `gate.still_s`, with the instruction for the participant and the offset in the plane (mm)."""
+    `gate.still_s`, with the instruction for the participant and the offset in the plane from the start position (mm).
+    Without a position reading the handle counts as outside, with the offset (0, 0)."""
     inside_since_s: list[float] = []
 
     def read_handle() -> HandleView:
+        """Read the handle once."""
         offset_m = sitting.supervisor.compute_offset_m(sitting.device.look())
         now_s = sitting.clock.now_s()
         if offset_m is None:
@@ -100,10 +105,10 @@ def _make_handle_reader(gate: GateSettings, plane: Plane, sitting: Sitting) -> C
         elif not inside_since_s:
             inside_since_s.append(now_s)
         sitting.supervisor.set_handle_ready(is_in_gate)
-        ready = is_in_gate and now_s - inside_since_s[0] >= gate.still_s
+        is_ready = is_in_gate and now_s - inside_since_s[0] >= gate.still_s
         first_axis, second_axis = PLANE_AXES[plane]
         return HandleView(
-            ready,
+            is_ready,
             "Hold it there." if is_in_gate else f"Bring the handle {distance_mm:.0f} mm back to the centre.",
             (1000.0 * offset_m[first_axis], 1000.0 * offset_m[second_axis]),
             gate.radius_mm,
@@ -120,12 +125,12 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
     question = make_question(state, due_trial)
     state = log_and_apply(state, make_presented_event(due_trial, sitting), sitting)
     stimulus_reply = ask_participant(state, due_trial, question, sitting)
-    masked = is_masked(sitting)
+    is_masking_intact = is_masked(sitting)
     if stimulus_reply.pulse is not None:
         state = _log_pulse(state, due_trial, stimulus_reply.pulse, sitting)
     if isinstance(stimulus_reply.reply, Unanswered):
         return _log_void_trial(state, due_trial, stimulus_reply, stimulus_reply.reply, sitting)
-    if not masked:
+    if not is_masking_intact:
         return _log_void_trial(state, due_trial, stimulus_reply, MASKING_STOPPED, sitting)
     answer = AnswerGiven(
         utc=sitting.clock.utc(),
@@ -170,12 +175,12 @@ def _log_answered_trial(
     """Judge an answered trial by the health of device and control loop, and log it as measured (with flags, if any) or
     as void. play_result: recording and health of the stimulus, from its onset to its release."""
     correct = state.answered is not None and state.answered.answer == due_trial.label
-    vector = compute_direction_vector(state.protocol.directions, due_trial.direction)
+    unit_vector = compute_direction_vector(state.protocol.directions, due_trial.direction)
     verdict = judge_trial(
         play_result.health, state.protocol.measurement, stimulus_reply.is_complete, stimulus_reply.health
     )
     recording = play_result.recording if verdict.is_measurable else None
-    values = measure_delivered(recording, vector, due_trial.frequency_hz) if recording is not None else None
+    delivered = measure_delivered(recording, unit_vector, due_trial.frequency_hz) if recording is not None else None
     fault = play_result.health.fault
     end_reason = find_leaving_reason(fault)
     if verdict.void_reason:
@@ -186,11 +191,13 @@ def _log_answered_trial(
         )
         return ActionResult(state, end_reason=end_reason, void=verdict.void_reason, fault=fault)
     friction_n = state.protocol.safety.plausibility.friction_n
-    measured = recording if values is not None else None
-    device_kg = sitting.device.info.effective_mass_kg
-    if measured is not None and has_too_little_motion(measured, vector, due_trial.frequency_hz, friction_n, device_kg):
+    measured_recording = recording if delivered is not None else None
+    effective_mass_kg = sitting.device.info.effective_mass_kg
+    if measured_recording is not None and has_too_little_motion(
+        measured_recording, unit_vector, due_trial.frequency_hz, friction_n, effective_mass_kg
+    ):
         verdict = replace(verdict, flags=(*verdict.flags, TOO_LITTLE_MOTION))
-    outcome = TrialOutcome(play_result, values, verdict.flags, vector, verdict.is_measurable)
+    outcome = TrialOutcome(play_result, delivered, verdict.flags, unit_vector, verdict.is_measurable)
     state = log_and_apply(state, record_measured_trial(due_trial, outcome, state, sitting), sitting)
     return ActionResult(state, correct, end_reason=end_reason, fault=fault)
 
@@ -218,7 +225,7 @@ def _log_void_trial(
 
 
 def _find_void_cause(reply: Unanswered, sitting: Sitting) -> VoidCause:
-    """Cause of a void trial in which the device had no fault."""
+    """Find the cause of a void trial in which the device had no fault."""
     requester = sitting.supervisor.stop_requester or sitting.supervisor.pause_requester
     if requester is not None and requester != "participant" and (reply.ends_sitting or reply.pause):
         return VoidCause.EXPERIMENTER

@@ -62,7 +62,7 @@ class SessionSupervisor:
         self._handle_ready = True
         self._last_published_s = float("-inf")
         self.listen()
-        self._publish_live_state()
+        self._read_buttons_and_publish()
 
     def keep_alive(self) -> bool:
         """Reset the device's watchdog, take requests and button presses, publish the live state. False where the wait
@@ -70,7 +70,7 @@ class SessionSupervisor:
         only after a stop request."""
         self._device.keep_alive()
         self.listen()
-        self._publish_live_state()
+        self._read_buttons_and_publish()
         if self._activity == "pause":
             return self.stop_requester is None
         if self.stop_requester is not None or self.pause_requester is not None or self._answer is not None:
@@ -119,9 +119,9 @@ class SessionSupervisor:
         """Set whether the handle is at its start position, for viewers; True again after the next `start_activity`."""
         self._handle_ready = ready
 
-    def _publish_live_state(self) -> None:
-        """Publish the live state if `LIVE_INTERVAL_S` has passed and time is not virtual; read the buttons at each
-        call."""
+    def _read_buttons_and_publish(self) -> None:
+        """Read the buttons at each call; publish the live state if `LIVE_INTERVAL_S` has passed since the last time,
+        and the clock is not virtual."""
         now_s = self._clock.now_s()
         is_due = not self._clock.virtual and now_s - self._last_published_s >= LIVE_INTERVAL_S
         if not is_due and not self._buttons:

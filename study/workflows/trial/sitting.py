@@ -1,5 +1,8 @@
-"""The ports of one sitting (device, display, log, ...). The state of a session changes only by events that are logged:
-`log_and_apply`."""
+"""Ports of one sitting (device, display, log, ...), and the functions that change the state of its session.
+
+`conduct_session` makes the `Sitting`; `run_session`, `prepare_sitting` and the modules of this package receive it. The
+state of a session changes only by events that are logged (`log_and_apply`), so that it can be rebuilt from the log.
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -77,12 +80,13 @@ class Sitting:
     hand: Hand
     supervisor: SessionSupervisor
     device_name: str
-    """As `open_device` takes it."""
+    """Name under which the device was opened (`open_device`)."""
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Centre of the spring, where the handle belongs."""
+    """Centre of the virtual spring, the start position of the handle (x, y, z; m)."""
     pulse: Callable[[], Pulse | None] = send_no_pulse
     """Sends a pulse on the lab's trigger line, right after the device has begun a trial's force. Never raises."""
     masking_noise: SoundOutput | None = None
+    """None where the protocol or the lab has no masking noise."""
 
 
 def log_and_apply(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
@@ -108,7 +112,7 @@ def notify_experimenter(sentence: str, sitting: Sitting) -> None:
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
-    """Read pending requests, then log all notes since the last call."""
+    """Take pending requests, then log all notes since the last call."""
     sitting.supervisor.listen()
     for note in sitting.supervisor.take_notes():
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)

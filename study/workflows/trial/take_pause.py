@@ -1,4 +1,5 @@
-"""A pause of the sitting: nothing is played until the participant decides to continue, to leave or to withdraw."""
+"""Pause a sitting: nothing is played until the participant decides to continue, to leave or to withdraw. Called by
+`run_session`."""
 
 from dataclasses import dataclass
 

@@ -18,7 +18,7 @@ from study.session.state.due_trial import PresentTrial
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import DeliveredMotion
 from study.store.disk.provenance import list_versions
-from study.store.sessions.trial_recordings import recording_name, save_trial_recording
+from study.store.sessions.trial_recordings import name_recording, save_trial_recording
 from study.workflows.trial.sitting import Sitting
 
 
@@ -121,7 +121,7 @@ def record_measured_trial(
     saved_recording = None
     if outcome.play_result.recording is not None:
         metadata = _make_recording_metadata(due_trial, outcome, state, sitting)
-        name = recording_name(due_trial.run, due_trial.trial, due_trial.attempt)
+        name = name_recording(due_trial.run, due_trial.trial, due_trial.attempt)
         saved_recording = save_trial_recording(sitting.folder, name, outcome.play_result.recording, metadata)
     delivered = outcome.delivered
     return TrialMeasured(

@@ -1,4 +1,5 @@
-"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session, used by `hapteq stream`.
+"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session. Made by `study.cli.stream`
+(`hapteq stream`); `stream_session` and `stream_signals` send through them.
 
 The optional library pylsl is imported only when an outlet is made. Times of samples are on LSL's own clock, in s.
 """
@@ -12,8 +13,9 @@ from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
 from study.regular_file import open_regular
 
-LONGEST_FIRST_LINE_BYTES = 2**20
-"""Largest part (bytes) of the first line of a log that is read; its hash identifies the session."""
+MAX_FIRST_LINE_BYTES = 2**20
+"""Largest part (bytes) of the first line of a log that is read; its hash identifies the session. Chosen: 1 MiB, far
+more than a line with the text of a protocol."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +44,8 @@ class MarkerOutlet:
 
     def __init__(self, log: Path) -> None:
         self._library = _import_pylsl()
-        self._source = make_source_id(log)
-        stream_fields = ("hapteq markers", "Markers", 1, self._library.IRREGULAR_RATE, "string", self._source)
+        self._source_id = make_source_id(log)
+        stream_fields = ("hapteq markers", "Markers", 1, self._library.IRREGULAR_RATE, "string", self._source_id)
         self._outlet = self._library.StreamOutlet(self._library.StreamInfo(*stream_fields))
 
     def clock_s(self) -> float:
@@ -56,14 +58,14 @@ class MarkerOutlet:
 
     def make_signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
         """Make an outlet for a stream of signals of the same session. rate_hz: its nominal sample rate (Hz)."""
-        return _PylslSignalOutlet(self._library, f"{self._source} {stream.name}", stream, rate_hz)
+        return _PylslSignalOutlet(self._library, f"{self._source_id} {stream.name}", stream, rate_hz)
 
 
 class _PylslSignalOutlet:
     """A `SignalOutlet` of pylsl for samples in double precision, with label, unit and type of each channel."""
 
-    def __init__(self, library: Any, source: str, stream: StreamDescription, rate_hz: float) -> None:
-        info = library.StreamInfo(stream.name, stream.kind, len(stream.channels), rate_hz, "double64", source)
+    def __init__(self, library: Any, source_id: str, stream: StreamDescription, rate_hz: float) -> None:
+        info = library.StreamInfo(stream.name, stream.kind, len(stream.channels), rate_hz, "double64", source_id)
         channels = info.desc().append_child("channels")
         for label, unit in zip(stream.channels, stream.units, strict=True):
             channel = channels.append_child("channel")
@@ -72,6 +74,7 @@ class _PylslSignalOutlet:
         self._outlet = library.StreamOutlet(info)
 
     def push(self, samples: FloatArray, at_s: FloatArray) -> None:
+        """Send samples with their times, see `SignalOutlet`."""
         self._outlet.push_chunk(samples, at_s.tolist())
 
 
@@ -80,14 +83,14 @@ def make_source_id(log: Path) -> str:
     log's first line. It does not depend on the folder and reveals nothing about the session. Raises StudyError."""
     try:
         with open_regular(log) as file:
-            first_line = file.readline(LONGEST_FIRST_LINE_BYTES)
+            first_line = file.readline(MAX_FIRST_LINE_BYTES)
     except OSError as problem:
         raise make_unreadable_log_error(log, problem) from problem
     return f"hapteq {hashlib.sha256(first_line).hexdigest()[:16]}"
 
 
 def make_unreadable_log_error(log: Path, problem: Exception) -> StudyError:
-    """Error for a log that cannot be read while a session is followed."""
+    """Make the error for a log that cannot be read while a session is followed."""
     return StudyError(
         "The session's log cannot be followed",
         f"{log.name} in {log.parent.name}: {problem}.",

@@ -71,21 +71,21 @@ def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> t
                 simulated,
             ),
         )
-    studies = []
+    planned_studies = []
     for name, sessions in groupby(
         sorted(started_sessions, key=lambda session: session.protocol), key=lambda session: session.protocol
     ):
         protocol_sessions = list(sessions)
-        studies.append(
+        planned_studies.append(
             _plan_from_sessions(data, _load_latest_protocol(name, protocol_sessions), protocol_sessions, simulated)
         )
-    if not studies:
+    if not planned_studies:
         raise WrongUseError(
             "There is no study to plan",
             f"{data} holds no session of {'simulated participants' if simulated else 'people'}.",
             "Name the protocol with --protocol, or the folder of the sessions.",
         )
-    return tuple(studies)
+    return tuple(planned_studies)
 
 
 def _find_started_sessions(data: Path, simulated: bool) -> list[_StartedSession]:
@@ -178,10 +178,10 @@ def _load_latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> Stu
 def _warn_of_different_texts(sessions: Sequence[_StartedSession]) -> tuple[str, ...]:
     """Warn if sessions of this protocol used different texts of it: their orders are counted together although they may
     differ. Empty without a difference."""
-    texts = {session.protocol_text for session in sessions if session.protocol_text is not None}
-    if len(texts) < 2:
+    protocol_texts = {session.protocol_text for session in sessions if session.protocol_text is not None}
+    if len(protocol_texts) < 2:
         return ()
-    return (f"{len(texts)} different texts of this protocol were used. Lock it: hapteq protocol lock.",)
+    return (f"{len(protocol_texts)} different texts of this protocol were used. Lock it: hapteq protocol lock.",)
 
 
 def summarise_plans(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
@@ -237,11 +237,11 @@ def format_plan_lines(study: PlannedStudy) -> list[str]:
     plan = study.plan
     done_count, begun_count, left_out_count = (plan.count(progress) for progress in ("done", "begun", "left out"))
     planned_text = f" of {plan.planned} planned" if plan.planned else ""
-    text_lines = [f"{plan.protocol}: {done_count} done{planned_text}, {begun_count} begun, {left_out_count} left out"]
-    text_lines += _format_codes(
+    lines = [f"{plan.protocol}: {done_count} done{planned_text}, {begun_count} begun, {left_out_count} left out"]
+    lines += _format_codes(
         "to resume", [participant.code for participant in plan.participants if participant.progress == "begun"]
     )
-    text_lines += _format_codes(
+    lines += _format_codes(
         "left out",
         [
             f"{participant.code} ({participant.reason})"
@@ -250,23 +250,17 @@ def format_plan_lines(study: PlannedStudy) -> list[str]:
         ],
     )
     if plan.planned and plan.planned % plan.cycle_length:
-        text_lines.append(
-            f"{plan.planned} participants do not balance the orders: multiples of {plan.cycle_length} would."
-        )
+        lines.append(f"{plan.planned} participants do not balance the orders: multiples of {plan.cycle_length} would.")
     if not plan.planned:
-        text_lines.append(
-            "No sample size is declared: analysis.participants in the protocol says how many are planned."
-        )
+        lines.append("No sample size is declared: analysis.participants in the protocol says how many are planned.")
     if not plan.cells:
-        text_lines.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
+        lines.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
     else:
         incomplete_cells = [cell_index for cell_index, cell in enumerate(plan.cells) if cell.needed]
         incomplete_text = ", ".join(f"{cell_index + 1}" for cell_index in incomplete_cells)
-        text_lines.append(
-            f"orders still needed: {incomplete_text}" if incomplete_cells else "orders still needed: none"
-        )
-    text_lines.append(f"next: {study.next_code}{_describe_next_order(plan)}")
-    return [*text_lines, *study.remarks]
+        lines.append(f"orders still needed: {incomplete_text}" if incomplete_cells else "orders still needed: none")
+    lines.append(f"next: {study.next_code}{_describe_next_order(plan)}")
+    return [*lines, *study.remarks]
 
 
 def _format_codes(title: str, codes: Sequence[str]) -> list[str]:

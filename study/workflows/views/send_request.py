@@ -13,9 +13,9 @@ from study.store.sessions.request_inbox import RequestInbox
 
 RECEIVE_TIMEOUT_S = 3.0
 """Longest time (s) until the session receives the request. It reads its inbox about twenty times a second, except while
-it shows a form or a notice."""
+it shows a form or a notice. Chosen."""
 POLL_INTERVAL_S = 0.02
-"""Interval (s) at which the sender checks whether the request was received."""
+"""Interval (s) at which the sender checks whether the request was received. Chosen below the session's interval."""
 
 
 def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
@@ -32,16 +32,16 @@ def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
             "Look at it with: hapteq watch " + str(folder.path),
         )
     inbox = RequestInbox(folder.path)
-    name = inbox.send(request)
+    request_name = inbox.send(request)
     deadline_s = clock.now_s() + RECEIVE_TIMEOUT_S
-    while inbox.is_unread(name):
+    while inbox.is_unread(request_name):
         if clock.now_s() >= deadline_s:
-            return _handle_timeout(folder, request, inbox, name)
+            return _handle_timeout(folder, request, inbox, request_name)
         clock.sleep(POLL_INTERVAL_S)
     return True
 
 
-def _handle_timeout(folder: SessionFolder, request: Request, inbox: RequestInbox, name: str) -> bool:
+def _handle_timeout(folder: SessionFolder, request: Request, inbox: RequestInbox, request_name: str) -> bool:
     """Leave or withdraw a request that was not received in time; returns and raises as `send_request`."""
     if isinstance(request, NoteAsked):
         return False
@@ -58,7 +58,7 @@ def _handle_timeout(folder: SessionFolder, request: Request, inbox: RequestInbox
         )
     # A pause is withdrawn, because it would be unexpected minutes later. If that fails, the session has received it in
     # the meantime.
-    if not inbox.take_back(name):
+    if not inbox.take_back(request_name):
         return True
     raise StudyError(
         "The session did not respond to the pause",

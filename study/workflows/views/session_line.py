@@ -26,7 +26,8 @@ from study.store.sessions.withdrawal_files import describe_unfinished_withdrawal
 from study.workflows.results.fold_session import fold_session
 
 MEASURED_EVENT = b',"event":"trial_measured",'
-"""Bytes in the line of a log that closes a counted trial; they are counted without parsing."""
+"""Bytes in the line of a log that closes a counted trial; they are counted without parsing. Only the writer
+of the log produces them: a quotation mark inside a text is escaped."""
 
 
 def make_session_line(folder: SessionFolder) -> SessionLine:
@@ -108,8 +109,8 @@ def _read_file_stamps(folder: SessionFolder) -> tuple[tuple[str, int, int, int],
     return tuple((name, status.st_mtime_ns, status.st_ctime_ns, status.st_size) for name, status in statuses)
 
 
-@lru_cache(maxsize=4096)
-def _make_cached_line(folder: SessionFolder, file_stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
+@lru_cache(maxsize=4096)  # more sessions than a data folder usually has
+def _make_cached_line(folder: SessionFolder, file_stamps: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
     """Make the line of a session that is not withdrawn. file_stamp: key of the cache (`_read_file_stamps`); the result
     depends only on these files. Raises StudyError where the log is invalid, OSError where it cannot be read."""
     content = read_regular(folder.log)
@@ -142,7 +143,7 @@ def _make_cached_line(folder: SessionFolder, file_stamp: tuple[tuple[str, int, i
     )
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=64)  # more protocols than a data folder usually has
 def _read_name_and_run_count(protocol_text: str) -> tuple[str, int] | None:
     """Read name and number of runs of a study protocol; None for text that is not one."""
     try:

@@ -1,5 +1,5 @@
-"""Streaming of a session's events as markers of the lab streaming layer (LSL), with the time at which they happened.
-Called by `hapteq stream`.
+"""Stream a session's events as markers of the lab streaming layer (LSL), with the time at which they happened. Called
+by `study.cli.stream` (`hapteq stream`).
 
 A separate process follows the log, so that streaming cannot delay or end the session. Every event in the log carries
 the time t by the session's monotonic clock; its marker gets the time t + offset on LSL's clock. The offset between the
@@ -27,7 +27,7 @@ OFFSET_READINGS = 10
 longer ones were interrupted. Chosen."""
 REPORTED_CHANGE_S = 0.001
 """Least change of the offset (s) for which `SideTasks.on_offset` is called again. Chosen."""
-LARGEST_EVENT_AGE_S = 5.0
+MAX_EVENT_AGE_S = 5.0
 """Largest age (s) of an event by this computer's monotonic clock. Chosen. An event outside 0 to this age has the time
 of another clock (simulated session, or before a restart): its marker gets the time of sending and states so."""
 
@@ -75,20 +75,20 @@ class LogFollower:
 
     def __init__(self, log: Path) -> None:
         self._log = log
-        self._offset = 0
+        self._read_byte_count = 0
 
     def read_new_lines(self) -> list[bytes]:
         """Read the new complete lines; an incomplete last line is returned once it is complete. Raises OSError, and
         ValueError where the log became shorter or grew by more than `MAX_TABLE_BYTES`."""
         with open_regular(self._log) as file:
-            new_byte_count = os.fstat(file.fileno()).st_size - self._offset
+            new_byte_count = os.fstat(file.fileno()).st_size - self._read_byte_count
             if not 0 <= new_byte_count <= MAX_TABLE_BYTES:
                 raise ValueError(
                     "it became shorter" if new_byte_count < 0 else f"it grew by {new_byte_count} bytes at once"
                 )
-            file.seek(self._offset)
+            file.seek(self._read_byte_count)
             complete_lines = file.read(new_byte_count).split(b"\n")[:-1]
-        self._offset += sum(len(line) + 1 for line in complete_lines)
+        self._read_byte_count += sum(len(line) + 1 for line in complete_lines)
         return complete_lines
 
 
@@ -106,15 +106,15 @@ def stream_session(
     read."""
     reported_offset_s = math.inf
     try:
-        follower, sent_count, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
+        follower, sent_count, offset_s, next_measurement_s = LogFollower(log), 0, 0.0, now_s()
         if any(
             LAST_EVENT.encode() in line and _parse_event(line).get("event") == LAST_EVENT
             for line in follower.read_new_lines()
         ):
             return 0
         while True:
-            if now_s() >= next_offset_s:
-                offset_s, next_offset_s = measure_offset_s(outlet, now_s), now_s() + OFFSET_INTERVAL_S
+            if now_s() >= next_measurement_s:
+                offset_s, next_measurement_s = measure_offset_s(outlet, now_s), now_s() + OFFSET_INTERVAL_S
                 outlet.push(_format_marker({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
                 if not abs(offset_s - reported_offset_s) < REPORTED_CHANGE_S:
                     reported_offset_s = offset_s
@@ -155,11 +155,11 @@ def _parse_event(line: bytes) -> dict[str, Any]:
 def _send_event(
     event: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
-    """Send the streamed fields of an event, with its time if its age is 0 to `LARGEST_EVENT_AGE_S`, else with the time
+    """Send the streamed fields of an event, with its time if its age is 0 to `MAX_EVENT_AGE_S`, else with the time
     of sending and the field `stamped`."""
     fields = {name: event[name] for name in STREAMED_FIELDS if event.get(name) is not None}
     event_s = event.get("monotonic_s")
-    if isinstance(event_s, float) and 0 <= now_s - event_s <= LARGEST_EVENT_AGE_S:
+    if isinstance(event_s, float) and 0 <= now_s - event_s <= MAX_EVENT_AGE_S:
         marker_s = event_s + offset_s
     else:
         fields["stamped"] = "when it was sent"

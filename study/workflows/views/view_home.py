@@ -1,7 +1,7 @@
 """Lists for the start screen: the sessions of a data folder, and the protocols, models and devices to choose from.
 
-Used by the screen (`study.tui.engine.engine_commands`) and `hapteq sessions`. Nothing is changed. Damaged files are
-listed with a remark or left out; they never raise an error.
+Called by the screen (`study.tui.engine.engine_commands`) and `hapteq sessions` (`study.cli.sessions`). Nothing is
+changed. Damaged files are listed with a remark or left out; they never raise an error.
 """
 
 import tomllib
@@ -21,7 +21,8 @@ from study.workflows.views.session_line import make_session_line
 
 
 def list_protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
-    """Study protocols to choose from: shipped ones first, then files in the data folder and in its parent folder."""
+    """List the study protocols to choose from: shipped ones first, then files in the data folder and in its parent
+    folder."""
     folders = dict.fromkeys((data.absolute(), data.absolute().parent))
     study_files = [str(path) for folder in folders for path in _list_toml_files(folder) if _is_study_protocol(path)]
     lines = (make_protocol_line(name, data) for name in (*list_shipped_protocols(), *study_files))
@@ -29,7 +30,7 @@ def list_protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
 
 
 def _list_toml_files(folder: Path) -> list[Path]:
-    """TOML files in a folder, by name; empty if it cannot be read."""
+    """List the TOML files in a folder, by name; empty if it cannot be read."""
     try:
         return sorted(path for path in folder.glob("*.toml") if path.is_file())
     except OSError:
@@ -45,7 +46,8 @@ def _is_study_protocol(path: Path) -> bool:
 
 
 def make_protocol_line(name: str, data: Path) -> ProtocolLine | None:
-    """Line of a study protocol; None for a protocol of another kind. An invalid one is listed with its problem."""
+    """Make the line of a study protocol; None for a protocol of another kind. An invalid one is listed with its
+    problem."""
     try:
         protocol_file = read_protocol(name, data)
     except ProtocolRefusedError as refusal:
@@ -59,14 +61,16 @@ def make_protocol_line(name: str, data: Path) -> ProtocolLine | None:
 
 
 def list_model_files(data: Path) -> tuple[str, ...]:
-    """Files of identified models in the data folder and in its parent folder, the latest first."""
+    """List the files of identified models in the data folder and in its parent folder, the latest first."""
     folders = dict.fromkeys((data.absolute(), data.absolute().parent))
     hdf5_files = [path for folder in folders for path in _list_hdf5_files(folder)]
-    return tuple(str(path) for path in sorted(hdf5_files, key=_read_mtime_s, reverse=True) if _is_model(path))
+    return tuple(
+        str(path) for path in sorted(hdf5_files, key=_read_mtime_s, reverse=True) if _is_identified_model(path)
+    )
 
 
 def describe_model_quality(path: str) -> str:
-    """Quality of the model in a file, in a few words, or why it cannot be used."""
+    """Describe the quality of the model in a file, in a few words, or why it cannot be used."""
     try:
         return write_quality_brief(read_identified_model(Path(path)).quality)
     except StudyError as problem:
@@ -74,7 +78,7 @@ def describe_model_quality(path: str) -> str:
 
 
 def _list_hdf5_files(folder: Path) -> list[Path]:
-    """HDF5 files in a folder; empty if it cannot be read."""
+    """List the HDF5 files in a folder; empty if it cannot be read."""
     try:
         return [path for path in folder.glob("*.h5") if path.is_file()]
     except OSError:
@@ -82,15 +86,15 @@ def _list_hdf5_files(folder: Path) -> list[Path]:
 
 
 def _read_mtime_s(path: Path) -> float:
-    """Time of the last change (s since 1970); 0 for a file that was removed meanwhile."""
+    """Read the time of the last change (s since 1970); 0 for a file that was removed meanwhile."""
     try:
         return path.stat().st_mtime
     except OSError:
         return 0.0
 
 
-def _is_model(path: Path) -> bool:
-    """Whether an HDF5 file is an identified model."""
+def _is_identified_model(path: Path) -> bool:
+    """Whether an HDF5 file is an identified model; False also where it cannot be read."""
     try:
         return confirm_identified_model(path)
     except StudyError:  # a recording, or not a hapteq file
@@ -98,22 +102,23 @@ def _is_model(path: Path) -> bool:
 
 
 def make_home_view(data: Path) -> HomeView:
-    """Content of the start screen. A missing data folder is shown as empty. Control characters are replaced, except in
-    the paths of models, by which the files are opened: the screen replaces them where it shows the names."""
-    models = list_model_files(data)
-    qualities = tuple((model, describe_model_quality(model)) for model in models)
+    """Make the content of the start screen. A missing data folder is shown as empty. Control characters are replaced,
+    except in the paths of models, by which the files are opened: the screen replaces them where it shows the names."""
+    model_paths = list_model_files(data)
+    qualities = tuple((model_path, describe_model_quality(model_path)) for model_path in model_paths)
     return HomeView(
         replace_unprintable(str(data)),
         list_session_lines(data),
         make_printable(list_protocol_lines(data)),
         DEVICES,
-        models,
+        model_paths,
         qualities,
     )
 
 
 def list_session_lines(data: Path) -> tuple[SessionLine, ...]:
-    """Lines of all sessions, the latest first. Unreadable sessions are listed with a remark."""
+    """List the lines of all sessions, the latest first; empty if the folder cannot be read. Unreadable sessions are
+    listed with a remark."""
     try:
         folders = list_session_folders(data)
     except OSError:

@@ -49,9 +49,10 @@ class Follower:
     """Follower of one session: `look` reads the new part of its log and returns the view. Never writes."""
 
     def __init__(self, folder: SessionFolder) -> None:
+        """folder: the session, of which nothing is read yet."""
         self._folder = folder
         self._watched: FollowedSession | None = None
-        self._read_bytes = 0
+        self._read_byte_count = 0
         self._last_line = b""
         self._chain = Chain()
         self._problem = ""
@@ -86,13 +87,12 @@ class Follower:
     def _read_new_lines(self) -> None:
         """Read the new part of the log and apply its complete lines. Reading stops at an invalid line, which is read
         again at the next look. Raises StudyError as `look`."""
-        sealed_bytes = (
-            self._count_sealed_bytes()
-        )  # read before the log: a seal is written after the lines that it covers, so the log must be as long
+        # Read before the log: a seal is written after the lines that it covers, so the log must be as long.
+        sealed_bytes = self._count_sealed_bytes()
         try:
             with open_regular(self._folder.log) as file:
                 self._restart_if_rewritten(file)
-                file.seek(self._read_bytes)
+                file.seek(self._read_byte_count)
                 new_bytes = file.read(MAX_TABLE_BYTES)
         except OSError as problem:
             self._problem, self._log_missing = f"{problem.strerror or problem}.", isinstance(problem, FileNotFoundError)
@@ -105,16 +105,15 @@ class Follower:
             self._problem = self._apply_line(line)
             if self._problem:
                 return
-            self._read_bytes += len(line)
+            self._read_byte_count += len(line)
             self._last_line = line
         if sealed_bytes is None:
             self._problem = "its seal cannot be read."
-        elif sealed_bytes > self._read_bytes:
+        elif sealed_bytes > self._read_byte_count:
             self._problem = "its end is missing."
 
     def _count_sealed_bytes(self) -> int | None:
-        """Return the length of the log (bytes) that its seals cover; 0 without a seal, None if a seal cannot be
-        read."""
+        """Count the bytes of the log that its seals cover; 0 without a seal, None if a seal cannot be read."""
         try:
             return max((read_seal(path).bytes for path in find_seals(self._folder.path).values()), default=0)
         except StudyError:
@@ -123,9 +122,9 @@ class Follower:
     def _restart_if_rewritten(self, file: io.BufferedReader) -> None:
         """Start again from the first line if the last line read is no longer at its place in the file: the writer of a
         log removes a line that could not be synced to the disk."""
-        file.seek(self._read_bytes - len(self._last_line))
+        file.seek(self._read_byte_count - len(self._last_line))
         if file.read(len(self._last_line)) != self._last_line:
-            self._watched, self._read_bytes, self._last_line, self._chain = None, 0, b"", Chain()
+            self._watched, self._read_byte_count, self._last_line, self._chain = None, 0, b"", Chain()
 
     def _apply_line(self, line: bytes) -> str:
         """Apply one line of the log; returns its problem as a clause, empty if there is none. Raises StudyError for an

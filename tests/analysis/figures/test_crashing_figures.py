@@ -11,7 +11,7 @@ def raise_value_error(*arguments):
 
 
 def test_the_others_are_drawn_and_the_crash_is_reported(friction_findings, friction_pictures, monkeypatch):
-    monkeypatch.setattr(module, "held_out_picture", raise_value_error)
+    monkeypatch.setattr(module, "make_held_out_picture", raise_value_error)
     guard = Guard(enabled=True)
     drawn = module.draw_diagnosis_pictures(friction_findings, guard)
     assert len(drawn) == len(friction_pictures) - 1
@@ -20,6 +20,6 @@ def test_the_others_are_drawn_and_the_crash_is_reported(friction_findings, frict
 
 
 def test_without_the_guard_a_crash_is_an_error(friction_findings, monkeypatch):
-    monkeypatch.setattr(module, "held_out_picture", raise_value_error)
+    monkeypatch.setattr(module, "make_held_out_picture", raise_value_error)
     with pytest.raises(ValueError, match="broadcast"):
         module.draw_diagnosis_pictures(friction_findings)

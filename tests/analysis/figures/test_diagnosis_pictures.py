@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Annotation
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectra
+from analysis.diagnosis.result.residual_spectrum import compute_held_out_spectra
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, make_mismatch_map_picture
 from analysis.figures.diagnosis.residual_spectra import draw_residual_spectra
@@ -146,7 +146,7 @@ def test_a_signature_shows_dots_with_errors_and_the_law_in_units_that_read_well(
 
 def test_a_signature_without_samples_says_so(friction_findings):
     none = np.zeros(0)
-    empty = replace(friction_findings.signatures[0], measured_abscissa=none, measured=none, spread=none)
+    empty = replace(friction_findings.signatures[0], measured_abscissa=none, measured=none, standard_error=none)
     assert [text.get_text() for text in draw_signature(empty).texts] == ["Too few samples show this effect to draw it."]
 
 
@@ -178,7 +178,7 @@ def test_errors_of_every_channel_stand_beside_the_noise_line(friction_findings):
 
 
 def test_the_remainder_lies_on_the_noise_where_all_is_explained(friction_findings):
-    for each in compute_remainder_spectra(friction_findings.time_series, friction_findings.floor):
+    for each in compute_held_out_spectra(friction_findings.time_series, friction_findings.floor):
         over = each.after / each.noise
         assert np.median(over) == pytest.approx(1.0, abs=0.15)
         assert np.max(each.retuned / each.noise) > 10
@@ -188,14 +188,14 @@ def test_a_spectrum_of_white_noise_has_the_density_of_its_rms(friction_findings)
     series = friction_findings.time_series[0]
     noise = np.random.default_rng(1).standard_normal(series.measured.shape)
     white = replace(series, measured=series.after + noise)
-    spectrum = compute_remainder_spectra((white,), None)[0]
+    spectrum = compute_held_out_spectra((white,), None)[0]
     assert spectrum.after[-10:].mean() == pytest.approx(np.sqrt(2 / series.sample_rate_hz), rel=0.05)
     assert np.isnan(spectrum.noise).all()
 
 
 def test_without_held_out_data_nothing_is_drawn(friction_findings):
     series = replace(friction_findings.time_series[0], tested=())
-    assert compute_remainder_spectra((series,), friction_findings.floor) == ()
+    assert compute_held_out_spectra((series,), friction_findings.floor) == ()
     sentence = "There are no held-out data to draw."
     assert [text.get_text() for text in draw_residual_spectra(()).texts] == [sentence]
     assert [text.get_text() for text in draw_held_out(None, {}, {}).texts] == [sentence]

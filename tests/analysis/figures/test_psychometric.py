@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
-from analysis.figures.study_pictures import study_pictures
+from analysis.figures.study_pictures import draw_study_pictures
 from analysis.figures.style import PAGE_WIDTH_IN
 from analysis.figures.thresholds_by_unit import draw_thresholds_by_unit
 from analysis.psychophysics.detection import compute_thresholds_above_detection
@@ -55,7 +55,7 @@ def test_a_persons_curve_crosses_its_threshold_line_where_it_is_written(analysis
 
 @pytest.mark.slow
 def test_a_study_has_them_page_wide_as_svg_and_png(analysis):
-    pictures = {picture.name: picture for picture in study_pictures(analysis)}
+    pictures = {picture.name: picture for picture in draw_study_pictures(analysis)}
     for name in ("thresholds", "units", "psychometric", "psychometric-2-s02", "staircases-2-s02", "delivered"):
         assert pictures[name].bitmap
         assert pictures[name].figure.get_size_inches()[0] == PAGE_WIDTH_IN
@@ -94,7 +94,7 @@ def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
     some = replace(table, values=tuple((0.0, *row[1:]) for row in table.values))
     assert draw_thresholds_by_unit([analysis.table, some]).axes[1].get_ylim()[0] > 0
     still = tuple(replace(row, threshold_mps2=0.0, threshold_mm=0.0) for row in analysis.thresholds)
-    assert "units" not in [picture.name for picture in study_pictures(replace(analysis, thresholds=still))]
+    assert "units" not in [picture.name for picture in draw_study_pictures(replace(analysis, thresholds=still))]
 
 
 @pytest.mark.slow
@@ -105,10 +105,10 @@ def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(all_tria
     assert row[:3] == (None, None, None) and row[4] is None
     assert row[3] == pytest.approx(20 * np.log10(analysis.table.values[0][3] / felt))
     assert table.censored[0][3] == analysis.table.censored[0][3]
-    assert "units" in [picture.name for picture in study_pictures(analysis)]
+    assert "units" in [picture.name for picture in draw_study_pictures(analysis)]
 
 
 @pytest.mark.slow
 def test_where_nothing_was_measured_there_is_no_figure_of_units(simulate_study, protocol):
     trials = [replace(t, delivered_mps2=None, displacement_mm=None) for t in simulate_study(subjects=2)]
-    assert "units" not in [picture.name for picture in study_pictures(analyse_study(trials, protocol))]
+    assert "units" not in [picture.name for picture in draw_study_pictures(analyse_study(trials, protocol))]

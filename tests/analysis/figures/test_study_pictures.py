@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from analysis.figures.picture import Picture
-from analysis.figures.study_pictures import study_pictures
+from analysis.figures.study_pictures import draw_study_pictures
 from analysis.figures.style import MARKERS
 from analysis.psychophysics.study_analysis import analyse_study
 
@@ -13,7 +13,7 @@ from analysis.psychophysics.study_analysis import analyse_study
 @pytest.fixture(scope="module")
 def draw_pictures(protocol):
     def pictures(trials) -> dict[str, Picture]:
-        return {picture.name: picture for picture in study_pictures(analyse_study(trials, protocol))}
+        return {picture.name: picture for picture in draw_study_pictures(analyse_study(trials, protocol))}
 
     return pictures
 
@@ -78,7 +78,7 @@ def test_each_participant_has_a_line_and_each_mean_stands_over_its_tick(study_dr
 def test_a_run_that_the_trial_limit_stopped_is_drawn_and_said(simulate_study, protocol):
     limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
     trials = simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), rule=limited.staircase)
-    pictures = {picture.name: picture for picture in study_pictures(analyse_study(trials, limited))}
+    pictures = {picture.name: picture for picture in draw_study_pictures(analyse_study(trials, limited))}
     figure = pictures["thresholds"].figure
     above = [line for line in figure.axes[0].lines if line.get_marker() in MARKERS and line.get_ydata()[0] > 3.0]
     assert [str(line.get_marker()) for line in above] == list(MARKERS[:2])

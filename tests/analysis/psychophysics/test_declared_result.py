@@ -105,8 +105,8 @@ def test_the_terminal_and_the_document_have_it(hierarchical_declared):
 def test_nothing_declared_takes_a_sentence(analyse_declared):
     undeclared = analyse_declared()
     assert undeclared.declared_result.results == ()
-    assert undeclared.declared.count(". ") == 0
-    assert undeclared.declared in page_text(undeclared)
+    assert undeclared.declaration.count(". ") == 0
+    assert undeclared.declaration in page_text(undeclared)
     assert "Participants and exclusions" not in page_text(undeclared)
     assert not any("Declared" in line for line in format_threshold_lines(undeclared))
 

@@ -49,10 +49,10 @@ def test_the_model_is_that_of_a_protocol_with_the_played_frequencies_alone(trial
 @pytest.mark.slow
 def test_the_report_names_the_missing_and_both_analyses_compare_with_the_lowest_played(trials, protocol):
     analysis = analyse_study(drop_frequencies(trials, 5.0), protocol)
-    assert analysis.compared.startswith("The model leaves 5 Hz out, where there is no answer yet.")
+    assert analysis.comparison_text.startswith("The model leaves 5 Hz out, where there is no answer yet.")
     assert {contrast.against_hz for contrast in (*analysis.primary.contrasts, *analysis.mean_contrasts)} == {15.0}
     assert [contrast.frequency_hz for contrast in analysis.mean_contrasts] == [25.0, 35.0, 45.0]
-    assert "Differences to 15 Hz by the model and by reversal means" in analysis.compared
+    assert "Differences to 15 Hz by the model and by reversal means" in analysis.comparison_text
     assert "The model leaves 5 Hz out" in render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
     assert json.loads(json.dumps(make_anova_document(analysis), allow_nan=False))["primary"]["missing_hz"] == [5.0]
 
@@ -62,8 +62,8 @@ def test_a_frequency_with_broken_runs_alone_has_no_reversal_means_to_compare(tri
     broken = [t for t in trials if t.frequency_hz != 5.0 or t.trial <= 8]
     analysis = analyse_study(broken, protocol)
     assert analysis.primary.missing_hz == () and analysis.mean_contrasts == ()
-    assert "Reversal means give no difference to 5 Hz yet" in analysis.compared
-    assert "agree within" not in analysis.compared
+    assert "Reversal means give no difference to 5 Hz yet" in analysis.comparison_text
+    assert "agree within" not in analysis.comparison_text
 
 
 def test_void_trials_are_no_answers(trials):

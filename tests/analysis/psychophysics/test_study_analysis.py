@@ -28,7 +28,7 @@ def test_a_whole_study_is_analysed(simulate_study, protocol, statistics_json):
     assert analysis.population is Population.SIMULATED
     assert len(analysis.thresholds) == 50
     assert analysis.anova.p < 0.001
-    assert analysis.within.p < 0.001
+    assert analysis.repeated_measures.p < 0.001
     assert len(analysis.comparisons.pairs) == 10
     document = statistics_json(analysis)
     assert (document["format"], document["version"]) == ("hapteq-anova", 1)

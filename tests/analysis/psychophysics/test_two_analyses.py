@@ -26,16 +26,16 @@ def analysis(simulate_study, protocol):
 def test_what_the_cap_hides_is_reported(analysis):
     by_model, by_means = analysis.primary.contrasts[3], analysis.mean_contrasts[3]
     assert by_model.difference_db > by_means.difference_db + 3.0
-    assert "differ: at " in analysis.compared
-    assert "45 Hz" in analysis.compared
+    assert "differ: at " in analysis.comparison_text
+    assert "45 Hz" in analysis.comparison_text
     for name in ("means", "tukey", "one-way"):
-        assert describe_coverage(MEASURED_COVERAGES, name) in analysis.compared
+        assert describe_coverage(MEASURED_COVERAGES, name) in analysis.comparison_text
 
 
 @pytest.mark.slow
 def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis):
     parts = analysis.primary, analysis.mean_contrasts, analysis.comparisons, analysis.table
-    assert describe_comparison(*parts, SIMULATED_RULE) == analysis.compared
+    assert describe_comparison(*parts, SIMULATED_RULE) == analysis.comparison_text
     for other in (replace(SIMULATED_RULE, cap_n=2.0), replace(SIMULATED_RULE, down_after_right=2)):
         said = describe_comparison(*parts, other)
         assert "Near the cap the published intervals do not have" in said
@@ -82,8 +82,8 @@ def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(p
 @pytest.mark.slow
 def test_where_all_guess_no_difference_is_told(protocol, simulate_study):
     analysis = analyse_study(simulate_study(true_n=(float("inf"),) * 5), protocol)
-    assert "The model gives no difference to 5 Hz." in analysis.compared
-    assert "Both agree" not in analysis.compared and "they disagree" not in analysis.compared
+    assert "The model gives no difference to 5 Hz." in analysis.comparison_text
+    assert "Both agree" not in analysis.comparison_text and "they disagree" not in analysis.comparison_text
 
 
 @pytest.mark.slow
@@ -99,15 +99,15 @@ def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_i
 @pytest.mark.slow
 def test_far_below_the_cap_the_two_agree(simulate_study, protocol):
     low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
-    assert "agree within 1 dB" in low.compared
-    assert "Measured near the cap" not in low.compared
+    assert "agree within 1 dB" in low.comparison_text
+    assert "Measured near the cap" not in low.comparison_text
 
 
 def test_one_participant_leaves_the_published_analysis_alone(simulate_study, protocol):
     alone = analyse_study(simulate_study(subjects=1), protocol)
     assert alone.primary is None
-    assert "only the published analysis is given" in alone.compared
-    assert describe_comparison(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
+    assert "only the published analysis is given" in alone.comparison_text
+    assert describe_comparison(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.comparison_text
 
 
 def test_what_was_declared_and_what_was_not_is_reported():
@@ -147,4 +147,4 @@ def test_the_direction_limit_is_between_the_frequencies_around_the_cap(analysis)
 @pytest.mark.slow
 def test_the_declaration_is_part_of_the_analysis(simulate_study, protocol):
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 5.0), 10))
-    assert "Declared as primary" in analyse_study(simulate_study(subjects=3), declared).declared
+    assert "Declared as primary" in analyse_study(simulate_study(subjects=3), declared).declaration

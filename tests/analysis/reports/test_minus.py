@@ -11,7 +11,7 @@ from analysis.diagnosis.localisation.state_regions import describe_region
 from analysis.diagnosis.real_answer.real_answer import OwnParameter
 from analysis.diagnosis.result.wording import write_summary_lines
 from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
-from analysis.figures.study_pictures import study_pictures
+from analysis.figures.study_pictures import draw_study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.diagnosis_report import render_diagnosis_report
@@ -73,7 +73,7 @@ def test_on_the_report_of_a_study(simulate_study, protocol):
     ellipses = compute_moment_ellipsoid(samples), compute_phasor_ellipse(samples, 1000.0, 25.0)
     tilted = (EllipsoidResult(25.0, "direction_1", 1.0, *ellipses),)
     analysis = analyse_study(trials, turned)
-    html = render_study_report(analysis, study_pictures(analysis, tilted), {}, "2026-01-02T03:04:05Z", tilted)
+    html = render_study_report(analysis, draw_study_pictures(analysis, tilted), {}, "2026-01-02T03:04:05Z", tilted)
     assert_one_spelling(page_texts(html))
 
 

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.figures.study_pictures import study_pictures
+from analysis.figures.study_pictures import draw_study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.psychophysics.thresholds import RunEnd
@@ -71,7 +71,7 @@ def make_ellipsoid():
 def render_report(protocol):
     def render(trials, ellipsoids=(), provenance=None, protocol=protocol) -> str:
         analysis = analyse_study(trials, protocol)
-        pictures = study_pictures(analysis, ellipsoids)
+        pictures = draw_study_pictures(analysis, ellipsoids)
         return render_study_report(
             analysis, pictures, provenance or {"hapteq": "0.1.0"}, "2026-01-02T03:04:05Z", ellipsoids
         )
@@ -256,7 +256,7 @@ def test_where_psi_chose_the_levels_nothing_speaks_of_reversals(simulate_study, 
     rule = replace(protocol.staircase, bayesian=BayesianPlacement(15))
     study = replace(protocol, staircase=rule, analysis=AnalysisSettings(primary="published", contrast_hz=(45.0, 5.0)))
     analysis = analyse_study(simulate_study(subjects=2, rule=rule), study)
-    pictures = study_pictures(analysis, ())
+    pictures = draw_study_pictures(analysis, ())
     drawn = " ".join(
         text.get_text()
         for picture in pictures

@@ -9,7 +9,7 @@ from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import PlacingError, place_effects, shorten_axis_name, to_model_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import parse_law
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import ModelEffect
 from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
 
@@ -26,11 +26,11 @@ def placed(model, *effects: ModelEffect):
 
 
 def test_the_catalogue_plays_every_name_of_the_vocabulary():
-    assert [effect.name for effect in CATALOGUE] == [name.name for name in EFFECT_NAMES]
+    assert [effect.name for effect in CATALOGUE] == [name.name for name in EFFECT_ENTRIES]
 
 
 @pytest.mark.parametrize("optional", [False, True])
-@pytest.mark.parametrize("kind", [name.name for name in EFFECT_NAMES])
+@pytest.mark.parametrize("kind", [name.name for name in EFFECT_ENTRIES])
 def test_every_effect_of_a_file_can_be_played(bench, kind, optional):
     model = bench.three_axes()
     (one,) = placed(model, written(kind, None, optional))

@@ -18,7 +18,7 @@ from protocols.procedure.psi import (
     list_levels_db,
     list_thresholds_db,
 )
-from protocols.procedure.staircase import begin_staircase, is_complete, is_finished, level_n, step, to_db
+from protocols.procedure.staircase import begin_staircase, compute_level_n, is_complete, is_finished, step, to_db
 from tests.analysis.conftest import PUBLISHED
 
 CAP_DB = to_db(3.0)
@@ -90,7 +90,7 @@ def test_no_answers_lead_above_the_cap_and_the_same_answers_lead_to_the_same_lev
     for _ in range(2):
         state, played = begin_staircase(rule), []
         for answer in answers:
-            played.append(level_n(rule, state))
+            played.append(compute_level_n(rule, state))
             state = step(rule, state, answer)
         levels.append(played)
         assert is_finished(rule, state) and is_complete(rule, state)

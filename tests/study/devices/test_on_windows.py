@@ -84,7 +84,7 @@ def test_a_stimulus_is_held_on_the_driver_with_the_calls_that_are_made_there(win
 def test_a_library_is_loaded_by_its_whole_path_so_that_what_lies_beside_it_is_found(monkeypatch):
     loaded: list[str] = []
     monkeypatch.setattr(library.ctypes, "CDLL", loaded.append)
-    library._load(Path("sdk") / "bin" / "drd64.dll")
+    library._load_shared_library(Path("sdk") / "bin" / "drd64.dll")
     assert loaded == [str(Path.cwd() / "sdk" / "bin" / "drd64.dll")]
 
 

@@ -45,7 +45,7 @@ NAMED_IN = {
     },
     "hold_unchecked": {"study/devices/force_dimension/force_limit_check.py"},
     "given_past_this_n": {"study/devices/force_dimension/force_limit_check.py"},
-    "Standby": set(),
+    "StandbyThread": set(),
     "run_block": set(),
 }
 """Where else than at home a name may stand at all: imported, called, under another name or as a string."""

@@ -14,7 +14,7 @@ from protocols.definition.plausibility import PlausibilitySettings
 from study.devices import opening
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings
-from study.devices.opening import DEVICES, FRICTIONLESS, REAL, SIMULATIONS, open_device
+from study.devices.opening import DEVICES, FRICTIONLESS, REAL_DEVICES, SIMULATIONS, open_device
 from study.devices.rig import READING_SIZE
 from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.devices.safe import SafeDevice
@@ -128,7 +128,7 @@ def test_a_higher_ceiling_with_a_hand_is_refused():
 
 
 def test_every_device_that_is_offered_can_be_built():
-    assert set(DEVICES) <= {*SIMULATIONS, *REAL} == set(RIGS_BY_NAME)
+    assert set(DEVICES) <= {*SIMULATIONS, *REAL_DEVICES} == set(RIGS_BY_NAME)
 
 
 def test_the_device_without_friction_says_so_and_is_offered_nowhere():
@@ -171,7 +171,7 @@ def own(request, monkeypatch, tmp_path):
     rig = OwnRig(request.param)
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
     monkeypatch.setitem(RIGS_BY_NAME, "own", lambda settings, seed: rig)
-    monkeypatch.setattr(opening, "REAL", (*REAL, "own"))
+    monkeypatch.setattr(opening, "REAL_DEVICES", (*REAL_DEVICES, "own"))
     return rig
 
 

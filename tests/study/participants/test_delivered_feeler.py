@@ -70,5 +70,5 @@ def test_the_delivered_population_has_the_thresholds_of_the_population(observer)
 
 
 def test_detection_and_what_was_not_measured_go_by_the_command(observer):
-    assert observer.felt_n(replace(felt(1.2, along=0.1), delivered=None)) == 1.2
-    assert observer.felt_n(replace(felt(1.2, along=0.1), phase=Phase.DETECTION)) == 1.2
+    assert observer.compute_equivalent_force_n(replace(felt(1.2, along=0.1), delivered=None)) == 1.2
+    assert observer.compute_equivalent_force_n(replace(felt(1.2, along=0.1), phase=Phase.DETECTION)) == 1.2

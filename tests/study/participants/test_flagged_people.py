@@ -9,7 +9,7 @@ from analysis.psychophysics.repeated_trials import format_repeat_warning
 from analysis.psychophysics.study_warnings import list_study_warnings
 from analysis.psychophysics.threshold_table import tabulate_thresholds
 from analysis.psychophysics.thresholds import compute_thresholds
-from protocols.procedure.staircase import begin_staircase, is_finished, level_n
+from protocols.procedure.staircase import begin_staircase, compute_level_n, is_finished
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.observer import PerceivedStimulus
 from study.participants.observer_catalogue import find_observer
@@ -30,7 +30,7 @@ def session(observer, subject, seed):
         while not is_finished(PUBLISHED, state):
             shown = int(random.integers(1, 3))
             felt = PerceivedStimulus(
-                run, state.trials, 0, Phase.TEST, HZ[place], level_n(PUBLISHED, state), shown, before
+                run, state.trials, 0, Phase.TEST, HZ[place], compute_level_n(PUBLISHED, state), shown, before
             )
             while (reply := observer.reply(felt, seed)).ask_again and left > 0:
                 left -= 1

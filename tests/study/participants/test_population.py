@@ -9,7 +9,7 @@ from scipy.stats import tukey_hsd
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import load_protocol
 from protocols.procedure.schedule import draw_trial, schedule_runs
-from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
+from protocols.procedure.staircase import begin_staircase, compute_level_n, is_finished, step, to_newton
 from protocols.trial import Phase
 from study.participants.detection_thresholds import TYPICAL_DETECTION_N
 from study.participants.observer import Observer, PerceivedStimulus
@@ -26,7 +26,7 @@ def sitting(protocol: StudyProtocol, observer: Observer, seed: int) -> dict[floa
         state = begin_staircase(protocol.staircase)
         while not is_finished(protocol.staircase, state):
             draw = draw_trial(protocol.schedule, "random", seed, run.index, state.trials, 0)
-            level = level_n(protocol.staircase, state)
+            level = compute_level_n(protocol.staircase, state)
             felt = PerceivedStimulus(
                 run.index, state.trials, 0, run.phase, run.frequency_hz, level, draw.direction, answered
             )

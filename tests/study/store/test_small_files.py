@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.document import diagnosis_from_json
 from equalizer.plant.mechanical_model import ActuatorLimits, SensorLimits, Tolerance
-from equalizer.plant.mechanical_model_toml import MATRICES, parse_mechanical_model
+from equalizer.plant.mechanical_model_toml import MATRIX_KEYS, parse_mechanical_model
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.store.disk.file_errors import AlreadyExistsError, CannotReadError, UnusableFileError
@@ -77,7 +77,7 @@ def test_a_faulty_mechanical_model_is_an_error_of_the_study(tmp_path):
 def test_the_documented_keys_of_a_mechanical_model_are_those_that_are_read():
     tables = {"model": None, "sensor": SensorLimits, "actuator": ActuatorLimits, "tolerance": Tolerance}
     read = {f"{table}.{part.name}" for table, kind in tables.items() if kind for part in fields(kind)}
-    read |= {f"model.{name}" for name in ("name", "quantity", "rotational", *MATRICES)}
+    read |= {f"model.{name}" for name in ("name", "quantity", "rotational", *MATRIX_KEYS)}
     assert {entry.name for entry in LAYOUT if entry.name.split(".")[0] in tables} == read
 
 

@@ -1,8 +1,9 @@
-"""Maps of the missing force along each axis against position, velocity, command and time, and hysteresis loops.
+"""Compute maps of the missing force along each axis against position, velocity, command and time, and hysteresis loops.
 
-From force balances, the missing force is the residual of mass, damping and stiffness (or of the given model); without
+With force balances, the missing force is the residual of mass, damping and stiffness (or of the given model); without
 balances, that of the re-tuned model, from its evidence. Its sign is that of a force on the device. Where laws complete
-the model, the residual with them is shown, too.
+the model, the residual with them is computed, too. Called by `diagnose`; `analysis.figures.diagnosis.state_maps` draws
+the maps.
 """
 
 from collections.abc import Sequence
@@ -28,11 +29,11 @@ if TYPE_CHECKING:
 
 
 SCATTER_SAMPLES = 600
-"""Approximate number of single samples that are drawn."""
+"""Least number of single samples that are drawn, where there are as many; up to twice as many are drawn. Chosen."""
 LOOP_SAMPLES = 2000
-"""Largest number of samples of a loop."""
+"""Largest number of samples of a loop. Chosen."""
 LOOP_PERIODS = 1.1
-"""Length of a loop in periods of the motion's strongest line, so that it closes."""
+"""Length of a loop in periods of the motion's strongest line. Chosen above 1, so that the loop closes."""
 WITH_NAMED, WITH_CANDIDATES = "with the named effects", "with the best candidates, not confirmed"
 """Texts for the laws that complete the model."""
 
@@ -93,51 +94,54 @@ class StateMaps:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AxisSeries:
-    """Samples (n,) of one axis, all parts in a row; SI."""
+    """Samples (n,) of one axis, all parts one after another; SI."""
 
     rate_hz: float
-    seconds: FloatArray
+    time_s: FloatArray
     position: FloatArray
     velocity: FloatArray
     force: FloatArray
     model_force: FloatArray
     completed_force: FloatArray | None
-    used: Mask
+    is_used: Mask
     parts: tuple[slice, ...]
 
 
 def compute_state_maps(
     diagnosis: Diagnosis, balances: "Sequence[Balance]", evidence: Sequence[Evidence], recording: Recording
 ) -> tuple[StateMaps, ...]:
-    """Maps of all axes, in the order of drawing: the axis of the first named effect, then by missing force. From the
-    force balances where there are any; else from the evidence of the re-tuned model."""
+    """Compute the maps of all axes, in the order of drawing: the axis of the first named effect, then by the share of
+    the missing force. From the force balances where there are any; else from the evidence of the re-tuned model. Axes
+    without usable samples are left out."""
     channels = recording.command.channels
-    letters = tuple(shorten_axis_name(channel, channels) for channel in channels)
+    axis_letters = tuple(shorten_axis_name(channel, channels) for channel in channels)
     units = recording.command.units
     length_unit = determine_unit_system(units, recording.response.units).length
     maps = []
-    for axis, letter in enumerate(letters):
+    for axis, letter in enumerate(axis_letters):
         if balances:
-            series, completed = _extract_balance_series(balances[axis], diagnosis, letter)
+            series, completion = _extract_balance_series(balances[axis], diagnosis, letter)
             has_prior = balances[axis].search.regression.prior is not None
-            model = "the re-tuned model" if has_prior else "mass, damping and stiffness alone"
+            model_text = "the re-tuned model" if has_prior else "mass, damping and stiffness alone"
         else:
-            series, completed, model = _extract_evidence_series(evidence, axis), "", "the re-tuned model"
+            series, completion, model_text = _extract_evidence_series(evidence, axis), "", "the re-tuned model"
         if series is not None:
-            labels = (letter, units[axis], model, completed)
+            labels = (letter, units[axis], model_text, completion)
             maps.append(_make_maps(series, labels, length_unit))
     first_axis = diagnosis.effects[0].axis if diagnosis.effects else None
     return tuple(sorted(maps, key=lambda axis_map: (axis_map.axis != first_axis, -axis_map.share)))
 
 
 def _extract_balance_series(balance: "Balance", diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
-    """The samples of one axis from its balance, None without any, and the text for the laws that complete the model:
-    the named ones, else all that were chosen."""
+    """Extract the samples of one axis from its balance, None without usable ones, and the text for the laws that
+    complete the model: the named ones, else all that the balance contains."""
     regression = balance.search.regression
-    names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-    named_laws = [law.law_index for law in balance.laws if law.simulated_as in names]
-    laws = named_laws or [law.law_index for law in balance.laws]
-    linear, completed = (regression.compute_residuals(regression.select_columns(law_set)) for law_set in ((), laws))
+    named_effects = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
+    named_indices = [law.law_index for law in balance.laws if law.simulated_as in named_effects]
+    law_indices = named_indices or [law.law_index for law in balance.laws]
+    linear_residuals, completed_residuals = (
+        regression.compute_residuals(regression.select_columns(indices)) for indices in ((), law_indices)
+    )
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions
     series = _AxisSeries(
@@ -146,33 +150,35 @@ def _extract_balance_series(balance: "Balance", diagnosis: Diagnosis, letter: st
         np.concatenate([motion.position[:: motion.step, axis] for motion in motions]),
         np.concatenate([motion.velocity[:: motion.step, axis] for motion in motions]),
         np.concatenate(regression.force),
-        np.concatenate(_subtract_remainder(regression, linear)),
-        np.concatenate(_subtract_remainder(regression, completed)) if laws else None,
+        np.concatenate(_compute_model_forces(regression, linear_residuals)),
+        np.concatenate(_compute_model_forces(regression, completed_residuals)) if law_indices else None,
         np.concatenate([motion.mask_valid_samples(motion.fit | motion.test) for motion in motions]),
         _make_slices([len(force) for force in regression.force]),
     )
-    return (series if series.used.any() else None), (WITH_NAMED if named_laws else WITH_CANDIDATES if laws else "")
+    return (series if series.is_used.any() else None), (
+        WITH_NAMED if named_indices else WITH_CANDIDATES if law_indices else ""
+    )
 
 
-def _subtract_remainder(regression: "Regression", remainder: Sequence[FloatArray]) -> list[FloatArray]:
-    """Force that the model needs for the motion: the measured force less the residual, per motion."""
-    return [force - residual for force, residual in zip(regression.force, remainder, strict=True)]
+def _compute_model_forces(regression: "Regression", residuals: Sequence[FloatArray]) -> list[FloatArray]:
+    """Compute the force that the model requires for the motion: the measured force less the residual, per motion."""
+    return [force - residual for force, residual in zip(regression.force, residuals, strict=True)]
 
 
 def _compute_times_s(motions: "Sequence[Motion]") -> FloatArray:
-    """(n,): time of the decimated samples, as if the parts followed one another without a gap."""
-    count = sum(len(motion.force[:: motion.step]) for motion in motions)
-    return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
+    """Compute (n,): time of the decimated samples, as if the parts followed one another without a gap."""
+    sample_count = sum(len(motion.force[:: motion.step]) for motion in motions)
+    return np.asarray(np.arange(sample_count) * motions[0].step / motions[0].rate_hz)
 
 
-def _make_slices(counts: Sequence[int]) -> tuple[slice, ...]:
-    """Ranges of parts with these numbers of samples."""
-    ends = np.cumsum([0, *counts]).tolist()
+def _make_slices(sample_counts: Sequence[int]) -> tuple[slice, ...]:
+    """Make the index ranges of parts with these numbers of samples, one after another."""
+    ends = np.cumsum([0, *sample_counts]).tolist()
     return tuple(slice(start, end) for start, end in pairwise(ends))
 
 
 def _extract_evidence_series(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
-    """The samples of one axis from the evidence; None where its motion is not known."""
+    """Extract the samples of one axis from the evidence; None where its motion is not known, or no sample is usable."""
     if not evidence or any(axis >= record.axis_force.shape[1] for record in evidence):
         return None
     position, velocity, force, missing_force = (
@@ -180,19 +186,19 @@ def _extract_evidence_series(evidence: Sequence[Evidence], axis: int) -> _AxisSe
         for name in ("axis_position", "axis_velocity", "command", "axis_force")
     )
     is_finite = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(force) & np.isfinite(missing_force)
-    used = is_finite & np.concatenate([record.used > 0 for record in evidence])
+    is_used = is_finite & np.concatenate([record.used > 0 for record in evidence])
     rate_hz = evidence[0].sample_rate_hz
-    if not used.any() or not np.ptp(velocity[used]) > 0:
+    if not is_used.any() or not np.ptp(velocity[is_used]) > 0:
         return None
-    seconds = np.arange(len(force)) / rate_hz
+    time_s = np.arange(len(force)) / rate_hz
     parts = _make_slices([len(record.command) for record in evidence])
-    return _AxisSeries(rate_hz, seconds, position, velocity, force, force + missing_force, None, used, parts)
+    return _AxisSeries(rate_hz, time_s, position, velocity, force, force + missing_force, None, is_used, parts)
 
 
 def _make_maps(series: _AxisSeries, labels: tuple[str, str, str, str], length_unit: str) -> StateMaps:
-    """The maps of one axis. labels: axis, unit of the force, model, completed. length_unit: of the position."""
+    """Make the maps of one axis. labels: axis, unit of the force, model, completed. length_unit: of the position."""
     axis, unit, model, completed = labels
-    # As the missing force on the device: friction then points against the motion.
+    # The sign is that of a force on the device, so that friction is opposite to the motion.
     missing_force = series.model_force - series.force
     residual = None if series.completed_force is None else series.completed_force - series.force
     views = tuple(
@@ -201,25 +207,29 @@ def _make_maps(series: _AxisSeries, labels: tuple[str, str, str, str], length_un
             ("position", length_unit, series.position),
             ("velocity", f"{length_unit}/s", series.velocity),
             ("command", unit, series.force),
-            ("time", "s", series.seconds),
+            ("time", "s", series.time_s),
         )
     )
-    force_deviation = series.force[series.used] - series.force[series.used].mean()
+    force_deviation = series.force[series.is_used] - series.force[series.is_used].mean()
     force_rms = max(float(np.sqrt(np.mean(force_deviation**2))), 1e-300)
-    share = float(np.sqrt(np.mean(missing_force[series.used] ** 2))) / force_rms
+    share = float(np.sqrt(np.mean(missing_force[series.is_used] ** 2))) / force_rms
     return StateMaps(axis, unit, model, completed, share, views, _make_loops(series, length_unit))
 
 
 def _make_view(
-    series: _AxisSeries, labels: tuple[str, str], abscissa: FloatArray, missing: tuple[FloatArray, FloatArray | None]
+    series: _AxisSeries,
+    labels: tuple[str, str],
+    abscissa: FloatArray,
+    force_and_residual: tuple[FloatArray, FloatArray | None],
 ) -> StateView:
-    """The missing force over one variable. labels: its name and unit. missing: without and with completing laws."""
-    missing_force, residual = missing
-    used_samples = np.flatnonzero(series.used)
+    """Make the view of the missing force over one variable. labels: its name and unit. force_and_residual: the missing
+    force, and the residual with the laws that complete the model; None without such laws."""
+    missing_force, residual = force_and_residual
+    used_samples = np.flatnonzero(series.is_used)
     drawn_samples = used_samples[:: max(len(used_samples) // SCATTER_SAMPLES, 1)]
-    bin_centres, mean, error = compute_bin_means(abscissa, missing_force, series.used, series.rate_hz)
+    bin_centres, mean, error = compute_bin_means(abscissa, missing_force, series.is_used, series.rate_hz)
     bin_residuals = (
-        np.zeros(0) if residual is None else compute_bin_means(abscissa, residual, series.used, series.rate_hz)[1]
+        np.zeros(0) if residual is None else compute_bin_means(abscissa, residual, series.is_used, series.rate_hz)[1]
     )
     return StateView(
         *labels, abscissa[drawn_samples], missing_force[drawn_samples], bin_centres, mean, error, bin_residuals
@@ -227,12 +237,12 @@ def _make_view(
 
 
 def _make_loops(series: _AxisSeries, length_unit: str) -> tuple[Loop, ...]:
-    """Loops over position and velocity."""
-    part = _find_largest_period(series)
-    completed_force = np.zeros(0) if series.completed_force is None else series.completed_force[part]
-    forces = series.force[part], series.model_force[part], completed_force
+    """Make the loops over position and velocity."""
+    period = _find_largest_period(series)
+    completed_force = np.zeros(0) if series.completed_force is None else series.completed_force[period]
+    forces = series.force[period], series.model_force[period], completed_force
     return tuple(
-        Loop(abscissa, unit, values[part], *forces)
+        Loop(abscissa, unit, values[period], *forces)
         for abscissa, unit, values in (
             ("position", length_unit, series.position),
             ("velocity", f"{length_unit}/s", series.velocity),
@@ -241,15 +251,16 @@ def _make_loops(series: _AxisSeries, length_unit: str) -> tuple[Loop, ...]:
 
 
 def _find_largest_period(series: _AxisSeries) -> slice:
-    """About one period of the motion, where its travel is largest."""
-    part = max(
+    """Find about one period of the motion where its travel is largest, at least 40 samples (chosen) where the part has
+    as many; starts a quarter of that length apart are tried."""
+    widest_part = max(
         series.parts,
         key=lambda samples: float(np.ptp(series.position[samples])) if samples.stop > samples.start else 0.0,
     )
-    position = series.position[part]
+    position = series.position[widest_part]
     power = np.abs(np.fft.rfft(position - position.mean()))
     strongest_line = int(np.argmax(power[1:])) + 1 if len(power) > 1 else 1
-    count = int(np.clip(LOOP_PERIODS * len(position) / strongest_line, min(40, len(position)), LOOP_SAMPLES))
-    starts = range(0, max(len(position) - count, 0) + 1, max(count // 4, 1))
-    best_start = max(starts, key=lambda start: float(np.ptp(position[start : start + count])))
-    return slice(part.start + best_start, part.start + min(best_start + count, len(position)))
+    period_samples = int(np.clip(LOOP_PERIODS * len(position) / strongest_line, min(40, len(position)), LOOP_SAMPLES))
+    starts = range(0, max(len(position) - period_samples, 0) + 1, max(period_samples // 4, 1))
+    best_start = max(starts, key=lambda start: float(np.ptp(position[start : start + period_samples])))
+    return slice(widest_part.start + best_start, widest_part.start + min(best_start + period_samples, len(position)))

@@ -17,7 +17,7 @@ from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, compute_law_score
 from study.errors import convert_interrupts
 from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
-from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
+from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
 from study.evaluation.bank.sealed_bank import (
@@ -49,45 +49,51 @@ class LawBlindTest:
 
 
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawBlindTest:
-    """Run a bank of laws in the folder `path`, or continue it after an interruption. Raises StudyError.
+    """Run a bank of laws in the folder `path`, or continue it after an interruption. Raises StudyError where the folder
+    belongs to another bank, a sealed file has changed, or the run is interrupted. Cases without answer and recording
+    are not diagnosed.
 
     on_progress: called with the step ("sealing" or "diagnosing"), the number of finished cases, and of all cases.
     """
     folder = open_proof_folder(path, plan.seed, plan.brief, LAW_BANK_KIND)
     with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
-        names = read_case_names(folder, range(plan.cases))
-        diagnosable = [
-            name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING_FILE).exists()
+        case_names = read_case_names(folder, range(plan.cases))
+        diagnosable_names = [
+            name
+            for name in case_names
+            if is_answered(folder.open / name) or (folder.open / name / RECORDING_FILE).exists()
         ]
         diagnose_and_count(
             folder,
-            names,
+            case_names,
             options.diagnosis_workers,
             partial(on_progress, "diagnosing"),
             keep=options.keep,
-            diagnosable=diagnosable,
+            diagnosable=diagnosable_names,
         )
     outcomes = reveal_laws(folder, plan.cases)
-    return LawBlindTest(folder, plan, seal, outcomes, compute_law_score(outcomes), list_engine_digests(folder, names))
+    return LawBlindTest(
+        folder, plan, seal, outcomes, compute_law_score(outcomes), list_engine_digests(folder, case_names)
+    )
 
 
-def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
-    """Reveal the answered cases among the first `cases` numbers, and return their outcomes. Raises StudyError where a
-    label or a fresh test motion differs from its seal."""
+def reveal_laws(folder: ProofFolder, case_count: int) -> tuple[LawOutcome, ...]:
+    """Reveal the answered cases among the numbers below `case_count`, and return their outcomes. Raises StudyError
+    where a label or a fresh test motion differs from its seal."""
 
     def is_unchanged(label: Mapping[str, Any]) -> bool:
         """Whether the file of the fresh test motions has the hash that is stated in the label."""
-        return compute_sha256(fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
+        return compute_sha256(get_fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
 
     def make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
         """Make the outcome of a case from its label and answer."""
-        return _make_outcome(label, answer, fresh_motions_path(folder, label["number"]))
+        return _make_law_outcome(label, answer, get_fresh_motions_path(folder, label["number"]))
 
-    return reveal_bank(folder, cases, make_outcome, is_unchanged)
+    return reveal_bank(folder, case_count, make_outcome, is_unchanged)
 
 
-def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_path: Path) -> LawOutcome:
+def _make_law_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_path: Path) -> LawOutcome:
     """Make the outcome of one case: its true law (None where the case has none), the answer and, where there are both a
     true and a found law, the error of the found laws on each fresh test motion in the file `fresh_path`."""
     truth = None if label["truth"] is None else _read_true_law(label["truth"])
@@ -98,14 +104,14 @@ def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_pat
     return replace(outcome, errors=tuple(compute_law_error(outcome.laws, motion) for motion in motions))
 
 
-def _read_true_law(label: Mapping[str, Any]) -> TrueLaw:
+def _read_true_law(truth: Mapping[str, Any]) -> TrueLaw:
     """Read the true law from the entry `truth` of a label."""
     return TrueLaw(
-        label["law"],
-        label["formula"],
-        tuple(label["axes"]),
-        tuple(label["acts_on"]),
-        tuple(tuple(readings) for readings in label["variables"]),
-        label["memory"],
-        label["numbers"],
+        truth["law"],
+        truth["formula"],
+        tuple(truth["axes"]),
+        tuple(truth["acts_on"]),
+        tuple(tuple(readings) for readings in truth["variables"]),
+        truth["memory"],
+        truth["numbers"],
     )

@@ -2,7 +2,7 @@
 
 Each case has open inputs for the diagnosis (recording, model, settings), and a sealed label with the true law and fresh
 test motions. Sealed means that the SHA-256 of each label is written, and can be published, before any case is
-diagnosed.
+diagnosed. Called by `prove_laws`.
 """
 
 import json
@@ -29,21 +29,22 @@ from study.store.formats.recording_file import write_recording
 
 def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draw, write and seal the missing cases in `workers` processes, calling `on_sealed` with the
-    number of cases sealed so far. Returns the SHA-256 of labels.sha256. Raises StudyError."""
+    number of cases sealed so far. Returns the SHA-256 of labels.sha256. Raises StudyError where a sealed file has
+    changed."""
     law_draws = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
     write_case = {law_draw.number: partial(_seal_law, folder, law_draw) for law_draw in law_draws}
     return seal_missing_cases(folder, write_case, workers, on_sealed)
 
 
-def fresh_motions_path(folder: ProofFolder, number: int) -> Path:
-    """Path of the sealed fresh motions of a case."""
+def get_fresh_motions_path(folder: ProofFolder, number: int) -> Path:
+    """Path of the file with the fresh test motions of a case, beside its label."""
     return folder.get_label_file(number).with_suffix(".npz")
 
 
 def read_fresh_motions(
     path: Path, axes: Sequence[str], law_axes: Sequence[str], acts_on_response: bool
 ) -> tuple[FreshMotion, ...]:
-    """Read a sealed file of fresh motions. axes: driven axes; law_axes: axes on which the laws act; acts_on_response:
+    """Read a file of fresh test motions. axes: driven axes; law_axes: axes on which the laws act; acts_on_response:
     whether the law acts on the sensor reading."""
     with np.load(path) as arrays_file:
         motion_count = len({name.split("_")[1] for name in arrays_file.files})
@@ -56,13 +57,14 @@ def read_fresh_motions(
 
 
 _ARRAY_NAMES = ("position", "velocity", "acceleration", "command", "reading", "lawful")
-"""Sealed arrays of a fresh motion, (samples, axes) each; the first four are the variables x, v, a and f of an axis."""
+"""Arrays of a fresh test motion, (samples, driven axes) each: the variables x (m), v (m/s), a (m/s²) and f (N) of an
+axis, the sensor reading (m/s²), and the force of the law (N)."""
 
 
 def _read_motion(
     arrays: dict[str, Any], axes: Sequence[str], law_axes: Sequence[str], acts_on_response: bool
 ) -> FreshMotion:
-    """A fresh motion as columns (t in s, and x, v, a and f by axis), with the law's contribution on the axes
+    """Make a fresh test motion of columns (t in s, and x, v, a and f by axis), with the law's contribution on the axes
     `law_axes`: to the sensor reading (m/s²), or the force (N)."""
     columns = {"t": np.arange(len(arrays["command"])) / RATE_HZ}
     for column, axis in enumerate(axes):
@@ -75,33 +77,37 @@ def _read_motion(
 
 
 def _seal_law(folder: ProofFolder, law_draw: LawDraw) -> None:
-    """Write one case. The label is written after all other files: without a label, the case is unfinished."""
+    """Write one case. The label is written after all other files: a case without a label is unfinished."""
     case_folder = begin_case(folder)
     law_case = generate_law_case(law_draw, case_folder.name)
     write_recording(case_folder / RECORDING_FILE, law_case.case.recording, precision="float32")
     write_mechanical_model(case_folder / MODEL_FILE, law_case.case.model)
     diagnosis_settings = {"without": [], "discovery": True, "processor_s": SEARCH_CPU_S}
     write_text(case_folder / SETTINGS_FILE, json.dumps(diagnosis_settings) + "\n")
-    np.savez(fresh_motions_path(folder, law_draw.number), allow_pickle=False, **_collect_arrays(law_case.fresh_motions))
+    np.savez(
+        get_fresh_motions_path(folder, law_draw.number), allow_pickle=False, **_collect_arrays(law_case.fresh_motions)
+    )
     label = _make_label(folder, law_draw, law_case, case_folder)
     write_text(folder.get_label_file(law_draw.number), json.dumps(label, indent=1, allow_nan=False) + "\n")
     publish_case(folder, case_folder)
 
 
 def _collect_arrays(motions: Sequence[FreshTestMotion]) -> dict[str, Any]:
-    """Arrays of all fresh motions by name and number, as `read_fresh_motions` reads them."""
+    """Collect the arrays of all fresh test motions by name and number, as `read_fresh_motions` reads them."""
     arrays = {}
-    for number, motion in enumerate(motions):
-        motion_arrays = (motion.motion.position, motion.motion.velocity, motion.motion.acceleration)
+    for number, fresh_motion in enumerate(motions):
+        motion_arrays = (fresh_motion.motion.position, fresh_motion.motion.velocity, fresh_motion.motion.acceleration)
         for name, values in zip(
-            _ARRAY_NAMES, (*motion_arrays, motion.command, motion.reading, motion.law_force), strict=True
+            _ARRAY_NAMES,
+            (*motion_arrays, fresh_motion.command, fresh_motion.reading, fresh_motion.law_force),
+            strict=True,
         ):
             arrays[f"{name}_{number}"] = values
     return arrays
 
 
 def _make_label(folder: ProofFolder, law_draw: LawDraw, law_case: LawCase, case_folder: Path) -> dict[str, Any]:
-    """The sealed label: the true law and the hashes of the files of the case. A random salt keeps the content from
+    """Make the sealed label: the true law and the hashes of the files of the case. A random salt keeps the content from
     being guessed from its hash."""
     return {
         "name": case_folder.name,
@@ -111,6 +117,6 @@ def _make_label(folder: ProofFolder, law_draw: LawDraw, law_case: LawCase, case_
         "adds": law_case.case.detectability,
         "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
         "model_sha256": compute_sha256(case_folder / MODEL_FILE),
-        "fresh_sha256": compute_sha256(fresh_motions_path(folder, law_draw.number)),
+        "fresh_sha256": compute_sha256(get_fresh_motions_path(folder, law_draw.number)),
         "salt": secrets.token_hex(SALT_BYTES),
     }

@@ -62,7 +62,8 @@ def _draw_stiffness_switching(context: EffectContext) -> dict[str, float]:
 
 
 def _build_stiffness_switching(device: Device, axis: int, values: Values) -> Device:
-    """Add a square wave to the ground stiffness of the axis, `depth` times its stiffness."""
+    """Add a square wave to the ground stiffness of the axis, `depth` times its stiffness. A row of the modulation holds
+    rate (Hz), depths of damping and stiffness, phase (rad), and the flag of a square wave."""
     modulation = device.modulation.copy()
     stiffness_n_per_m = values["depth"] * device.bench.stiffness[axis, axis]
     modulation[axis] = (values["rate_hz"], 0.0, stiffness_n_per_m, 0.0, 1.0)

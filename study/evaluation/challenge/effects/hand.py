@@ -3,7 +3,8 @@
 Hand impedance: mass (kg), damping (N s/m) and stiffness (N/m) to the ground along x, in other proportions along y and z
 (factors `mass_y` and so on). At strength 1 they have the size of a light grip, at 0 a hundredth of it.
 Time-varying grip: the damping between handle and ground is multiplied by 1 + depth sin(2 pi rate t + phase); whether
-the stiffness varies in the same way is drawn.
+the stiffness varies in the same way is drawn. All ranges were chosen by hand. Called by
+`study.evaluation.challenge.draw_case`.
 """
 
 from dataclasses import replace
@@ -17,7 +18,8 @@ from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, MODULATIO
 
 
 def _draw_hand(context: EffectContext) -> dict[str, float]:
-    """Along x at strength 1: 0.04 to 0.09 kg, 2.5 to 6 N s/m, 100 to 300 N/m, log-uniform."""
+    """Draw the impedance: at strength 1, along x, 0.04 to 0.09 kg, 2.5 to 6 N s/m and 100 to 300 N/m, log-uniform; the
+    factors of y and z 0.3 to 1.2, uniform."""
     grip_strength = context.interpolate_log(0.01, 1.0)
     x_values = {
         "mass": grip_strength * context.draw_log_uniform(0.04, 0.09),
@@ -29,21 +31,24 @@ def _draw_hand(context: EffectContext) -> dict[str, float]:
 
 
 def _build_hand(device: Device, axis: int, values: Values) -> Device:
-    def on_handle(name: str, ground: FloatArray) -> FloatArray:
-        """Matrix (3, 3) of the bench plus the hand's diagonal matrix."""
-        return ground + values[name] * np.diag((1.0, values[f"{name}_y"], values[f"{name}_z"]))
+    """Add mass, damping and stiffness of the hand to the device on all axes; `axis` is not used."""
+
+    def add_hand(name: str, bench_matrix: FloatArray) -> FloatArray:
+        """Add the hand's diagonal matrix to a matrix (3, 3) of the bench."""
+        return bench_matrix + values[name] * np.diag((1.0, values[f"{name}_y"], values[f"{name}_z"]))
 
     bench = replace(
         device.bench,
-        mass=on_handle("mass", device.bench.mass),
-        damping=on_handle("damping", device.bench.damping),
-        stiffness=on_handle("stiffness", device.bench.stiffness),
+        mass=add_hand("mass", device.bench.mass),
+        damping=add_hand("damping", device.bench.damping),
+        stiffness=add_hand("stiffness", device.bench.stiffness),
     )
     return replace(device, bench=bench)
 
 
 def _draw_grip(context: EffectContext) -> dict[str, float]:
-    """Rate (Hz), depth 0.02 to 0.8, phase (rad); stiffness_share: 0 or 1, whether the stiffness varies too."""
+    """Draw rate 0.03 to 0.5 Hz, depth 0.02 to 0.8, phase (rad), and stiffness_share: 0 or 1, whether the stiffness
+    varies too."""
     return {
         "rate_hz": context.draw_log_uniform(0.03, 0.5),
         "depth": context.interpolate_log(0.02, 0.8),
@@ -53,6 +58,7 @@ def _draw_grip(context: EffectContext) -> dict[str, float]:
 
 
 def _build_grip(device: Device, axis: int, values: Values) -> Device:
+    """Modulate damping and, if drawn, stiffness of the device on all axes; `axis` is not used."""
     modulation = np.zeros((3, 5))
     modulation[:, MODULATION_HZ], modulation[:, PHASE] = values["rate_hz"], values["phase"]
     modulation[:, DAMPING_DEPTH] = values["depth"] * np.diag(device.bench.damping)
@@ -64,4 +70,5 @@ EFFECTS = (
     ConcealedEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
     ConcealedEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
 )
-"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""
+"""The effects of the hand: name, place, whether it acts on one axis (else on all), functions that draw its parameters
+and build it in."""

@@ -1,6 +1,7 @@
 """Motion along one axis of a recording: position, velocity and acceleration by differentiation of a measured signal.
 
-`injections` computes from it the forces of faults that it injects into real recordings. Units are those of the recorded
+Faults of mechanism and drive that are injected into real recordings are computed from it. Called by `injections`;
+`force_injections` and `drive_injections` get its motions. Units are those of the recorded
 signal: m or rad, in V where voltages were recorded, and their time derivatives.
 """
 
@@ -65,7 +66,9 @@ def find_takes(recording: Recording) -> tuple[tuple[int, int], ...]:
     boundary is where an entry of `meta["parts"]` begins or ends; ignored within `MIN_TAKE_SAMPLES` of another boundary
     or of the end. The takes cover the recording."""
     parts = [part for part in recording.meta.get("parts", ()) if isinstance(part, dict)]
-    boundaries = sorted({int(part[side]) for part in parts for side in ("start", "stop") if side in part})
+    boundaries = sorted(
+        {int(part[bound_key]) for part in parts for bound_key in ("start", "stop") if bound_key in part}
+    )
     starts = [0]
     for boundary in boundaries:
         if starts[-1] + MIN_TAKE_SAMPLES <= boundary <= len(recording) - MIN_TAKE_SAMPLES:
@@ -82,9 +85,9 @@ def compute_axis_motion(recording: Recording, axis: int) -> AxisMotion | None:
     for signal in sorted(signals, key=lambda candidate: DERIVATIVE_ORDERS.get(candidate.quantities[0], 9)):
         quantity_orders = {DERIVATIVE_ORDERS.get(quantity, 9) for quantity in signal.quantities}
         if (signal.samples.shape[1] == axis_count or axis_count == 1) and max(quantity_orders) < 9:
-            samples, order = signal.samples[:, axis], DERIVATIVE_ORDERS[signal.quantities[axis]]
+            samples, derivative_order = signal.samples[:, axis], DERIVATIVE_ORDERS[signal.quantities[axis]]
             take_motions = [
-                _differentiate(samples[start:stop], order, recording.sample_rate_hz)
+                _differentiate(samples[start:stop], derivative_order, recording.sample_rate_hz)
                 for start, stop in find_takes(recording)
             ]
             q, v, a = (np.concatenate(take_arrays) for take_arrays in zip(*take_motions, strict=True))
@@ -92,14 +95,21 @@ def compute_axis_motion(recording: Recording, axis: int) -> AxisMotion | None:
     return None
 
 
-def _differentiate(samples: FloatArray, order: int, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _differentiate(
+    samples: FloatArray, derivative_order: int, rate_hz: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Compute position, velocity and acceleration in the frequency domain, from samples (n,) that are the derivative of
     position of this order. Missing samples are interpolated linearly; all are zero where none is known. The straight
     line through both ends is subtracted and the rest mirrored (odd), so that it is periodic. The low pass is the
-    squared magnitude of a fourth-order Butterworth filter; integration removes frequencies below 4 cycles per take."""
-    index, is_finite = np.arange(len(samples)), np.isfinite(samples)
-    interpolated = np.interp(index, index[is_finite], samples[is_finite]) if is_finite.any() else np.zeros(len(samples))
-    trend = np.interp(index, [0, len(interpolated) - 1], [interpolated[0], interpolated[-1]])
+    squared magnitude of a fourth-order Butterworth filter; integration removes frequencies below 4 cycles per take
+    (chosen), which it would amplify most."""
+    sample_indices, is_finite = np.arange(len(samples)), np.isfinite(samples)
+    interpolated = (
+        np.interp(sample_indices, sample_indices[is_finite], samples[is_finite])
+        if is_finite.any()
+        else np.zeros(len(samples))
+    )
+    trend = np.interp(sample_indices, [0, len(interpolated) - 1], [interpolated[0], interpolated[-1]])
     mirrored = np.concatenate([interpolated - trend, -(interpolated - trend)[-2:0:-1]])
     frequency = np.fft.rfftfreq(len(mirrored), 1 / rate_hz)
     spectrum = np.fft.rfft(mirrored)
@@ -107,7 +117,7 @@ def _differentiate(samples: FloatArray, order: int, rate_hz: float) -> tuple[Flo
     slope = (interpolated[-1] - interpolated[0]) / max(len(interpolated) - 1, 1) * rate_hz
     derivatives = []
     for target_order in range(3):
-        differentiations = target_order - order
+        differentiations = target_order - derivative_order
         j_omega = 2j * np.pi * np.maximum(frequency, 1e-12)
         gain = j_omega**differentiations / (1 + (frequency / cutoff_hz) ** 8)
         if differentiations < 0:

@@ -1,7 +1,8 @@
 """Faults of the drive (amplifier, motor), injected by altering the recorded command (inverse injection).
 
 The measured motion is unchanged. A drive with the characteristic g would have needed the command u' with g(u') = u for
-the recorded command u, and u' replaces u; see `force_injections`, which joins them with the injected forces.
+the recorded command u, and u' replaces u. `force_injections` joins these faults with those of the mechanism, and
+`injections` injects them.
 Saturation, slew limit and quantization have no unique inverse: their commands are approximations. The size of a fault
 grows exponentially with its strength, 0 to 1: a factor r**strength spans the ratio r. All ranges were chosen by hand.
 """
@@ -50,13 +51,13 @@ def compute_force_level(motion: AxisMotion, strength: float) -> float:
     return compute_centred_rms(motion.command) * float(0.02 * 50.0**strength)
 
 
-def _shift_later(samples: FloatArray, delay_samples: float) -> FloatArray:
+def _delay_samples(samples: FloatArray, delay_samples: float) -> FloatArray:
     """Delay samples (n,) by delay_samples (negative: advance), interpolated linearly; the end values are repeated."""
     sample_numbers = np.arange(len(samples), dtype=np.float64)
     return np.asarray(np.interp(sample_numbers - delay_samples, sample_numbers, samples))
 
 
-def _undo_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
+def _invert_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
     """Solve u' + cubic u'^3 = u for the command u' (n,) by Newton iteration from u."""
     command = motion.command.copy()
     for _ in range(NEWTON_STEPS):
@@ -70,7 +71,7 @@ def _draw_saturation(motion: AxisMotion, strength: float, generator: np.random.G
     return {"limit": force_limit, "more": float(0.05 * 20.0**strength)}
 
 
-def _undo_saturation(motion: AxisMotion, values: Values) -> FloatArray:
+def _invert_saturation(motion: AxisMotion, values: Values) -> FloatArray:
     """Increase the command wherever it reaches 97 % of the limit (3 % tolerance, for noise in a recorded command)."""
     is_saturated = np.abs(motion.command) >= 0.97 * values["limit"]
     return np.asarray(np.where(is_saturated, motion.command * (1 + values["more"]), motion.command))
@@ -84,7 +85,7 @@ def _draw_slew_limit(motion: AxisMotion, strength: float, generator: np.random.G
     return {"rate": limit_step * motion.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
 
 
-def _undo_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
+def _invert_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
     """Make a command that steps at once to the end of each stretch of two or more steps in one direction at about the
     highest rate."""
     command_steps = np.diff(motion.command)
@@ -124,7 +125,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         lambda motion, strength, generator: {
             "delay": max(0.3 * 0.02 * 50.0**strength / _compute_median_rad_per_s(motion.command, motion.rate_hz), 1e-9)
         },
-        lambda motion, values: _shift_later(motion.command, -values["delay"] * motion.rate_hz),
+        lambda motion, values: _delay_samples(motion.command, -values["delay"] * motion.rate_hz),
         actuator=True,
         memory=True,
     ),
@@ -137,8 +138,8 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         actuator=True,
         memory=True,
     ),
-    ForceInjection("force_saturation", _draw_saturation, _undo_saturation, actuator=True),
-    ForceInjection("slew_limit", _draw_slew_limit, _undo_slew_limit, actuator=True, memory=True),
+    ForceInjection("force_saturation", _draw_saturation, _invert_saturation, actuator=True),
+    ForceInjection("slew_limit", _draw_slew_limit, _invert_slew_limit, actuator=True, memory=True),
     ForceInjection(
         "force_quantization",
         lambda motion, strength, generator: {"step": compute_force_level(motion, 0.3 + 0.7 * strength)},
@@ -154,7 +155,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "actuator_cubic",
         lambda motion, strength, generator: {"cubic": 0.02 * 30.0**strength / float(np.abs(motion.command).max()) ** 2},
-        _undo_cubic_gain,
+        _invert_cubic_gain,
         actuator=True,
     ),
     ForceInjection(
@@ -165,4 +166,6 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ),
 )
 """Faults of the drive: name, draw of the parameters, and the command that would have been needed. Delay and time
-constant are 0.006 to 0.3 of the period of the median frequency over 2 pi."""
+constant are 0.006 to 0.3 of the period of the median frequency over 2 pi; the quantization step is
+`compute_force_level` at strengths from 0.3 to 1, the width of the dead band half of it at 0 to 1; the cubic term is 2
+to 60 % of the largest command, the gain drift 5 to 100 % (half as much where it is negative)."""

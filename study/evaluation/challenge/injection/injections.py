@@ -37,7 +37,8 @@ from study.evaluation.challenge.injection.reading_faults import (
 )
 
 MAINS_HZ = (50.0, 60.0)
-"""Nominal frequencies of the mains (Hz); injected hum has either, with equal probability."""
+"""Nominal frequencies of the mains (Hz); injected hum has either, with equal probability and a normal deviation of 0.02
+Hz."""
 MAX_CLOCK_ERROR_PPM = 2e4
 """Largest drawn clock error (ppm): that of oscillators without a crystal."""
 
@@ -72,7 +73,7 @@ class Injection:
     """Name in the vocabulary of effects."""
     draw: Draw
     apply: ApplyFault
-    least_channels: int = 1
+    min_channels: int = 1
     """Least number of response channels."""
     memory: bool = False
     """Whether the fault depends on earlier readings, so that it is applied to each take separately."""
@@ -195,9 +196,9 @@ INJECTIONS: tuple[Injection, ...] = (
         "cross_axis_sensitivity",
         lambda statistics, s, r: {"from_next": _interpolate_log(0.02, 0.8, s)},
         mix_channels,
-        least_channels=2,
+        min_channels=2,
     ),
-    Injection("sensor_misalignment", _draw_misalignment, rotate_readings, least_channels=3),
+    Injection("sensor_misalignment", _draw_misalignment, rotate_readings, min_channels=3),
 )
 """Faults of sensor, clock and mains: name in the vocabulary, draw of the parameters, and change of the response. In the
 draws, s is the strength and r the random generator; the ranges were chosen by hand."""
@@ -221,10 +222,8 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
         )
         raise ValueError(f"there is no way to inject '{effect}'; known are {known_names}")
     samples = recording.response.samples
-    if samples.shape[1] < injection.least_channels:
-        raise ValueError(
-            f"{effect} needs {injection.least_channels} response channels, and there are {samples.shape[1]}"
-        )
+    if samples.shape[1] < injection.min_channels:
+        raise ValueError(f"{effect} needs {injection.min_channels} response channels, and there are {samples.shape[1]}")
     values = injection.draw(measure_response(recording), strength, random)
     takes = find_takes(recording) if injection.memory else ((0, len(recording)),)
     rate_hz = recording.sample_rate_hz
@@ -264,7 +263,7 @@ def list_applicable_injections(recording: Recording) -> tuple[str, ...]:
     sensor_effects = [
         injection.effect
         for injection in INJECTIONS
-        if (injection.least_channels in (1, sensor_axes) or (injection.least_channels == 2 and has_two_channels))
+        if (injection.min_channels in (1, sensor_axes) or (injection.min_channels == 2 and has_two_channels))
         and (is_hum_resolved or injection.effect != "mains_hum")
     ]
     axes = range(recording.command.samples.shape[1])

@@ -1,9 +1,9 @@
 """Table of the concealed laws of the blind test: force, command and sensor laws outside the catalogue of effects.
 
-They test whether the diagnosis discovers a law that it does not know. They share no code with its grammar of laws, and
+They test whether the diagnosis discovers a law outside its catalogue. They share no code with its grammar of laws, and
 some have shapes that the grammar cannot express. The label of a law states on what it acts, which variables it needs,
 and whether it has a memory, so that an answer can be judged without comparing formulas. `draw_law` chooses a law for
-each simulated device, and `build_law` draws its parameters and adds it to the device.
+each simulated device, and `build_law` draws its parameters and adds it to the device. All ranges were chosen by hand.
 """
 
 from collections.abc import Callable
@@ -65,69 +65,70 @@ def _draw_simple_or_uniform(random: Random, simple_numbers: tuple[float, ...], l
     return float(random.choice(simple_numbers)) if random.random() < 0.5 else float(random.uniform(low, high))
 
 
-def _draw_none(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """For formulas without parameters: a = b = 0."""
+def _draw_zeros(random: Random, peaks: PeakValues) -> tuple[float, float]:
+    """Return a = b = 0, for formulas without parameters."""
     return 0.0, 0.0
 
 
 def _draw_speed_exponent(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: exponent of the speed."""
+    """Draw a, the exponent of the speed: 1.5, 3 or any number from 1.3 to 3.2; b = 0."""
     return _draw_simple_or_uniform(random, (1.5, 3.0), 1.3, 3.2), 0.0
 
 
 def _draw_position_exponent(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: exponent of the position."""
+    """Draw a, the exponent of the position: 1.5, 2, 5 or any number from 1.4 to 4; b = 0."""
     return _draw_simple_or_uniform(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0
 
 
-def _draw_one_or_two(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: exponent, 1 or 2."""
+def _draw_exponent(random: Random, peaks: PeakValues) -> tuple[float, float]:
+    """Draw a, an exponent: 1 or 2; b = 0."""
     return float(random.choice((1.0, 2.0))), 0.0
 
 
 def _draw_spatial_period(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: spatial period (m), 0.3 to 0.9 times the largest travel; b: phase (rad)."""
+    """Draw a, the spatial period (m), 0.3 to 0.9 times the largest travel, and b, the phase (rad)."""
     return peaks.travel_m * random.uniform(0.3, 0.9), random.uniform(-np.pi, np.pi)
 
 
-def _draw_modulation(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: frequency (Hz); b: phase (rad)."""
+def _draw_pumping(random: Random, peaks: PeakValues) -> tuple[float, float]:
+    """Draw a, the frequency (Hz), 0.5 to 6, and b, the phase (rad)."""
     return random.uniform(0.5, 6.0), random.uniform(-np.pi, np.pi)
 
 
 def _draw_attractor(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: distance of the attracting body (m), beyond the largest travel; b: exponent."""
+    """Draw a, the distance of the attracting body (m), 1.4 to 2.2 times the largest travel, and b, the exponent: 1, 2
+    or 3."""
     return peaks.travel_m * random.uniform(1.4, 2.2), float(random.choice((1.0, 2.0, 3.0)))
 
 
-def _draw_short_time(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: time constant (s), 8 ms to 0.4 s, log-uniform."""
+def _draw_short_lag(random: Random, peaks: PeakValues) -> tuple[float, float]:
+    """Draw a, a time constant (s), 8 ms to 0.4 s, log-uniform; b = 0."""
     return float(np.exp(random.uniform(np.log(0.008), np.log(0.4)))), 0.0
 
 
-def _draw_long_time(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: time constant (s), 0.4 s to 4 s."""
+def _draw_long_lag(random: Random, peaks: PeakValues) -> tuple[float, float]:
+    """Draw a, a time constant (s), 0.4 s to 4 s; b = 0."""
     return random.uniform(0.4, 4.0), 0.0
 
 
 def _draw_speed_scale(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: speed (m/s), 0.1 to 0.5 times the largest."""
+    """Draw a, a speed (m/s), 0.1 to 0.5 times the largest; b = 0."""
     return peaks.speed_mps * random.uniform(0.1, 0.5), 0.0
 
 
 def _draw_position_scale(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: position (m), 0.1 to 0.5 times the largest travel; b: 1.5, the exponent of a Hertz contact; other laws ignore
-    b."""
+    """Draw a, a position (m), 0.1 to 0.5 times the largest travel; b = 1.5 is the exponent of a Hertz contact, and
+    other laws ignore it."""
     return peaks.travel_m * random.uniform(0.1, 0.5), 1.5
 
 
 def _draw_force_limit(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: force (N) at which an amplifier saturates, 0.3 to 0.8 times the peak."""
+    """Draw a, the force (N) at which an amplifier saturates, 0.3 to 0.8 times the peak; b = 0."""
     return peaks.force_n * random.uniform(0.3, 0.8), 0.0
 
 
 def _draw_reading_limit(random: Random, peaks: PeakValues) -> tuple[float, float]:
-    """a: acceleration (m/s²) at which a sensor saturates, 0.3 to 0.8 times the peak."""
+    """Draw a, the acceleration (m/s²) at which a sensor saturates, 0.3 to 0.8 times the peak; b = 0."""
     return peaks.reading_mps2 * random.uniform(0.3, 0.8), 0.0
 
 
@@ -135,43 +136,43 @@ def _make_force_law(  # noqa: PLR0913 - the columns of the table below
     name: str, formula: str, code: int, draw: Callable[[Random, PeakValues], tuple[float, float]],
     *variables: str, axes: int = 1, memory: bool = False, mutual: bool = False,
 ) -> LawKind:  # fmt: skip
-    """A law that adds a force: a row of the table below."""
+    """Make a law that adds a force, a row of the table below; the arguments are those of `LawKind`."""
     return LawKind(name, formula, draw, variables, code, memory=memory, axes=axes, mutual=mutual)
 
 
 LAW_KINDS: tuple[LawKind, ...] = (
     _make_force_law("drag of a power", "-k |v|^a sgn v", kernel.SPEED_POWER, _draw_speed_exponent, "vx"),
     _make_force_law("spring of a power", "-k |x|^a sgn x", kernel.POSITION_POWER, _draw_position_exponent, "x"),
-    _make_force_law("drag that grows with the place", "-k |x|^a v", kernel.POSITION_DRAG, _draw_one_or_two, "x vx"),
-    _make_force_law("spring that grows with the speed", "-s k x |v|^a", kernel.SPEED_SPRING, _draw_one_or_two, "x vx"),
+    _make_force_law("drag that grows with the place", "-k |x|^a v", kernel.POSITION_DRAG, _draw_exponent, "x vx"),
+    _make_force_law("spring that grows with the speed", "-s k x |v|^a", kernel.SPEED_SPRING, _draw_exponent, "x vx"),
     _make_force_law("gain that ripples", "k u sin(2 pi x / a + b)", kernel.GAIN_RIPPLE, _draw_spatial_period, "fx x"),
-    _make_force_law("pumped stiffness", "-k x sin(2 pi a t + b)", kernel.PUMPED_STIFFNESS, _draw_modulation, "t x"),
+    _make_force_law("pumped stiffness", "-k x sin(2 pi a t + b)", kernel.PUMPED_STIFFNESS, _draw_pumping, "t x"),
     _make_force_law("attraction", "s k (1 / (a - s x)^b - 1 / a^b)", kernel.ATTRACTION, _draw_attractor, "x"),
-    _make_force_law("relaxation", "-k (x - lag(x, a))", kernel.RELAXATION, _draw_short_time, "x", "vx", memory=True),
-    _make_force_law("heating gain", "-k u lag(u^2, a)", kernel.HEATING, _draw_long_time, "fx", memory=True),
+    _make_force_law("relaxation", "-k (x - lag(x, a))", kernel.RELAXATION, _draw_short_lag, "x", "vx", memory=True),
+    _make_force_law("heating gain", "-k u lag(u^2, a)", kernel.HEATING, _draw_long_lag, "fx", memory=True),
     _make_force_law("soft drag", "-k tanh(v / a)", kernel.SOFT_DRAG, _draw_speed_scale, "vx"),
     _make_force_law("soft spring", "-k atan(x / a)", kernel.SOFT_SPRING, _draw_position_scale, "x"),
     _make_force_law("fading drag", "-k v / (1 + (v / a)^2)", kernel.FADING_DRAG, _draw_speed_scale, "vx"),
     _make_force_law("contact on one side", "-s k max(s x - a, 0)^b", kernel.CONTACT, _draw_position_scale, "x"),
     _make_force_law("drag beyond a place", "-k v where s x > a", kernel.ONE_SIDED_DRAG, _draw_position_scale, "x vx"),
-    _make_force_law("square of another axis", "-s k y^2", kernel.CROSS_SQUARE, _draw_none, "y", axes=2),
-    _make_force_law("spring that another axis stiffens", "-k x y^2", kernel.CROSS_SPRING, _draw_none, "x y", axes=2),
-    _make_force_law("drag that another axis makes", "-k vx |vy|", kernel.CROSS_DRAG, _draw_none, "vx vy", axes=2),
-    _make_force_law("gyroscopic", "s k vy, on the other -s k vx", kernel.GYROSCOPIC, _draw_none, "vy", axes=2,
+    _make_force_law("square of another axis", "-s k y^2", kernel.CROSS_SQUARE, _draw_zeros, "y", axes=2),
+    _make_force_law("spring that another axis stiffens", "-k x y^2", kernel.CROSS_SPRING, _draw_zeros, "x y", axes=2),
+    _make_force_law("drag that another axis makes", "-k vx |vy|", kernel.CROSS_DRAG, _draw_zeros, "vx vy", axes=2),
+    _make_force_law("gyroscopic", "s k vy, on the other -s k vx", kernel.GYROSCOPIC, _draw_zeros, "vy", axes=2,
                mutual=True),
-    _make_force_law("drag along the path", "-k |v| v of both axes", kernel.PATH_DRAG, _draw_none, "vx vy", axes=2,
+    _make_force_law("drag along the path", "-k |v| v of both axes", kernel.PATH_DRAG, _draw_zeros, "vx vy", axes=2,
                mutual=True),
     LawKind("soft amplifier", "a tanh(u / a)", _draw_force_limit, ("fx",), acts_on=("command", "force"),
             change=lambda u, cross, a, b: a * np.tanh(u / a) - u),
-    LawKind("amplifier of two gains", "u + s k |u|", _draw_none, ("fx",), acts_on=("command", "force"),
+    LawKind("amplifier of two gains", "u + s k |u|", _draw_zeros, ("fx",), acts_on=("command", "force"),
             change=lambda u, cross, a, b: np.abs(u)),
-    LawKind("bent amplifier", "u + s k u |u|", _draw_none, ("fx",), acts_on=("command", "force"),
+    LawKind("bent amplifier", "u + s k u |u|", _draw_zeros, ("fx",), acts_on=("command", "force"),
             change=lambda u, cross, a, b: u * np.abs(u)),
-    LawKind("crooked sensor", "r + s k r^2", _draw_none, ("ax",), acts_on=("response",),
+    LawKind("crooked sensor", "r + s k r^2", _draw_zeros, ("ax",), acts_on=("response",),
             change=lambda r, cross, a, b: r * r),
     LawKind("soft sensor", "a atan(r / a)", _draw_reading_limit, ("ax",), acts_on=("response",),
             change=lambda r, cross, a, b: a * np.arctan(r / a) - r),
-    LawKind("sensor of two axes", "rx + s k rx ry", _draw_none, ("ax ay",), acts_on=("response",), axes=2,
+    LawKind("sensor of two axes", "rx + s k rx ry", _draw_zeros, ("ax ay",), acts_on=("response",), axes=2,
             change=lambda r, cross, a, b: r * cross),
 )  # fmt: skip
 """All laws. A bank of devices uses each once, in random order, before any is used again."""

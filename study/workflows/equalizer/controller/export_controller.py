@@ -1,4 +1,5 @@
-"""`hapteq export-controller`: C sources of the real-time controller of an identified model.
+"""Export the real-time controller of an identified model as C sources. Called by `study.cli.export_controller` (`hapteq
+export-controller`).
 
 The controller (`equalizer.tracking.realtime`) plays a stored transient in any direction, and tracks a stream of
 reference accelerations with a preview. Header, example loop and check program are written into a new folder.
@@ -37,13 +38,13 @@ from study.workflows.output_paths import require_new_outputs
 
 TITLE = "The controller was not exported"
 """Title of each error message of this command."""
-MOST_TRANSIENT_ROWS = 5000
-"""Largest number of rows of a transient. For a model of order 26 each row becomes 130 numbers of C source, all of
-which a compiler must read."""
-LONGEST_PREVIEW_S = 2.0
-"""Longest preview that is accepted (s)."""
+MAX_TRANSIENT_ROWS = 5000
+"""Largest number of rows of a transient. Chosen: for a model of order 26 each row becomes 105 numbers of C source (3 x
+26 gains, 3 x 9 feedforward forces), all of which a compiler must read."""
+MAX_PREVIEW_S = 2.0
+"""Longest preview that is accepted (s). Chosen: each sample of it becomes a matrix of C source."""
 EXAMPLE_SETTINGS = "Such as --preview 200 --cap 3."
-"""Advice in error messages: settings that fit in most cases."""
+"""Advice in error messages: settings (ms, N) that fit in most cases."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,8 @@ class ControllerPlan:
     model: Path
     out: Path
     transient: Path | None = None
-    """Table of reference accelerations (m/s²); None: the built-in `realtime_controller.tap`."""
+    """Table of reference accelerations (m/s²); None: that of
+    `realtime_controller.make_default_transient`."""
     settings: RealtimeSettings = field(default_factory=RealtimeSettings)
 
 
@@ -72,8 +74,9 @@ class ExportedController:
 
 
 def export_controller(plan: ControllerPlan) -> ExportedController:
-    """Compute the controller and write its sources. Raises StudyError for a cap above the force of the strongest
-    supported device, and for a model or transient from which no controller can be made; nothing is written then."""
+    """Compute the controller and write its sources. Raises StudyError for an output that exists, a cap above the force
+    of the strongest supported device, and a model or transient from which no controller can be made; nothing is written
+    then."""
     require_new_outputs(plan.out, title=TITLE, kind="controllers")
     if plan.settings.cap_n > LARGEST_DEVICE_FORCE_N:
         raise _make_refusal(
@@ -99,12 +102,12 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
 
 
 def make_controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
-    """Make and check the settings of the real-time controller. weight: of |force|² against |error|² in the cost,
-    (m/s² per N)²; preview_s: time (s) for which the stream is known in advance; cap_n: largest force (N). Raises
-    StudyError for values outside their limits."""
-    if not preview_s <= LONGEST_PREVIEW_S:
+    """Make and check the settings of the real-time controller. weight: of |force|² against |error|² in the cost, (m/s²
+    per N)²; preview_s: time (s) for which the stream is known in advance; cap_n: largest force (N). Raises StudyError
+    for values outside their limits."""
+    if not preview_s <= MAX_PREVIEW_S:
         raise _make_refusal(
-            f"A preview of {preview_s:g} s was requested; {LONGEST_PREVIEW_S:g} s is the longest.", EXAMPLE_SETTINGS
+            f"A preview of {preview_s:g} s was requested; {MAX_PREVIEW_S:g} s is the longest.", EXAMPLE_SETTINGS
         )
     try:
         return RealtimeSettings(weight, preview_s, cap_n)
@@ -113,8 +116,8 @@ def make_controller_settings(weight: float, preview_s: float, cap_n: float) -> R
 
 
 def summarise_export(exported: ExportedController) -> dict[str, Any]:
-    """The export as plain values, for a JSON document. Errors are tracking errors relative to the reference (1 =
-    100 %), as predicted by the model itself."""
+    """Collect the results as plain values for a JSON document, units by the suffix of the key. Errors are tracking
+    errors relative to the reference (1 = 100 %), as predicted by the model itself."""
     controller, rate_hz = exported.controller, exported.model.sample_rate_hz
     return {
         "files": [str(path) for path in exported.files],
@@ -132,7 +135,7 @@ def summarise_export(exported: ExportedController) -> dict[str, Any]:
 
 def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
     """Return a warning if the controller's cap is above the largest force that hapteq plays with a hand on the handle;
-    empty otherwise."""
+    an empty tuple otherwise."""
     cap_n = exported.controller.cap_n
     if cap_n <= HAND_STIMULUS_CAP_N:
         return ()
@@ -143,8 +146,8 @@ def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
 
 
 def describe_export(exported: ExportedController) -> tuple[str, ...]:
-    """Lines for the terminal: files, length of the transient, delay and predicted error of the stream, and the command
-    that compiles and runs the check."""
+    """Format lines for the terminal: files, length of the transient, delay and predicted error of the stream, and the
+    command that compiles and runs the check."""
     values, (low_hz, high_hz) = summarise_export(exported), exported.model.band_hz
     return (
         *values["files"],
@@ -163,8 +166,8 @@ def _read_transient(path: Path, model: IdentifiedModel) -> FloatArray:
     if table.kind is not TRAJECTORY:
         raise TableError((f"{path.name} holds forces; a transient is a table of accelerations",))
     require_rate(table, model.sample_rate_hz)
-    if len(table.signal) > MOST_TRANSIENT_ROWS:
-        raise TableError((f"{path.name} has {len(table.signal)} rows; a controller takes {MOST_TRANSIENT_ROWS}",))
+    if len(table.signal) > MAX_TRANSIENT_ROWS:
+        raise TableError((f"{path.name} has {len(table.signal)} rows; a controller takes {MAX_TRANSIENT_ROWS}",))
     return table.signal.samples
 
 
@@ -176,7 +179,7 @@ def _require_force_model(model: IdentifiedModel) -> None:
 
 
 def _describe_origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
-    """Lines for the header: model file, band, position in the workspace, channels, transient and weight."""
+    """Format lines for the header: model file, band, position in the workspace, channels, transient and weight."""
     low_hz, high_hz = model.band_hz
     transient_text = "a tap along the last axis, 1 m/s^2" if plan.transient is None else plan.transient.name
     place_text = (
@@ -190,5 +193,5 @@ def _describe_origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str,
 
 
 def _make_refusal(explanation: str, advice: str) -> StudyError:
-    """Error of this command, which wrote nothing."""
+    """Make the error of this command, which wrote nothing."""
     return StudyError(TITLE, explanation, advice, saved="Nothing was written.")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.command_laws import make_slew_laws
-from analysis.diagnosis.settings import SLEW_REACHED
+from analysis.diagnosis.settings import SLEW_REACHED_SHARE
 from tests.slow_instances import slow
 
 RATE_HZ, SPEED = 50.0, 1.5
@@ -79,4 +79,4 @@ def test_rates_that_never_catch_up_are_not_tried():
     assert rates
     for law in make_slew_laws([command], 500.0):
         reached = np.abs(law.compute_columns(command, command)[:, 0] - command) < law.values["rate"] / 500.0
-        assert reached.mean() > SLEW_REACHED
+        assert reached.mean() > SLEW_REACHED_SHARE

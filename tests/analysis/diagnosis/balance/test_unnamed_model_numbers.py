@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.open_tolerance import widen_tolerance
+from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 
 SEED = 4
 

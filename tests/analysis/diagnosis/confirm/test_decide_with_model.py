@@ -63,7 +63,7 @@ def test_a_device_within_its_calibration_lacks_nothing(mass):
 def test_a_calibrated_number_does_not_take_friction_on_itself(friction_balance):
     """Fitted freely, damping would hold part of it; its prior keeps it within a few standard deviations."""
     regression = friction_balance.search.regression
-    deviations = regression.fit_weights(regression.select_columns(()))[1 : regression.base - 1]
+    deviations = regression.fit_weights(regression.select_columns(()))[1 : regression.base_column_count - 1]
     assert np.abs(deviations).max() < 10
     loose = replace(regression, prior=None)
     assert (

@@ -12,7 +12,7 @@ from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.bases import build_bases, compute_unexplained_share
 from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.compared_base import (
-    FEWEST_ROWS,
+    LEAST_ROWS,
     REACH,
     ComparedBase,
     compare_base,
@@ -170,8 +170,8 @@ def test_a_fast_clock_is_named_with_its_rate():
     assert found is not None
     named = choose_fault(found, 1).named
     assert named is not None and named.fault.effect == "clock_drift"
-    assert named.values["ppm"] == pytest.approx(-20_000, abs=3 * named.spread["ppm"])
-    assert named.spread["ppm"] < 200
+    assert named.values["ppm"] == pytest.approx(-20_000, abs=3 * named.standard_errors["ppm"])
+    assert named.standard_errors["ppm"] < 200
 
 
 @pytest.mark.parametrize("by", [0.2, 0.5])
@@ -236,7 +236,7 @@ def test_a_long_delay_is_named_with_an_interval_that_holds_it(late):
     assert found is not None
     named = choose_fault(found, 1).named
     assert named is not None and named.fault.effect in ("transport_delay", "logger_offset")
-    (seconds,), (error,) = named.values.values(), named.spread.values()
+    (seconds,), (error,) = named.values.values(), named.standard_errors.values()
     assert abs(seconds - late / 1000.0) < 2 * error < 0.01
 
 
@@ -245,7 +245,7 @@ def test_a_smooth_response_is_predicted_as_well_as_its_past_allows():
     late, innovation = record_oscillator(1, 400)
     parts = split_into_parts([late])
     compared = compare_base(AutoregressiveBase(0, 24, 1, 1), parts, parts)
-    assert compared.clean.scale * compared.columns[0] == pytest.approx(innovation, rel=0.1)
+    assert compared.clean.scale * compared.column_rms[0] == pytest.approx(innovation, rel=0.1)
     assert compute_unexplained_share(compared.base, parts) == pytest.approx(innovation, rel=0.1)
 
 
@@ -273,4 +273,4 @@ def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
     ]
     (base,), _ = next(build_bases(parts[0], parts[1]))
     assert isinstance(base, AutoregressiveBase) and base.step > 1
-    assert compare_base(base, parts[0], parts[1]).faulty.count >= FEWEST_ROWS
+    assert compare_base(base, parts[0], parts[1]).faulty.count >= LEAST_ROWS

@@ -10,7 +10,7 @@ from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.fault import Lags
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.recording_part import split_into_parts
-from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
+from analysis.diagnosis.settings import CONTRAST_BLOCKS, MISFIT_SHARE
 from equalizer.signals.signal import FloatArray
 
 
@@ -114,7 +114,7 @@ def test_a_fault_that_upsets_the_balance_of_forces_is_undone_in_it(rig):
     found = rank_faults(
         [replace(plain, command=replace(plain.command, samples=asked))], [rig.record_rig(1)], frozenset(), rig.time_left
     )
-    assert found is not None and found.by_force and found.faulty_share > BALANCE_HOLDS
+    assert found is not None and found.by_force and found.faulty_share > MISFIT_SHARE
     assert found.faults[0].fault.effect == "force_deadband"
     assert found.faults[0].values["width"] == pytest.approx(8.0, rel=0.1)
 

@@ -95,9 +95,9 @@ def test_a_fault_that_makes_all_errors_of_its_set_larger_shows_in_its_gain(rig):
     best = found.faults[0]
     assert best.gain_low > 0.1 > 1.6 * best.control_excess
     swallowed = replace(found, sample_count=int(found.block_squares.sum()))
-    assert not swallowed.sets_differ
-    assert swallowed.sets_differ_without(best)
-    assert not swallowed.sets_differ_without(replace(best, gain_low=0.01))
+    assert not swallowed.has_difference
+    assert swallowed.has_difference_without(best)
+    assert not swallowed.has_difference_without(replace(best, gain_low=0.01))
 
 
 @pytest.mark.parametrize(("varies", "named"), [(False, True), (True, False)])
@@ -106,5 +106,5 @@ def test_what_changes_in_the_course_of_a_recording_does_not_count_for_gaining_ev
     assert found is not None
     best = found.faults[0]
     alike = replace(best, fault=replace(best.fault, varies=varies), control_excess=10.0, gain_low=0.9 * best.gain)
-    assert not found.sets_differ_without(alike)
+    assert not found.has_difference_without(alike)
     assert (choose_fault(replace(found, faults=(alike,)), 1).named is not None) == named

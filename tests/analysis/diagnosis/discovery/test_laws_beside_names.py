@@ -98,7 +98,7 @@ def test_the_shorter_law_takes_the_place_of_names_that_fit(hardening_context):
     )
     names = make_named_search(hardening_context, cube, stop)
     assert judge(names).verdict == "explained"
-    said = LawSearch(ignore_progress, always).add_any(SearchResult(context, names, judge(names)))
+    said = LawSearch(ignore_progress, always).add_laws(SearchResult(context, names, judge(names)))
     (found,) = list_fitted_laws(said.found.after.fitted.hypothesis)
     assert found.expression.endswith("x**3")
     assert found.numbers[0] == pytest.approx(-CUBIC, rel=0.02)
@@ -110,7 +110,7 @@ def test_a_name_that_is_as_short_stays(hardening_context):
     context, _ = hardening_context
     cube = make_named_search(hardening_context, make_hypothesis("hardening_stiffness", k3=CUBIC))
     result = SearchResult(context, cube, judge(cube))
-    assert LawSearch(ignore_progress, always).add_any(result) is result
+    assert LawSearch(ignore_progress, always).add_laws(result) is result
     found = discover_laws(context, cube, ignore_progress, always, 1)
     assert not is_shorter_and_as_good(context, found, cube.after)
 

@@ -46,7 +46,7 @@ def search_result():
 def test_a_law_that_takes_nearly_all_of_a_louder_error_is_named_though_some_noises_are_left(search_result):
     context, known, found = search_result
     assert found.explanation.after.score.test.max() > 3
-    named = LawSearch(ignore_progress, always).add_any(SearchResult(context, known, judge(known)))
+    named = LawSearch(ignore_progress, always).add_laws(SearchResult(context, known, judge(known)))
     assert named.judgement.named
     laws = list_fitted_laws(named.found.after.fitted.hypothesis)
     assert laws[0].variables == ("x",)

@@ -14,7 +14,7 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search import FurtherSearches, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, judge
-from analysis.diagnosis.settings import LAW_ALONE_LEAVES
+from analysis.diagnosis.settings import LAW_ALONE_REMAINDER
 from equalizer.effects.catalogue import EFFECTS
 from tests.lawful import arena_of, law, recorded
 
@@ -34,7 +34,7 @@ def search_laws(recording, with_laws=True):
         said.append(what)
 
     laws = LawSearch(progress, always)
-    beyond = FurtherSearches(laws.add_short, at_end=laws.add_any) if with_laws else FurtherSearches()
+    beyond = FurtherSearches(laws.add_short_laws, at_end=laws.add_laws) if with_laws else FurtherSearches()
     result = search_effects(arena_of(recording)[0], CATALOGUE, progress, always, beyond)
     return result, said
 
@@ -78,7 +78,7 @@ def test_the_same_samples_are_searched_for_laws_once(seed=14):
     said: list[str] = []
     context, known = arena_of(recorded((DRAG_15,), seed))
     laws = LawSearch(lambda what, share: said.append(what), always)
-    once, again = (laws.add_any(SearchResult(context, known, judge(known))) for _ in range(2))
+    once, again = (laws.add_laws(SearchResult(context, known, judge(known))) for _ in range(2))
     assert said.count("looking for a law outside the catalogue") == 1
     assert list_fitted_laws(once.found.after.fitted.hypothesis) == list_fitted_laws(again.found.after.fitted.hypothesis)
 
@@ -92,7 +92,7 @@ def test_out_of_time_over_a_pair_the_law_that_leaves_a_part_is_kept(hears, seed=
 
     def short(result):
         asked.append("short")
-        found = LawSearch(lambda what, share: None, always).add_short(result)
+        found = LawSearch(lambda what, share: None, always).add_short_laws(result)
         named = Judgement("partly_explained", True)
         return SearchResult(context, found.found, named) if hears else result
 
@@ -119,12 +119,12 @@ def test_a_short_law_is_found_once_for_both_questions(seed=11):
     context, known = arena_of(recorded((DRAG_15,), seed))
     laws = LawSearch(lambda what, share: said.append(what), always)
     result = SearchResult(context, known, judge(known))
-    assert laws.add_short(result).judgement.verdict == laws.add_any(result).judgement.verdict == "explained"
+    assert laws.add_short_laws(result).judgement.verdict == laws.add_laws(result).judgement.verdict == "explained"
     assert said.count("looking for a law outside the catalogue") == 1
 
 
 @pytest.mark.parametrize(
-    ("leaves", "begun"), [pytest.param(1e-4, False, marks=pytest.mark.slow), (LAW_ALONE_LEAVES, True)]
+    ("leaves", "begun"), [pytest.param(1e-4, False, marks=pytest.mark.slow), (LAW_ALONE_REMAINDER, True)]
 )
 def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, leaves, begun, seed=12):
     """Of two effects, a single term leaves a part of the missing force."""
@@ -134,7 +134,7 @@ def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, leaves, begun, 
         fits.append(arguments)
         return ()
 
-    monkeypatch.setattr(discover_module, "LAW_ALONE_LEAVES", leaves)
+    monkeypatch.setattr(discover_module, "LAW_ALONE_REMAINDER", leaves)
     monkeypatch.setattr(discover_module, "fit_sums", fit_sums)
     context, known = arena_of(recorded((CUBE, DRAG_2), seed))
     assert discover_module.discover_laws(context, known, lambda what, share: None, always, single_term=True) is None

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.errors.error_measure_rule import choose_measure, is_self_stable
+from analysis.diagnosis.errors.error_measure_rule import is_self_stable, select_error_measure
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import Signal
 from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, make_model
@@ -16,17 +16,17 @@ def test_the_rule_keeps_free_simulation_for_plants_that_hold_themselves(
     controlled_recording: Recording, drifting_recording: Recording
 ) -> None:
     for each in (controlled_recording, drifting_recording):
-        assert choose_measure(observe_parts([each], 1), make_model(stiffness=400.0)).measure == "free simulation"
+        assert select_error_measure(observe_parts([each], 1), make_model(stiffness=400.0)).measure == "free simulation"
 
 
 def test_the_rule_takes_forces_where_a_model_grows_within_a_window(drifting_recording: Recording) -> None:
-    choice = choose_measure(observe_parts([drifting_recording], 1), make_model(stiffness=-400.0))
+    choice = select_error_measure(observe_parts([drifting_recording], 1), make_model(stiffness=-400.0))
     assert choice.measure == "predicted force"
     assert "a controller must have held" in choice.reason
     felt = replace(
         drifting_recording, response=replace(drifting_recording.response, quantity="acceleration", unit="m/s^2")
     )
-    choice = choose_measure(observe_parts([felt], 1), make_model(stiffness=-400.0, quantity="acceleration"))
+    choice = select_error_measure(observe_parts([felt], 1), make_model(stiffness=-400.0, quantity="acceleration"))
     assert choice.measure == "windows"
 
 
@@ -35,7 +35,7 @@ def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting_reco
         drifting_recording,
         response=replace(drifting_recording.response, samples=drifting_recording.response.samples + 0.3),
     )
-    choice = choose_measure(observe_parts([moving], 1), make_model(stiffness=400.0))
+    choice = select_error_measure(observe_parts([moving], 1), make_model(stiffness=400.0))
     assert choice.measure == "free simulation"
     late = replace(
         drifting_recording,
@@ -43,7 +43,7 @@ def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting_reco
         response=drifting_recording.response.select_samples(900, 4900),
         segments=(),
     )
-    choice = choose_measure(observe_parts([late], 1), make_model(stiffness=400.0))
+    choice = select_error_measure(observe_parts([late], 1), make_model(stiffness=400.0))
     assert choice.measure == "windows"
     assert "does not begin at rest" in choice.reason
 
@@ -54,7 +54,7 @@ def test_the_rule_takes_windows_under_a_controller_where_accelerations_alone_wer
     felt = replace(
         controlled_recording, response=replace(controlled_recording.response, quantity="acceleration", unit="m/s^2")
     )
-    choice = choose_measure(observe_parts([felt], 1), make_model(quantity="acceleration"))
+    choice = select_error_measure(observe_parts([felt], 1), make_model(quantity="acceleration"))
     assert choice.measure == "windows"
 
 

@@ -47,7 +47,7 @@ def test_only_samples_after_enough_known_ones_count():
     whitening, residual = fit_whitening_filter([ringing_noise(1)], LEAST), ringing_noise(2)
     residual[:300] = np.nan
     full = whitening.mask_full_history(residual)
-    assert not full[: 300 + whitening.lags].any()
-    assert full[300 + whitening.lags :].all()
+    assert not full[: 300 + whitening.order].any()
+    assert full[300 + whitening.order :].all()
     assert np.isnan(whitening.apply(residual)[:300]).all()
     assert np.isfinite(whitening.apply(residual)[300:]).all()

@@ -13,8 +13,8 @@ RATE_HZ, SAMPLES = 100.0, 1000
 def make_balance(*courses):
     """A balance with one named law, whose force in each take is a course."""
     regression = SimpleNamespace(
-        select_columns=lambda laws: list(laws), fit_weights=lambda columns: np.ones(1), base=0,
-        places=[slice(0, 1)],
+        select_columns=lambda laws: list(laws), fit_weights=lambda columns: np.ones(1), base_column_count=0,
+        column_ranges=[slice(0, 1)],
         columns=[course[:, None] for course in courses],
         motions=[SimpleNamespace(step=1, rate_hz=RATE_HZ) for _ in courses],
     )  # fmt: skip

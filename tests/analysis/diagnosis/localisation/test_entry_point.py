@@ -91,7 +91,7 @@ def test_without_position_the_rule_is_silent_and_directions_still_speak():
     bare = ResidualSpectra(FREQUENCY_HZ, spectra.residual[:, :, :2], spectra.noise[:, :, :2], 2)
     forces = [Entry(e.name, e.place, e.axis, e.directions[:, :2]) for e in make_entries()[:2]]
     found = rank_entries(bare, forces)
-    assert found.rule is None
+    assert found.sensor_comparison is None
     assert found.ranking[0].name == "force y"
 
 

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorRule
+from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorComparison
 from analysis.diagnosis.localisation.localisation_words import (
     write_entry_sentence,
     write_localisation_sentences,
@@ -15,7 +15,7 @@ from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 ALONG_X = EntryScore("a force along x", "mechanism", "x", 1.0, 0.9, 1.0, ())
 ALONG_ALL = EntryScore("forces along several axes", "mechanism", None, 0.9, 0.95, 1.0, ())
 OF_AX = EntryScore("an error of the ax channel", "sensor", "ax", 1.6, 0.4, 1e-9, ())
-MOVED, AT_SENSOR = SensorRule("motion", 50.0, 49.0), SensorRule("response sensor", 50.0, 0.1)
+MOVED, AT_SENSOR = SensorComparison("motion", 50.0, 49.0), SensorComparison("response sensor", 50.0, 0.1)
 RUBS = StateRegion("velocity", "v", "sign", 0.86, 1.0, 1e-5, "by the sign of v")
 
 
@@ -23,10 +23,10 @@ RUBS = StateRegion("velocity", "v", "sign", 0.86, 1.0, 1e-5, "by the sign of v")
 def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(friction_findings):
     local = friction_findings.localisation
     assert local.entry.ranking[0].name == "a force along x"
-    assert local.entry.rule.verdict == "motion"
+    assert local.entry.sensor_comparison.verdict == "motion"
     for stage in ("before", "retuned"):
         worst = local.states[stage][0]
-        assert (worst.input, worst.region.words) == ("fx", "by the sign of v")
+        assert (worst.input, worst.region.description) == ("fx", "by the sign of v")
         assert worst.region.p_value <= FALSE_DISCOVERY_RATE
     assert not local.states["after"]
 

@@ -37,7 +37,7 @@ def test_friction_follows_the_sign_of_velocity():
     random, states, strata = make_states(1)
     force = -0.2 * np.sign(states[1].values) + 0.05 * random.standard_normal(len(strata))
     region = best_region(force, states, strata)
-    assert (region.words, region.criterion) == ("by the sign of v", "sign")
+    assert (region.description, region.criterion) == ("by the sign of v", "sign")
     assert region.share > 0.8
     assert region.p_value < 1e-3
 
@@ -46,7 +46,7 @@ def test_what_happens_at_reversals_sits_near_no_velocity():
     random, states, strata = make_states(2)
     slow = np.exp(-((states[1].values / 0.02) ** 2))
     region = best_region(slow * random.standard_normal(len(strata)), states, strata)
-    assert (region.words, region.kind) == ("near v = 0", "velocity")
+    assert (region.description, region.kind) == ("near v = 0", "velocity")
     assert region.p_value < 1e-3
 
 
@@ -54,7 +54,7 @@ def test_a_limit_sits_where_the_command_is_large():
     random, states, strata = make_states(3)
     u = states[2].values
     force = np.clip(u, -2, 2) - u + 0.02 * random.standard_normal(len(strata))
-    words = {region.words for region in find_state_regions(Disturbance(force, strata), states, seed=1)}
+    words = {region.description for region in find_state_regions(Disturbance(force, strata), states, seed=1)}
     assert "where |fx| is large" in words
 
 
@@ -62,7 +62,7 @@ def test_a_place_is_named():
     random, states, strata = make_states(4)
     there = np.exp(-(((states[0].values - 2.1e-3) / 4e-4) ** 2))
     region = best_region(there * random.standard_normal(len(strata)), states, strata)
-    assert region.words in ("near x = 2.1 mm", "near x = 2 mm", "near x = 2.2 mm")
+    assert region.description in ("near x = 2.1 mm", "near x = 2 mm", "near x = 2.2 mm")
 
 
 @pytest.mark.parametrize(("strata_count", "words"), [(1, "late in the record"), (3, "late in each segment")])
@@ -72,7 +72,7 @@ def test_what_grows_with_time_is_late(strata_count, words):
     signal = band_noise(random, 24000)
     grown = signal * np.tile(np.linspace(0, 1, 24000 // strata_count), strata_count)
     regions = find_state_regions(Disturbance(grown, strata, signal), states, seed=1)
-    assert words in {region.words for region in regions}
+    assert words in {region.description for region in regions}
 
 
 def test_noise_is_tied_to_nothing():

@@ -18,7 +18,7 @@ from analysis.diagnosis.next_experiment.choose_experiment import (
     predict_gains,
 )
 from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
-from analysis.diagnosis.settings import TELLING_GAIN
+from analysis.diagnosis.settings import DISCRIMINATING_GAIN
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import compute_driven_axes
@@ -89,14 +89,16 @@ def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording
     truth, other = (np.hstack([each.response, each.position]) for each in played)
     measured = truth + NOISE * np.random.default_rng(1).standard_normal(truth.shape)
     cost = [float(np.sum(((measured - each) / NOISE) ** 2)) for each in (truth, other)]
-    assert cost[1] - cost[0] > 2 * TELLING_GAIN
+    assert cost[1] - cost[0] > 2 * DISCRIMINATING_GAIN
 
 
 @pytest.mark.slow
 def test_of_recordings_that_tell_alone_the_one_with_the_largest_gain_for_its_cost_is_chosen(friction_choice):
     _, _, gains = friction_choice
     (chosen,) = choose_experiments([gains]).experiments
-    worth = {each.experiment.words: each.gain / each.experiment.minutes for each in gains if each.gain >= TELLING_GAIN}
+    worth = {
+        each.experiment.words: each.gain / each.experiment.minutes for each in gains if each.gain >= DISCRIMINATING_GAIN
+    }
     assert worth[chosen.words] == max(worth.values()) > 3 * min(each.gain / each.experiment.minutes for each in gains)
 
 
@@ -118,7 +120,7 @@ def menu_numbers(chosen):
     return [menu.index(experiment.words) for experiment in chosen.experiments]
 
 
-TELLS, HALF = 3 * TELLING_GAIN, 0.6 * TELLING_GAIN
+TELLS, HALF = 3 * DISCRIMINATING_GAIN, 0.6 * DISCRIMINATING_GAIN
 
 
 def test_one_recording_that_tells_every_rival_is_preferred_to_two():
@@ -150,7 +152,7 @@ def test_a_rival_that_nothing_tells_does_not_hinder_the_others():
 
 
 def test_no_more_recordings_are_proposed_than_a_laboratory_would_make():
-    small = 0.3 * TELLING_GAIN
+    small = 0.3 * DISCRIMINATING_GAIN
     assert choose_experiments(make_gains([small, small, small, small])).experiments == ()
     chosen = choose_experiments(make_gains(*np.diag([TELLS] * 5).tolist()))
     assert len(chosen.experiments) == len(chosen.discriminated) == MOST_RECORDINGS
@@ -158,7 +160,7 @@ def test_no_more_recordings_are_proposed_than_a_laboratory_would_make():
 
 def test_a_recording_that_no_rival_needs_is_not_proposed():
     assert menu_numbers(choose_experiments(make_gains([TELLS, 0, 0, 0], [0, HALF, HALF, 0]))) == [0, 1, 2]
-    third = 0.4 * TELLING_GAIN
+    third = 0.4 * DISCRIMINATING_GAIN
     assert menu_numbers(choose_experiments(make_gains([TELLS, 0, 0, 0], [0.0, third, third, third]))) == [0]
 
 
@@ -205,7 +207,7 @@ def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     *others, weight = gains
     (chosen,) = choose_experiments([gains]).experiments
     assert "strapped to the handle" in chosen.words
-    assert weight.gain > TELLING_GAIN
+    assert weight.gain > DISCRIMINATING_GAIN
     assert all(other.gain < weight.gain / 3 for other in others)
 
 
@@ -239,7 +241,7 @@ def test_an_informative_expensive_recording_ranks_before_a_cheap_uninformative_o
     small = replace(sweep, commands=sweep.commands / 50)
     gains = predict_gains(bench, named, rival, known, (small, dear))
     assert choose_experiments([gains]).experiments == (dear,)
-    assert gains[0].gain < TELLING_GAIN < gains[1].gain
+    assert gains[0].gain < DISCRIMINATING_GAIN < gains[1].gain
 
 
 def test_an_axis_that_no_stiffness_holds_is_not_pushed_away():

@@ -18,7 +18,7 @@ from analysis.diagnosis.result.wording import describe_equivalents, describe_ver
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
 ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
-DEVICE = DeviceWording(single=True, system=LINEAR)
+DEVICE = DeviceWording(is_single_axis=True, system=LINEAR)
 DRY = Candidate("coulomb_friction", "mechanism", "x", {"level": 0.211}, 0.4, 0.62, "the main part is another")
 STICKY = Candidate(
     "viscoelastic_relaxation", "mechanism", "x", {"stiffness": 120.0, "time_constant": 0.02}, 0.2, 0.3,

@@ -20,7 +20,7 @@ from analysis.diagnosis.result.wording import (
     format_effect_title,
 )
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EFFECTS_BY_NAME
 from equalizer.signals.unit_system import LINEAR
 
 PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, "near v = 0", 0.8, 1e-9)
@@ -50,7 +50,7 @@ def test_an_effect_is_named_with_its_place_number_and_signature():
     )
 
 
-@pytest.mark.parametrize("name", EFFECT_NAMES, ids=lambda each: each.name)
+@pytest.mark.parametrize("name", EFFECT_ENTRIES, ids=lambda each: each.name)
 def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out_its_main_number(name):
     assert name.name in EFFECT_WORDS
     assert "_" not in get_noun(name.name)

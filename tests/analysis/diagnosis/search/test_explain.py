@@ -10,7 +10,7 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search import explain
-from analysis.diagnosis.search.explain import _look_ahead
+from analysis.diagnosis.search.explain import _find_effect_pair
 from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.verdict import ONLY_REFINES
 from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
@@ -194,10 +194,10 @@ def test_two_effects_that_hide_each_other_are_added_together(make_candidate, mon
 
     monkeypatch.setattr(explain, "find_next_effect", find_next)
     context = SimpleNamespace(excluded=frozenset())
-    rounds = _look_ahead(context, (), base, (first, again, other), None)
+    rounds = _find_effect_pair(context, (), base, (first, again, other), None)
     assert rounds == (((first, again, other), (both,)) if added else ())
     assert tried == (["cogging"] if added else ["cogging", "quadratic_damping"])
-    assert not _look_ahead(context, (), base, (make_candidate([5.0], "cogging"),), None)
+    assert not _find_effect_pair(context, (), base, (make_candidate([5.0], "cogging"),), None)
     near = make_candidate([1.9])
-    assert not _look_ahead(context, (), near, (make_candidate([1.8], "cogging"),), None)
-    assert not _look_ahead(SimpleNamespace(excluded={"force_deadband"}), (), base, (first,), None)
+    assert not _find_effect_pair(context, (), near, (make_candidate([1.8], "cogging"),), None)
+    assert not _find_effect_pair(SimpleNamespace(excluded={"force_deadband"}), (), base, (first,), None)

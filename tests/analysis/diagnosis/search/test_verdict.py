@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import compute_mismatch_share
-from analysis.diagnosis.search.verdict import compute_step_shares, confirms_addition, judge
+from analysis.diagnosis.search.verdict import compute_step_shares, has_confirmed_addition, judge
 
 RUBS = "coulomb_friction"
 
@@ -123,4 +123,4 @@ def test_an_effect_is_added_to_a_name_where_the_worst_held_out_channel_says_so(
     make_candidate, without, with_it, confirmed
 ):
     left = [make_candidate(1.0, RUBS, test=test) for test in (without, with_it)]
-    assert confirms_addition(*left) is confirmed
+    assert has_confirmed_addition(*left) is confirmed

@@ -8,16 +8,16 @@ from analysis.evaluation.blind_test.calibration import compute_calibration
 from analysis.evaluation.blind_test.confidence_intervals import compute_share, compute_statistic, pool_share
 from analysis.evaluation.blind_test.detection import (
     classify_outcome,
+    collect_effect_draws,
     compute_ideal_threshold,
     compute_rates_by_size,
-    make_detection_strips,
 )
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from analysis.evaluation.blind_test.score import compute_score, is_wrong_answer
 from analysis.evaluation.blind_test.wording import describe_answer, describe_concealed, format_figure
 from analysis.figures.blind_test_pictures import make_blind_test_pictures
-from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
+from analysis.reports.blind_test_report import BlindTestMetadata, render_blind_test_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from tests.slow_instances import slow_rows
 
@@ -167,7 +167,7 @@ def test_probabilities_that_mean_what_they_say_have_no_error():
 
 
 def test_each_draw_becomes_a_mark_of_its_effect():
-    strips = make_detection_strips([RIGHT, WRONG, IN_SET, UNSEEN])
+    strips = collect_effect_draws([RIGHT, WRONG, IN_SET, UNSEEN])
     assert [strip.effect for strip in strips] == ["coulomb_friction"]
     assert sorted(how for _, how in strips[0].draws) == ["in the set", "invisible", "missed", "right"]
     assert classify_outcome(BROKEN) == "missed"
@@ -180,7 +180,7 @@ def test_an_ideal_observer_sees_an_effect_from_where_it_adds_three_quarters_of_t
         compute_ideal_threshold([make_outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None
     )  # it does not grow
     assert compute_ideal_threshold(drawn[:2]) is None
-    assert make_detection_strips(drawn)[0].ideal_threshold == pytest.approx(0.5)
+    assert collect_effect_draws(drawn)[0].ideal_threshold == pytest.approx(0.5)
 
 
 def test_larger_effects_come_later():
@@ -198,7 +198,7 @@ def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
         FollowUp(5, "sensor_lag", both, "a sweep from 1 to 450 Hz", ("sensor_lag",), "a slow sinusoid", both),
         FollowUp(6, "sensor_lag", both, "", (), "a slow sinusoid", ()),
     )
-    facts = BlindTestFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
+    facts = BlindTestMetadata("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
     page = render_blind_test_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
     assert page.index("Misses: 8") < page.index("Figures")
     assert "One remark." in page and "ab" * 32 in page

@@ -79,7 +79,7 @@ def test_structure_asks_for_variables_axis_place_and_memory():
     assert right.structured
     assert right.close
     assert not right.close_louder
-    assert not right.missed
+    assert not right.is_wrong
     for wrong in ("-3.0*abs(vy)*y", "-3.0*lag(vy, 0.01)"):
         assert not make_outcome(wrong).structured
         assert make_outcome(wrong).wrongly_explained
@@ -89,13 +89,13 @@ def test_structure_asks_for_variables_axis_place_and_memory():
 def test_an_unnamed_candidate_does_not_count_as_a_wrong_explanation():
     held = make_outcome("-3.0*abs(vy)*y", verdict="unexplained", key="candidates")
     assert not held.wrongly_explained
-    assert held.missed
+    assert held.is_wrong
 
 
 def test_a_law_on_a_null_is_false():
     null = replace(make_outcome("1.0*vy*abs(vy)"), kind="nothing", truth=None)
     assert null.false_law
-    assert null.missed
+    assert null.is_wrong
     figures = {
         each.name: each for each in compute_law_score([null, make_outcome("-3.0*abs(vy)**1.5*sign(vy)")]).figures
     }

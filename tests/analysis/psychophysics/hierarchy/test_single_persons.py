@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from analysis.figures.study_pictures import study_pictures
+from analysis.figures.study_pictures import draw_study_pictures
 from analysis.psychophysics.hierarchy.answers import count_cells
 from analysis.psychophysics.hierarchy.curve import (
     NEPER_PER_DB,
@@ -65,16 +65,16 @@ def test_what_is_not_known_is_averaged_over_as_an_integral_does_it():
 @pytest.mark.slow
 def test_one_participant_has_thresholds_by_likelihood_in_report_document_and_figures(simulate_study, protocol):
     analysis = analyse_study(simulate_study(subjects=1), protocol)
-    page = render_study_report(analysis, study_pictures(analysis), {}, "2026-01-02T03:04:05Z")
+    page = render_study_report(analysis, draw_study_pictures(analysis), {}, "2026-01-02T03:04:05Z")
     assert "Thresholds by likelihood" in page and "Single thresholds by maximum likelihood" in page
     assert len(make_anova_document(analysis)["single_persons"]["runs"]) == 5
-    assert "psychometric-1-s01" in [picture.name for picture in study_pictures(analysis)]
+    assert "psychometric-1-s01" in [picture.name for picture in draw_study_pictures(analysis)]
 
 
 @pytest.mark.slow
 def test_people_at_one_frequency_have_their_own_numbers_and_a_study_needs_none(simulate_study, protocol):
     trials = simulate_study(subjects=3)
     single = analyse_study([trial for trial in trials if trial.frequency_hz == 15.0], protocol)
-    assert single.primary is None and [run.subject for run in single.single.runs] == ["s01", "s02", "s03"]
-    assert single.single.frequencies_hz == (15.0,)
-    assert analyse_study(trials, replace(protocol)).single is None
+    assert single.primary is None and [run.subject for run in single.single_persons.runs] == ["s01", "s02", "s03"]
+    assert single.single_persons.frequencies_hz == (15.0,)
+    assert analyse_study(trials, replace(protocol)).single_persons is None

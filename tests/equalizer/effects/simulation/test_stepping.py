@@ -56,7 +56,7 @@ def plainly(bodies, driven, size, step_s):
     rows = np.vstack([linear.motion, linear.response, linear.position])
     nothing = np.zeros_like(linear.position)
     by_u = np.vstack([linear.motion_by_command, linear.response_by_command, nothing[:, : driven.mean.shape[1]]])
-    by_f = np.vstack([linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((len(nothing), r))])
+    by_f = np.vstack([linear.motion_by_port_force, linear.response_by_port_force, np.zeros((len(nothing), r))])
     state, force_end, shown = np.zeros(len(linear.transition)), np.zeros(r), np.zeros(driven.mean.shape[1])
     memories = [np.zeros(act.memory) for act in bodies.actions]
     looked, added = np.empty((n, len(rows))), np.empty((n, r))
@@ -84,20 +84,20 @@ def _one_step(bodies, linear, state, u, memories, at):
                 force[port] -= own[item, 0]
                 end[port] -= own[item, 1]
                 memories[item][:] = before[item]
-            free = linear.transition @ state + linear.by_command @ u + linear.by_axis_force @ force
-            unit = linear.by_axis_force[:, port]
+            free = linear.transition @ state + linear.state_by_command @ u + linear.state_by_port_force @ force
+            unit = linear.state_by_port_force[:, port]
             at[X], at[V] = motion[port] @ state, motion[r + port] @ state
             at[X_FREE], at[V_FREE] = motion[port] @ free, motion[r + port] @ free
             at[X_PER_N], at[V_PER_N] = motion[port] @ unit, motion[r + port] @ unit
             row = 2 * r + port
             at[A_FREE] = motion[row] @ state + linear.motion_by_command[row] @ u
-            at[A_FREE] += linear.motion_by_axis_force[row] @ force
-            at[A_PER_N], at[F_END] = linear.motion_by_axis_force[row, port], np.nan
+            at[A_FREE] += linear.motion_by_port_force[row] @ force
+            at[A_PER_N], at[F_END] = linear.motion_by_port_force[row, port], np.nan
             mean = act.law(numbers, memories[item], at)
             own[item] = mean, mean if np.isnan(at[F_END]) else at[F_END]
             force[port] += own[item, 0]
             end[port] += own[item, 1]
-    return linear.transition @ state + linear.by_command @ u + linear.by_axis_force @ force, end
+    return linear.transition @ state + linear.state_by_command @ u + linear.state_by_port_force @ force, end
 
 
 def assert_same(model, effects, commands, steps, fine=1):

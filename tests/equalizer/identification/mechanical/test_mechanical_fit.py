@@ -222,7 +222,7 @@ def test_modes_that_the_sensor_sees_otherwise_are_fitted_by_shapes_of_their_own(
     response += 0.003 * response.std() * rng.standard_normal(response.shape)
     parts = [Segment(3000 * i, 3000 * (i + 1), "multisine", 1.0, 1000, "test" if i == 3 else "fit") for i in range(4)]
     source = recording(commands, response, segments=parts)
-    fit = fit_mechanical_model([source], MechanicalFitSettings(sensors_elsewhere=True))
+    fit = fit_mechanical_model([source], MechanicalFitSettings(noncollocated_sensors=True))
     assert fit.held_out is not None and fit.held_out < 0.06
     np.testing.assert_allclose(fit.model.input[:, 0], np.eye(fit.model.coordinates)[0])
 

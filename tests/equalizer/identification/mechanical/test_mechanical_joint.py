@@ -25,7 +25,7 @@ def played(model, commands) -> np.ndarray:
     before = np.zeros(1)
     for u in commands:
         out.append(steps.response @ state + steps.response_by_command @ before)
-        state, before = steps.transition @ state + steps.by_command @ u, u
+        state, before = steps.transition @ state + steps.state_by_command @ u, u
     return np.array(out)
 
 

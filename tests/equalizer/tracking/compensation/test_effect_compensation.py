@@ -8,7 +8,7 @@ import pytest
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording, Segment
@@ -135,11 +135,11 @@ def effect(kind, axis=None, **parameters) -> ModelEffect:
 
 def test_every_effect_of_the_vocabulary_is_used_or_says_why_not(frictionless, wanted):
     effects = tuple(
-        ModelEffect(name.name, None, {part.name: 0.01 for part in name.parameters}) for name in EFFECT_NAMES
+        ModelEffect(name.name, None, {part.name: 0.01 for part in name.parameters}) for name in EFFECT_ENTRIES
     )
     done = compensate(inverse(frictionless, wanted), wanted, frictionless, physics(*effects), None)
     assert {each.kind for each in done.used} == {*LAWS, "force_deadband"}
-    assert len(done.used) + len(done.not_used) == len(EFFECT_NAMES)
+    assert len(done.used) + len(done.not_used) == len(EFFECT_ENTRIES)
     assert all(reason for _, reason in done.not_used)
 
 

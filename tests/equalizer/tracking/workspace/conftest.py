@@ -12,7 +12,7 @@ import pytest
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.feedforward.quality import Quality, measure_quality
+from equalizer.tracking.feedforward.quality import ResponseQuality, measure_quality
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
 
 LENGTH_M = 0.06
@@ -46,13 +46,13 @@ class Workspaces:
         ]
         return WorkspaceModels(tuple(found))
 
-    def worst(self, at, bend=0.0) -> Quality:
+    def worst(self, at, bend=0.0) -> ResponseQuality:
         """at: from a place to ModelsAtPlace. Over all lines and 21 places."""
         found = [
             measure_quality(self.plant(x, bend).response(LINES_HZ) @ at(self.place_m(x)).compute_inverse(LINES_HZ))
             for x in OFF_GRID
         ]
-        return Quality(
+        return ResponseQuality(
             max(each.flatness_db for each in found),
             max(each.coupling_db for each in found),
             max(each.axis_error_deg for each in found),

@@ -17,12 +17,12 @@ def relative(found, truth):
 
 def test_at_a_given_place_the_given_model_comes_back(three):
     for model in three.models:
-        found = build_modal_interpolation(three).at(model.place_m).models[0]
+        found = build_modal_interpolation(three).interpolate_at(model.place_m).models[0]
         assert relative(compute_model_response(found, LINES), compute_model_response(model, LINES)) < 0.01
 
 
 def test_the_model_is_stable_small_and_says_what_it_is_made_of(three):
-    at = build_modal_interpolation(three).at((0.02, 0.01, 0.0))
+    at = build_modal_interpolation(three).interpolate_at((0.02, 0.01, 0.0))
     (model,) = at.models
     assert at.weights == (1.0,)
     assert at.remarks == ()
@@ -36,17 +36,17 @@ def test_the_model_is_stable_small_and_says_what_it_is_made_of(three):
 
 def test_the_order_in_which_models_are_given_does_not_matter(three):
     place = (0.041, 0.01, 0.0)
-    one = build_modal_interpolation(three).at(place).models[0]
-    other = build_modal_interpolation(WorkspaceModels(three.models[::-1])).at(place).models[0]
+    one = build_modal_interpolation(three).interpolate_at(place).models[0]
+    other = build_modal_interpolation(WorkspaceModels(three.models[::-1])).interpolate_at(place).models[0]
     np.testing.assert_allclose(
         compute_model_response(one, LINES), compute_model_response(other, LINES), rtol=1e-6, atol=1e-6
     )
 
 
 def test_outside_the_nearest_place_is_used_and_reported(three):
-    at = build_modal_interpolation(three).at((0.09, 0.01, 0.0))
+    at = build_modal_interpolation(three).interpolate_at((0.09, 0.01, 0.0))
     assert "30.0 mm outside" in at.remarks[0]
-    edge = build_modal_interpolation(three).at((0.06, 0.01, 0.0)).models[0]
+    edge = build_modal_interpolation(three).interpolate_at((0.06, 0.01, 0.0)).models[0]
     np.testing.assert_allclose(
         compute_model_response(at.models[0], LINES), compute_model_response(edge, LINES), rtol=1e-4, atol=1e-4
     )
@@ -63,4 +63,4 @@ def test_a_remainder_that_no_smooth_model_holds_is_reported(three, monkeypatch):
     from equalizer.tracking.workspace import modal_interpolation as module
 
     monkeypatch.setattr(module, "REAL_POLES_PER_OCTAVE", 0.1)
-    assert "% off where it is worst" in build_modal_interpolation(three).at((0.02, 0.01, 0.0)).remarks[0]
+    assert "% off where it is worst" in build_modal_interpolation(three).interpolate_at((0.02, 0.01, 0.0)).remarks[0]

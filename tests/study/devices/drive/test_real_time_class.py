@@ -17,7 +17,7 @@ from study.devices.drive.real_time_class import (
     STARVING_ADVICE,
     SWITCH_INTERVAL_S,
     check_real_time_rights,
-    real_time_class,
+    request_real_time_class,
 )
 from study.devices.safe import SafeDevice
 
@@ -48,7 +48,7 @@ def as_linux_comes(monkeypatch, tmp_path):
     """What Linux leaves to ordinary threads: the file that says so."""
     path = tmp_path / "sched_rt_runtime_us"
     path.write_text("950000\n")
-    monkeypatch.setattr(module, "RT_RUNTIME", path)
+    monkeypatch.setattr(module, "RT_RUNTIME_PATH", path)
     return path
 
 
@@ -80,7 +80,7 @@ def allow(monkeypatch):
 def test_real_time_priority_lasts_as_long_as_the_loop(allow):
     library, asked = allow(True, True)
     before_s = sys.getswitchinterval()
-    with real_time_class() as granted:
+    with request_real_time_class() as granted:
         assert (granted.scheduled, granted.locked, granted.advice) == (True, True, "")
         assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S)
     assert asked == [(FIFO | RESET_ON_FORK, PRIORITY)]
@@ -106,7 +106,7 @@ def test_with_all_permissions_there_is_no_warning(allow):
 def test_overlapping_loops_keep_the_priority_until_the_later_end(allow, first_begun_ends_first):
     library, _ = allow(True, True)
     before_s = sys.getswitchinterval()
-    begun = [real_time_class(), real_time_class()]
+    begun = [request_real_time_class(), request_real_time_class()]
     for each in begun:
         each.__enter__()
     earlier, later = begun if first_begun_ends_first else reversed(begun)
@@ -119,7 +119,7 @@ def test_overlapping_loops_keep_the_priority_until_the_later_end(allow, first_be
 @pytest.mark.parametrize("granted_again", [True, False])
 def test_querying_the_priority_does_not_change_a_running_loop(allow, granted_again):
     library, _ = allow(True, True)
-    with real_time_class():
+    with request_real_time_class():
         library.allowed = granted_again
         assert check_real_time_rights().fine == granted_again
         assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S)
@@ -131,7 +131,7 @@ def test_future_memory_is_locked_only_without_a_memory_limit(allow, monkeypatch,
     resource = pytest.importorskip("resource")
     monkeypatch.setattr(resource, "getrlimit", lambda which: {resource.RLIMIT_MEMLOCK: (limit, -1)}[which])
     library, _ = allow(True, True)
-    with real_time_class():
+    with request_real_time_class():
         assert library.flags == [flags]
 
 
@@ -148,7 +148,7 @@ def test_unlimited_real_time_runtime_of_the_kernel_is_a_warning(allow, as_linux_
 
 def test_an_error_inside_restores_the_priority(allow):
     library, _ = allow(True, True)
-    with pytest.raises(OSError, match="usb"), real_time_class():
+    with pytest.raises(OSError, match="usb"), request_real_time_class():
         raise OSError("usb")
     assert not library.locked
 
@@ -159,7 +159,7 @@ def test_only_the_calling_thread_gets_the_priority():
     found: list[tuple[bool, int]] = []
 
     def ask() -> None:
-        with real_time_class() as granted:
+        with request_real_time_class() as granted:
             found.append((granted.scheduled, os.sched_getscheduler(threading.get_native_id())))
 
     before = os.sched_getscheduler(0)
@@ -181,7 +181,7 @@ def test_on_windows_sleeps_are_made_finer_and_the_thread_comes_first(monkeypatch
     kernel.GetCurrentThread = type("Function", (), {"__call__": lambda self: 2})()
     monkeypatch.setattr(module.platform, "system", lambda: "Windows")
     monkeypatch.setattr(module.ctypes, "windll", SimpleNamespace(winmm=winmm, kernel32=kernel), raising=False)
-    with real_time_class() as granted:
+    with request_real_time_class() as granted:
         assert granted.scheduled == (fine_sleep and priority)
         assert not granted.locked and granted.advice.startswith("Windows")
         assert ended == []
@@ -204,7 +204,7 @@ def test_a_real_device_s_loop_asks_in_its_own_thread_and_gives_back_when_it_is_c
         yield
         told.append("given back")
 
-    monkeypatch.setattr("study.devices.drive.realtime_drive.real_time_class", noted)
+    monkeypatch.setattr("study.devices.drive.realtime_drive.request_real_time_class", noted)
 
     class Rig(rigs.ScriptedRig):
         info = replace(rigs.INFO, simulated=simulated)

@@ -11,7 +11,7 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.force_dimension import connect
 from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.usb import UsbDevice
-from study.devices.opening import REAL, open_device
+from study.devices.opening import REAL_DEVICES, open_device
 from study.errors import DeviceError, ExitCode
 
 
@@ -152,7 +152,7 @@ def test_settings_that_are_not_safe_close_it_again(stub, rigs):
     assert stub.get("opened") == 0
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", REAL_DEVICES)
 def test_real_devices_are_not_played_in_virtual_time(stub, rigs, name):
     with pytest.raises(DeviceError, match="needs real time"):
         open_device(name, rigs.SETTINGS, VirtualClock(), seed=1)

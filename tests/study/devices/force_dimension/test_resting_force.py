@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from study.devices.drive.stepped_runner import CLOSE_TIMEOUT_S
+from study.devices.drive.stepped_runner import DEVICE_CLOSE_TIMEOUT_S
 from study.devices.force_dimension.rig import JOIN_TIMEOUT_S
 from study.devices.native import acquire, read_clock_s, release, sleep_until
 
@@ -125,7 +125,7 @@ def test_closing_waits_for_a_zero_that_hangs_no_longer_than_half_of_its_time(stu
         hang_a_zero(stub, rig, 3.0)
         began_s = time.monotonic()
         assert rig.close()
-        assert JOIN_TIMEOUT_S <= time.monotonic() - began_s < CLOSE_TIMEOUT_S
+        assert JOIN_TIMEOUT_S <= time.monotonic() - began_s < DEVICE_CLOSE_TIMEOUT_S
         assert rig._zero_thread.is_alive() and stub.safe
 
 

@@ -274,7 +274,7 @@ def pull_at(governor, x_m: float, stamp_s: float) -> float:
 def test_the_kept_code_of_the_tick_is_outdated_when_any_file_of_the_safety_layer_changes(tmp_path):
     folder = Path(govern.__file__).parent
     rig = folder.parent / "rig.py"
-    expected = compiling.fingerprint(folder, rig)
+    expected = compiling.compute_fingerprint(folder, rig)
     for entry in (govern.tick, govern.record_missed_ticks):
         assert expected in [cell.cell_contents for cell in entry.py_func.__closure__]
     for name in ("cells", "compiling", "confine", "feedback", "govern", "plausibility", "rig"):
@@ -284,4 +284,4 @@ def test_the_kept_code_of_the_tick_is_outdated_when_any_file_of_the_safety_layer
         beyond.write_bytes(rig.read_bytes())
         with (beyond if name == "rig" else tmp_path / f"{name}.py").open("a") as file:
             file.write("# changed")
-        assert compiling.fingerprint(tmp_path, beyond) != expected
+        assert compiling.compute_fingerprint(tmp_path, beyond) != expected

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from study.devices.governor.compiling import fingerprint
+from study.devices.governor.compiling import compute_fingerprint
 
 DEVICES = Path(__file__).parents[4] / "study" / "devices"
 COMPILED = {
@@ -36,11 +36,11 @@ def test_a_change_of_any_watched_file_is_another_fingerprint(tmp_path):
     inside, beyond = tmp_path / "folder" / "a.py", tmp_path / "rig.py"
     inside.write_text("A = 1\n")
     beyond.write_text("B = 1\n")
-    found = [fingerprint(tmp_path / "folder", beyond)]
+    found = [compute_fingerprint(tmp_path / "folder", beyond)]
     beyond.write_text("B = 2\n")
-    found.append(fingerprint(tmp_path / "folder", beyond))
+    found.append(compute_fingerprint(tmp_path / "folder", beyond))
     inside.write_text("A = 2\n")
-    found.append(fingerprint(tmp_path / "folder", beyond))
+    found.append(compute_fingerprint(tmp_path / "folder", beyond))
     assert len(set(found)) == 3
 
 

@@ -30,4 +30,4 @@ def device(behind, served, rigs):
 def impatient(monkeypatch):
     for name in ("ANSWER_TIMEOUT_S", "STOP_TIMEOUT_S", "CLOSE_TIMEOUT_S"):
         monkeypatch.setattr(remote_device, name, 0.2)
-    monkeypatch.setattr(call_pipe, "GRACE_S", 0.1)
+    monkeypatch.setattr(call_pipe, "ANSWER_GRACE_S", 0.1)

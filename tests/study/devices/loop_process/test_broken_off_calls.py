@@ -68,7 +68,7 @@ def test_a_stop_that_is_not_answered_kills_the_process_without_a_grace(
     behind, served, rigs, hang, monkeypatch, impatient
 ):
     monkeypatch.setattr(behind, "stop", hang.wait)
-    monkeypatch.setattr(call_pipe, "GRACE_S", 3600.0)
+    monkeypatch.setattr(call_pipe, "ANSWER_GRACE_S", 3600.0)
     device = served.remote(behind, rigs.SETTINGS)
     device.hold(rigs.push())
     with device._loss_lock:  # as a call that waits for the end of a process that hung up

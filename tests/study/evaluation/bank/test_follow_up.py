@@ -9,7 +9,7 @@ import pytest
 
 from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
 from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up_figures
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES
 from study.errors import StudyError
 from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, PROPOSED_KEY, RANDOM_KEY, follow_up
 from study.evaluation.bank.proof_folder import (
@@ -62,7 +62,7 @@ def started(path, best):
     write_sealed_case(folder, draw_case_plan(SEED, NUMBER, True))
     label = json.loads(folder.get_label_file(NUMBER).read_text())
     place = folder.open / label["name"]
-    without = [effect.name for effect in EFFECT_NAMES if effect.name not in CONSIDERED]
+    without = [effect.name for effect in EFFECT_ENTRIES if effect.name not in CONSIDERED]
     (place / SETTINGS_FILE).write_text(format_settings(without))
     menu = list_experiments(read_mechanical_model(place / MODEL_FILE), 1000.0, 0, LEVEL_N)
     answer(place, best=menu[0].words if best else "")

@@ -15,7 +15,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import open_proof_folder
-from study.evaluation.real.inject_real import PROCESSOR_S, Carrier, seal_injections
+from study.evaluation.real.inject_real import PROCESSOR_S, InjectableRecording, seal_injections
 from study.evaluation.real.injected_halves import blank_lead_responses, compute_held_out_change, draw_halves
 from study.store.disk.provenance import compute_sha256
 from study.store.formats.recording_file import read_recording
@@ -48,8 +48,8 @@ def recording(model) -> Recording:
 
 
 @pytest.fixture(scope="module")
-def carrier(recording, model) -> Carrier:
-    return Carrier("rig", model, recording)
+def carrier(recording, model) -> InjectableRecording:
+    return InjectableRecording("rig", model, recording)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.procedure.staircase import begin_staircase, level_n, step
+from protocols.procedure.staircase import begin_staircase, compute_level_n, step
 from protocols.trial import Phase, TrialStatus
 from study.session.facts.events import (
     DeviceFacts,
@@ -216,7 +216,7 @@ def test_folding_gives_the_levels_of_the_staircase_alone(answers):
             break
         before = find_next_action(state) if not isinstance(find_next_action(state), TakeRest) else None
         if before is not None:
-            assert before.level_n == level_n(protocol.staircase, expected)
+            assert before.level_n == compute_level_n(protocol.staircase, expected)
         state = one_trial(state, correct)
         expected = step(protocol.staircase, expected, correct)
 

@@ -168,12 +168,12 @@ def test_what_a_stop_tells_is_in_the_language(on_stage, code):
     words = Words(table_of(code))
 
     async def story(stage):
-        assert english_in(stage.words, words.own_texts) == []
+        assert english_in(stage.words, words.protocol_texts) == []
         assert words["key_quit"] in stage.words
         assert words["key_leave"] in stage.text.splitlines()[-1]
         stage.app.screen.show_outcome(outcomes.make_stop_unanswered_outcome(words))
         await stage.pilot.pause()
-        assert english_in(stage.words, words.own_texts) == []
+        assert english_in(stage.words, words.protocol_texts) == []
         assert words["stop_do_now"].split(":")[0] in re.sub(r"[\s│┃]+", " ", stage.words)
 
     on_stage(OutcomeScreen(outcomes.make_stop_sent_outcome(words)), story)

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES
 from study.workflows.files.format_docs import SCHEMAS, generate_documents, write_documents
 
 DOCS = Path(__file__).parents[4] / "docs"
@@ -21,7 +21,7 @@ def test_no_schema_of_old_is_left():
 
 @pytest.mark.slow
 def test_every_effect_is_on_the_page():
-    assert all(f"`{effect.name}`" in generate_documents()["formats.md"] for effect in EFFECT_NAMES)
+    assert all(f"`{effect.name}`" in generate_documents()["formats.md"] for effect in EFFECT_ENTRIES)
 
 
 def test_a_document_schema_asks_for_format_and_version():

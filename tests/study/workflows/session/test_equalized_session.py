@@ -16,7 +16,7 @@ from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, compute_highest_l
 from study.session.stimulus.stimulus import make_held_stimulus
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
-from study.store.sessions.trial_recordings import find_trial_recording, recording_name
+from study.store.sessions.trial_recordings import find_trial_recording, name_recording
 from study.workflows.results.analyze_data import analyze_data
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_tables
@@ -126,7 +126,7 @@ def test_every_trial_says_which_acceleration_its_level_stands_for(conducted):
 def test_what_is_commanded_is_what_the_model_needs_with_the_spring_left_to_itself(conducted):
     """A rigid mass under the protocol's spring: total force = mass times acceleration."""
     trial = next(t for t in conducted.state.trials if t.frequency_hz == 5.0)
-    _, recording = find_trial_recording(conducted.folder, recording_name(trial.run, trial.trial, trial.attempt))
+    _, recording = find_trial_recording(conducted.folder, name_recording(trial.run, trial.trial, trial.attempt))
     n = 200
     phasor = np.fft.rfft(recording.excitation.samples[-n:], axis=0)[1] * 2 / n
     info = conducted.state.opened.device

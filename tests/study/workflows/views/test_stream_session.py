@@ -15,7 +15,7 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 from study.workflows.views import stream_session as module
 from study.workflows.views.lsl_outlets import MarkerOutlet, make_source_id
-from study.workflows.views.stream_session import LARGEST_EVENT_AGE_S, SideTasks, measure_offset_s, stream_session
+from study.workflows.views.stream_session import MAX_EVENT_AGE_S, SideTasks, measure_offset_s, stream_session
 
 OFFSET_S = 1000.25
 
@@ -95,7 +95,7 @@ def test_nothing_about_the_person_is_reported(tmp_path):
     assert not any(word in said for word in ("P01", "dizzy", "left-handed", "secret"))
 
 
-@pytest.mark.parametrize("monotonic_s", [None, 50.0 - LARGEST_EVENT_AGE_S - 1, 60.0, 0.3])
+@pytest.mark.parametrize("monotonic_s", [None, 50.0 - MAX_EVENT_AGE_S - 1, 60.0, 0.3])
 def test_a_fact_of_another_clock_is_stamped_when_it_is_sent_and_reports_it(tmp_path, monotonic_s):
     pushed, _ = streamed(tmp_path, [line("trial_presented", monotonic_s=monotonic_s), line("session_closed")])
     marker, at_s = pushed[1]

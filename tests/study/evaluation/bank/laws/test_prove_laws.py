@@ -6,7 +6,7 @@ import pytest
 
 from study.errors import StudyError
 from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
-from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
+from study.evaluation.bank.laws.seal_laws import get_fresh_motions_path, read_fresh_motions, seal_laws
 from study.evaluation.bank.laws.write_law_proof import format_law_lines, write_law_proof
 from study.evaluation.bank.proof_folder import SETTINGS_FILE, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
@@ -38,7 +38,7 @@ def test_fresh_motion_lies_with_the_label(sealed):
     label = read_label(sealed.get_label_file(0))
     truth = label["truth"]
     found = read_fresh_motions(
-        fresh_motions_path(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"]
+        get_fresh_motions_path(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"]
     )
     assert len(found) == 2
     assert set(truth["axes"]) == set(found[0].contributions)
@@ -49,7 +49,7 @@ def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
     copy = open_proof_folder(tmp_path / "copy", SEED, True, "laws")
     for name in ("labels.sha256", "sealed/00000.json"):
         (copy.path / name).write_bytes((sealed.path / name).read_bytes())
-    fresh_motions_path(copy, 0).write_bytes(b"other")
+    get_fresh_motions_path(copy, 0).write_bytes(b"other")
     with pytest.raises(StudyError, match="seal"):
         reveal_laws(copy, 1)
 

@@ -18,7 +18,7 @@ from study.cli.main import main
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trajectory_file import write_trajectory
 from study.workflows.equalizer.controller.export_controller import (
-    LONGEST_PREVIEW_S,
+    MAX_PREVIEW_S,
     ControllerPlan,
     export_controller,
 )
@@ -42,7 +42,7 @@ def test_it_compiles_without_a_warning_and_agrees_with_python(vendor, tmp_path, 
 @pytest.mark.slow
 def test_the_longest_preview_that_is_accepted_is_compared_too(vendor, tmp_path):
     """The first sample of a stream is played after it."""
-    settings = RealtimeSettings(preview_s=LONGEST_PREVIEW_S)
+    settings = RealtimeSettings(preview_s=MAX_PREVIEW_S)
     out = tmp_path / "out"
     exported = export_controller(ControllerPlan(write_model(tmp_path / "model.h5"), out, settings=settings))
     late = len(exported.controller.tracker) - 1

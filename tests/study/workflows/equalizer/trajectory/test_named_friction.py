@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
@@ -40,11 +40,11 @@ def test_each_effect_that_a_diagnosis_names_is_compensated_or_reported(plan, tmp
             "z" if effect.name == "sensor_lag" else None,
             {part.name: 0.7 if part.name == "gain" else 0.01 for part in effect.parameters},
         )
-        for effect in EFFECT_NAMES
+        for effect in EFFECT_ENTRIES
     )
     write_mechanical_model(tmp_path / "improved.toml", mechanism(*named))
     told = summarise_equalization(equalize_trajectory(replace(plan, physics=tmp_path / "improved.toml")))
-    assert {*told["compensated"], *told["not_compensated"]} == {effect.name for effect in EFFECT_NAMES}
+    assert {*told["compensated"], *told["not_compensated"]} == {effect.name for effect in EFFECT_ENTRIES}
     assert all(told["not_compensated"].values())
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.mechanical.open_tolerance import widen_tolerance
+from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 
 ONE = np.eye(2)
