@@ -16,7 +16,7 @@ Each depends on one axis alone, which is what the formula of a `judged_law` can 
 on grids over the motion and refined like those of the catalogue's laws (`structures`).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -39,6 +39,13 @@ FREE_POSITION_LAWS = {"power_of_position", "even_power_of_position", "exponentia
                       "contact_beyond_position"}  # fmt: skip
 FREE_LAWS = frozenset({*FREE_SPEED_LAWS, *FREE_POSITION_LAWS, "product_of_position_and_speed"})
 """Names of all laws of this file; a diagnosis reports their formulas as `discovered_law`."""
+
+
+def list_excluded_laws(excluded_effects: Iterable[str], discovery: bool) -> frozenset[str]:
+    """List the laws that the force balance leaves out: these effects and, without discovery, all of `FREE_LAWS`."""
+    return frozenset(excluded_effects) | (frozenset() if discovery else FREE_LAWS)
+
+
 POWERS, POWER_BOUNDS = (0.3, 0.6, 1.5, 2.0, 3.0, 4.5), ((0.05, 6.0),)
 """Tried exponents, and bounds of their refinement; 6 is the largest that a search by simulation names as well."""
 SPEED_SHARES = (0.03, 0.1, 0.3, 1.0)

@@ -7,7 +7,7 @@ with a remedy. Called by `diagnose_recordings` and `study.evaluation.real`.
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.free_laws import list_excluded_laws
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fit_without_model
@@ -34,7 +34,7 @@ def fit_first_model(
     bounds: function that tells whether time is left, and the guard that catches crashes. on_progress: called with the
     step's name and its completed share. Raises StudyError for unsuitable recordings."""
     time_left, guard = bounds
-    excluded = (*excluded_effects, *(() if discovery else FREE_LAWS))
+    excluded = list_excluded_laws(excluded_effects, discovery)
 
     def fit_by_balance() -> FirstModel | None:
         return fit_without_model.fit_first_model(
