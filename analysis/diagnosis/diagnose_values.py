@@ -7,7 +7,7 @@ Checks and prepares the recordings, fits a linear first model where none is give
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.free_laws import list_excluded_laws
 from analysis.diagnosis.data.input_checks import require_comparable, require_model_of
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
@@ -66,7 +66,7 @@ def _fit_first_model(
 ) -> FirstModel:
     """Fit a linear model, with remarks: to these recordings, with their force balances, or to the clean ones alone."""
     if not settings.clean:
-        excluded = (*settings.without, *(() if settings.discovery else FREE_LAWS))
+        excluded = list_excluded_laws(settings.without, settings.discovery)
         return fit_first_model(recordings, excluded, settings.time_left, progress, map_)
     step = "fitting a linear model, as none was given"
     return FirstModel(

@@ -103,9 +103,9 @@ def format_error(error: float | None) -> str:
     return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
 
 
-def format_error_of_signal(error: float | None) -> str:
+def format_error_of_signal(error: float) -> str:
     """Format an error in words: "14 % of the signal", "12 times the signal"."""
-    return f"{format_error(error)} {'the' if error is not None and 100 * error >= 1000 else 'of the'} signal"
+    return f"{format_error(error)} {'the' if 100 * error >= 1000 else 'of the'} signal"
 
 
 def format_probability(probability: float) -> str:

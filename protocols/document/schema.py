@@ -132,9 +132,10 @@ def _describe_number(node: Node) -> str:
 
 
 def _describe_text(node: Node) -> str:
-    """Describe a text: as a name where it has a pattern (that of `field_types`), else by its length."""
+    """Describe a text: as a name where it has a pattern ("^[a-z][a-z0-9_]{0,N}$"), else by its length."""
     if "pattern" in node:
-        return "text in quotes: a lower-case letter, then up to 63 lower-case letters, digits and underscores"
+        most = node["pattern"].partition("{0,")[2].partition("}")[0]
+        return f"text in quotes: a lower-case letter, then up to {most} lower-case letters, digits and underscores"
     min_length, max_length = node.get("minLength", 0), node.get("maxLength")
     return f"text in quotes, {min_length} to {max_length} characters long" if max_length else "text in quotes"
 

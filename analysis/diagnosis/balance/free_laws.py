@@ -18,7 +18,7 @@ that they only exclude columns that are zero or linear. In the code, c is the in
 m, n are the nonlinear parameters and w the weights, as in `law`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -42,6 +42,13 @@ FREE_POSITION_LAWS = {"power_of_position", "even_power_of_position", "exponentia
 """Laws of the speed alone, and of the position alone: each group is a family of similar laws (`judged_law`)."""
 FREE_LAWS = frozenset({*FREE_SPEED_LAWS, *FREE_POSITION_LAWS, "product_of_position_and_speed"})
 """Names of all laws of this file; a diagnosis reports their formulas as `discovered_law`."""
+
+
+def list_excluded_laws(excluded_effects: Iterable[str], discovery: bool) -> frozenset[str]:
+    """List the laws that the force balance leaves out: these effects and, without discovery, all of `FREE_LAWS`."""
+    return frozenset(excluded_effects) | (frozenset() if discovery else FREE_LAWS)
+
+
 POWERS, POWER_BOUNDS = (0.3, 0.6, 1.5, 2.0, 3.0, 4.5), ((0.05, 6.0),)
 """Tried exponents, and bounds of their refinement; 6 is the largest that a search by simulation names as well."""
 SPEED_SHARES = (0.03, 0.1, 0.3, 1.0)

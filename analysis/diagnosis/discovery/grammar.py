@@ -116,7 +116,7 @@ def list_terms(axes: Sequence[Axis], axis_index: int, duration_s: float, rate_hz
         *_generate_power_terms(own_axis), *_generate_product_terms(own_axis), *_generate_hinge_terms(own_axis),
         *_generate_saturation_terms(own_axis), *_generate_pole_terms(own_axis),
         *_generate_memory_terms(own_axis, other_axes, duration_s, rate_hz),
-        *_generate_cross_axis_terms(own_axis, other_axes), *_generate_drift_terms(own_axis, duration_s),
+        *_generate_cross_axis_terms(own_axis, other_axes), *_generate_drift_terms(own_axis),
         *_generate_inertia_terms(own_axis, other_axes),
     )  # fmt: skip
     return tuple(terms)
@@ -283,7 +283,7 @@ def _generate_inertia_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Itera
             yield Term(shape)
 
 
-def _generate_drift_terms(axis: Axis, duration_s: float) -> Iterator[Term]:
+def _generate_drift_terms(axis: Axis) -> Iterator[Term]:
     """Generate stiffness, damping, gain of the command and force that change linearly with time."""
     yield from (Term(f"{signal_name}*t") for signal_name in (axis.x, axis.v, axis.f))
     yield Term("t")

@@ -19,15 +19,17 @@ def find_periodic_terms(
     Of position, for each weight: the two strongest lines of pitches from the largest position down to about 1/40 of it,
     computed from fewer than 16000 evenly spaced samples. Their spacing, 0.35 per travel of a symmetric motion, is as
     fine as in `balance.laws`. Pitches of 1/12 of the travel (peak to peak) or more hardly make a line; they also start
-    on a grid, as sine and cosine. A pitch varies within a factor of 2, up to the travel (the start at a line may exceed
-    it where the motion is far from position 0). Of time: the strongest line above `_SLOWEST_LINE_HZ` for each weight;
+    on a grid, as sine and cosine. A pitch varies within a factor of 2, up to the travel; lines of longer pitches, which
+    the spectrum has where the motion is far from position 0, are left out. Of time: the strongest line above
+    `_SLOWEST_LINE_HZ` for each weight;
     its frequency varies by 20 %."""
     x = columns[own_axis.x]
     stride = max(len(x) // 8000, 1)
     wave_numbers = np.arange(1.0, 40.0, 0.175) / own_axis.largest_position
+    travel = float(np.ptp(x))
+    wave_numbers = wave_numbers[wave_numbers * travel >= 1.0]
     phasors = np.exp(-2j * np.pi * np.outer(x[::stride], wave_numbers)).astype(np.complex64)
     terms = []
-    travel = float(np.ptp(x))
     for weight_signal, wave_count, phase in product(
         ("", own_axis.f, own_axis.v), np.geomspace(1.0, 12.0, 13).tolist(), (0.0, np.pi / 2)
     ):

@@ -88,8 +88,7 @@ class Windows:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         """Compute, per record, (n, c): measured minus simulated, in units of `unit`, after the fit of each window's
-        initial state; NaN where a sample is missing, and then without that fit in the whole record
-        (`_remove_state_errors`)."""
+        initial state; NaN where a sample is missing."""
         all_effects = (*self.model_effects, *effects)
         return tuple(
             self._simulate_from_states(model, all_effects, *record_and_states)[1]
@@ -128,22 +127,23 @@ class Windows:
         structure = build_bodies(
             model, [effect for effect in effects if isinstance(effect.effect.action, Structure)]
         ).structure
+        if not (np.isfinite(residual) | np.isnan(record.measured)).all():  # the simulation diverged
+            return simulated, residual
         return simulated, self._remove_state_errors(structure, residual, recording.sample_rate_hz, window_samples)
 
     def _remove_state_errors(
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, window_samples: int
     ) -> FloatArray:
-        """Compute (n, c): residuals without their projection on the free motions from other initial states, window by
-        window. Unchanged in all windows where any value is missing, or where a simulation or free motion diverges."""
+        """Compute (n, c): residuals, NaN where missing, without their projection on the free motions from other initial
+        states, window by window; unchanged where a free motion diverges."""
         n, c = residual.shape
         # A fit may try an unstable model, whose free motion overflows: its residuals are returned unchanged.
         with np.errstate(over="ignore", invalid="ignore"):
             free_motion = (
                 _compute_free_motion(structure, sample_rate_hz, min(window_samples, n), c) / self.unit[:, None]
             )
-            is_finite = np.isfinite(residual).all() and np.isfinite(np.sum(free_motion**2))
-        if not is_finite:
-            return residual
+            if not np.isfinite(np.sum(free_motion**2)):
+                return residual
         full_windows_end = n // window_samples * window_samples
         projected = residual.copy()
         if full_windows_end:
@@ -229,8 +229,22 @@ def _compute_free_motion(
 
 
 def _project_out(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
-    """Subtract from residuals (windows, samples) their least-squares projection on the columns of free_motion (samples,
-    k), which are normalised first; a column of zeros has no effect."""
+    """Subtract from residuals (windows, samples), NaN where missing, their least-squares projection on the columns of
+    free_motion (samples, k). A window with missing samples is fitted to the others; it stays unchanged where those are
+    fewer than `READINGS_PER_STATE` per column."""
+    projected, is_complete = residual.copy(), np.isfinite(residual).all(axis=1)
+    projected[is_complete] = _project_complete_windows(residual[is_complete], free_motion)
+    for window in np.flatnonzero(~is_complete):
+        is_known = np.isfinite(residual[window])
+        if np.count_nonzero(is_known) >= READINGS_PER_STATE * free_motion.shape[1]:
+            known_residual = residual[window, is_known]
+            projected[window, is_known] = _project_complete_windows(known_residual[None], free_motion[is_known])[0]
+    return projected
+
+
+def _project_complete_windows(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
+    """Do the same as `_project_out` for residuals without missing samples. The columns of free_motion are normalised
+    first; a column of zeros has no effect."""
     column_norms = np.linalg.norm(free_motion, axis=0)
     basis, singular_values, _ = np.linalg.svd(
         free_motion / np.where(column_norms > 0, column_norms, 1.0), full_matrices=False

@@ -8,7 +8,7 @@ takes longest, or rigid bodies where that fails. Tolerances are wide, because un
 parameters. Called by `diagnose_values` and `study.workflows.diagnosis.fit_without_model`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,7 +60,7 @@ FREE_REMARK = (
 
 def fit_first_model(
     recordings: Sequence[Recording],
-    excluded_effects: Sequence[str],
+    excluded_effects: Collection[str],
     time_left: TimeBudget,
     on_progress: Progress,
     map_: Mapper = map,

@@ -101,7 +101,7 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
     if not starts or length < 8:
         return None
     rate_hz = recording.sample_rate_hz
-    transient = not segment.period or starts == [segment.start]
+    transient = length != segment.period or starts == [segment.start]
     spectra = [_compute_spectra(signal.samples, starts, length) for signal in (recording.command, recording.response)]
     excitation = recording.command if recording.excitation is None else recording.excitation
     excitation_norm = np.linalg.norm(_compute_spectra(excitation.samples, starts, length).mean(axis=0), axis=1)

@@ -4,9 +4,12 @@ A daily check compares the friction, gain, response and noise in a recording of 
 recording (the baseline). Called by `study.workflows.checks.daily_check`, and by `hapteq validate` and `hapteq show`.
 """
 
-from dataclasses import asdict, dataclass, fields
+import json
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import read_json, write_json
@@ -50,15 +53,11 @@ def write_daily_check(path: Path, check: DailyCheck) -> None:
 
 def read_daily_check(path: Path) -> DailyCheck:
     """Read the result of a daily check. Raises CannotReadError where the file cannot be read, UnusableFileError where
-    it is of another format or version, lacks a field, or device, utc or passed has a wrong type; other types are not
-    checked."""
-    document = read_json(path, FORMAT, VERSION)
+    it is of another format or version, lacks a field, or a field has a wrong type."""
+    document = read_json(path, FORMAT, VERSION)  # unknown keys, such as the provenance, are ignored
     try:
-        values = {field.name: document[field.name] for field in fields(DailyCheck)}
-        if not isinstance(values["passed"], bool) or not all(
-            isinstance(values[name], str) for name in ("device", "utc")
-        ):
-            raise TypeError("device and utc must be texts, passed true or false")
-        return DailyCheck(**{**values, "sentences": tuple(values["sentences"]), "changes": tuple(values["changes"])})
-    except (KeyError, TypeError) as error:
-        raise UnusableFileError(path, "daily check", (f"it has no proper {error}",)) from error
+        # As JSON, because lists become tuples there even where no other type is converted.
+        return TypeAdapter(DailyCheck).validate_json(json.dumps(document), strict=True)
+    except ValidationError as error:
+        problems = tuple(f"{'.'.join(map(str, issue['loc']))}: {issue['msg']}" for issue in error.errors())
+        raise UnusableFileError(path, "daily check", problems) from error

@@ -7,7 +7,7 @@ with a remedy. Called by `diagnose_recordings` and `study.evaluation.real.diagno
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.free_laws import list_excluded_laws
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fit_without_model
@@ -34,7 +34,7 @@ def fit_first_model(
     share, 0 to 1. discovery: whether laws outside the catalogue are tried. Raises StudyError for unsuitable
     recordings."""
     has_time_left, guard = time_budget_and_guard  # the time limit of the search, and the guard that catches crashes
-    excluded_names = (*excluded_effects, *(() if discovery else FREE_LAWS))
+    excluded_names = list_excluded_laws(excluded_effects, discovery)
 
     def fit_by_balance() -> FirstModel | None:
         """Fit by force balance; None where this gives no model."""

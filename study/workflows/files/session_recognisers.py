@@ -49,14 +49,18 @@ DOCUMENTS = {
 
 def recognise_session(content: FileContent) -> str | None:
     """Recognise a session folder, or a log by its name or by the session format in its first 1000 characters. For a
-    log, the log of its folder (`LOG_NAME`) is replayed, without checks of recordings and tables. Returns the session in
-    words; None for other files. Raises UnusableFileError for a damaged session."""
+    log it is replayed, without checks of recordings and tables. Returns the session in words; None for other files.
+    Raises UnusableFileError for a damaged session, and for a log with another name than `LOG_NAME`: the folder's own
+    log would be replayed in its place."""
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
             return _describe_withdrawn(folder, content.path)
         return _check_session(folder, content.path) if folder.log.exists() else None
     if content.path.name == LOG_NAME or f'"{SESSION_FORMAT}"' in (content.text or "")[:1000]:
+        if content.path.name != LOG_NAME:
+            problem = f"a log is only checked under its name {LOG_NAME} in the folder of its session"
+            raise UnusableFileError(content.path, "session log", (problem,))
         return _describe_session(_replay_log(SessionFolder(content.path.resolve().parent), content.path))
     return None
 

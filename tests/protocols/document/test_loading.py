@@ -298,3 +298,10 @@ def test_nonsense_is_refused_in_words_and_never_crashes(values, kind):
     with pytest.raises(ProtocolError) as caught:
         protocol_from_values({**values, "kind": kind}, "nonsense")
     assert all(problem.key and problem.problem and problem.allowed for problem in caught.value.problems)
+
+
+def test_the_key_of_a_question_may_be_as_long_as_its_description_says(threshold_text):
+    longest = "a" * 40
+    assert load_protocol(changed(threshold_text, 'key = "strategy"', f'key = "{longest}"'), "text")
+    error = refused(changed(threshold_text, 'key = "strategy"', f'key = "{longest}a"'))
+    assert "up to 39 lower-case letters" in error.allowed

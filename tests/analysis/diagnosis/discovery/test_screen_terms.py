@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from analysis.diagnosis.discovery.fit_sum import fit_sum
-from analysis.diagnosis.discovery.grammar import Term
+from analysis.diagnosis.discovery.grammar import Term, measure_axes
 from analysis.diagnosis.discovery.matched_filter import View, build_views
+from analysis.diagnosis.discovery.periodic_terms import find_periodic_terms
 from analysis.diagnosis.discovery.screen_terms import (
     build_normal_equations,
     solve_all_blocks,
@@ -65,3 +66,16 @@ def test_a_frequency_is_found_from_a_start_that_is_out_of_phase_at_the_end(pumpe
     found = fit_sum(build_normal_equations(pumped_view), (term,))
     assert found is not None
     assert found.terms[0].numbers[0] == pytest.approx(3.371, abs=2e-4)
+
+
+def test_pitches_start_within_the_travel_of_a_motion_far_from_zero():
+    t = np.arange(4000) / 500.0
+    x = 0.3 + 0.01 * np.sin(2 * np.pi * 0.7 * t)
+    pitch = 0.004
+    columns = {"x": x, "vx": np.gradient(x, 1 / 500.0), "fx": np.cos(3.0 * t)}
+    (axis,) = measure_axes(columns, 1)
+    terms = find_periodic_terms(columns, axis, 0.5 * np.sin(2 * np.pi * x / pitch), 500.0)
+    in_position = [term for term in terms if "x/p0" in term.shape]
+    for term in in_position:
+        assert term.bounds[0][0] <= term.numbers[0] <= term.bounds[0][1] <= np.ptp(x)
+    assert min(abs(term.numbers[0] / pitch - 1) for term in in_position) < 0.05

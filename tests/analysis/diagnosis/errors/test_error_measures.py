@@ -97,6 +97,22 @@ def test_a_state_is_fitted_even_where_the_windows_begin_wrong(drifting_recording
     assert np.allclose(one[0], other[0], atol=1e-3 * np.abs(one[0]).max())
 
 
+def test_missing_samples_change_only_the_window_they_are_in(drifting_recording: Recording) -> None:
+    measure = make_measure([drifting_recording], make_model()).measure
+    (record,) = measure.records
+    gappy = record.measured.copy()
+    gappy[600:640] = np.nan
+    incomplete = measure.with_records((replace(record, measured=gappy),))
+    (whole,), (partial,) = measure.residuals(make_model(), ()), incomplete.residuals(make_model(), ())
+    window = slice(500, 1000)
+    assert np.isnan(partial[600:640]).all() and np.isfinite(np.delete(partial, np.s_[600:640], axis=0)).all()
+    assert np.delete(partial, window, axis=0) == pytest.approx(np.delete(whole, window, axis=0), nan_ok=True)
+    # The other samples of that window are fitted as well: less is left of them, by the few that are missing.
+    present = np.isfinite(partial[window])
+    ratio = np.sum(partial[window][present] ** 2) / np.sum(whole[window][present] ** 2)
+    assert 0.8 < ratio <= 1
+
+
 def test_what_decisions_see_does_not_hang_on_sealed_samples(
     controlled_recording: Recording, drifting_recording: Recording
 ) -> None:

@@ -15,8 +15,9 @@ from study.cli.main import main
 from study.devices.opening import get_device_folder
 from study.errors import DeviceError
 from study.session.views.participant_views import DeviceFinding, DeviceReport
+from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.provenance import compute_sha256
-from study.store.formats.daily_check_file import DailyCheck, write_daily_check
+from study.store.formats.daily_check_file import DailyCheck, read_daily_check, write_daily_check
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
@@ -171,3 +172,17 @@ def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
         check_on_device(device, replace(plan, out=checks / "2.h5"), QUIET)
     assert "it broke off" in judge_last_check(INFO).value and not judge_last_check(INFO).fine
     assert main(["validate", str(checks / "2.json")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("passed", "yes"), ("utc", 3), ("sentences", "all well"), ("changes", [3]), ("recording", None)]
+)
+def test_a_result_with_a_wrong_type_is_refused_with_the_key(tmp_path, key, value):
+    path = tmp_path / "check.json"
+    check = DailyCheck("omega3", "7", "2026-11-30T00:00:00Z", True, ("All well.",), (), "a.h5", "0", "1")
+    write_daily_check(path, check)
+    assert read_daily_check(path) == check
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(UnusableFileError) as refused:
+        read_daily_check(path)
+    assert refused.value.problems[0].startswith(key)

@@ -8,6 +8,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from protocols.trial import Trial
+from study.session.facts.events import SESSION_FORMAT
 from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import write_json
 from study.store.formats.identified_model_file import write_identified_model
@@ -15,6 +16,7 @@ from study.store.formats.participant_texts import make_language_template
 from study.store.formats.protocol_files import list_shipped_protocols
 from study.store.formats.recording_file import write_recording
 from study.store.formats.thresholds_file import write_thresholds
+from study.store.sessions.event_log import LOG_NAME
 from study.workflows.files.file_content import FileContent
 from study.workflows.files.recognisers import RECOGNISERS
 from study.workflows.files.validate import validate_file
@@ -202,3 +204,9 @@ def test_a_new_format_joins_by_one_function(tmp_path):
 
     path = written(tmp_path / "notes.md", "# Notes\n")
     assert validate_file(path, (*RECOGNISERS, recognise_notes)).kind == "notes"
+
+
+def test_a_log_is_not_checked_under_another_name_by_the_log_of_its_folder(tmp_path):
+    copy = written(tmp_path / "copy.jsonl", f'{{"format": "{SESSION_FORMAT}"}}\n')
+    found = validate_file(copy)
+    assert found.problems == (f"a log is only checked under its name {LOG_NAME} in the folder of its session.",)
