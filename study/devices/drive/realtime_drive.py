@@ -46,8 +46,7 @@ from study.devices.drive.virtual_drive import count_due_ticks
 from study.devices.governor.governor import Governor
 
 READING_TIMEOUT_S = 0.1
-"""Longest wait of a caller for a reading (s). A reading takes well below 1 ms; a busy computer is late by some 10
-ms."""
+"""Longest wait of a caller for a reading (s): a reading takes below 1 ms; a busy computer is late by some 10 ms."""
 
 
 class _Request:
@@ -63,8 +62,7 @@ class ReadingRequests:
     it."""
 
     def __init__(self, clock: Clock, wake: Callable[[], None], timeout_s: float = READING_TIMEOUT_S) -> None:
-        """clock: of the drive; wake: makes the loop's thread check `is_pending`; timeout_s: longest wait of a
-        caller."""
+        """clock: of the drive; wake: makes the loop's thread check `is_pending`; timeout_s: a caller's longest wait."""
         self._clock = clock
         self._wake = wake
         self._timeout_s = timeout_s

@@ -88,11 +88,7 @@ def simulate_power(
         for first_study in range(0, plan.studies, STUDIES_PER_CHUNK)
         if (sample_size, first_study) not in verdicts_by_chunk
     ]
-    finished_count = sum(
-        len(verdicts)
-        for (chunk_sample_size, _), verdicts in verdicts_by_chunk.items()
-        if chunk_sample_size in plan.people
-    )
+    finished_count = sum(len(verdicts_by_chunk[chunk]) for chunk in verdicts_by_chunk if chunk[0] in plan.people)
     on_finished(finished_count)
     for chunk, verdicts in run_tasks(executor, judge_chunk, ((chunk, (plan, chunk)) for chunk in remaining_chunks)):
         verdicts_by_chunk[chunk] = verdicts

@@ -232,25 +232,22 @@ def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
         if folder is None:
             continue
         session_opened = fold_session(folder).state.opened
+        place = f"{folder.name} in {rehearsal.data}"
         if session_opened.equalized is not None and session_opened.equalized.sha256 != model_sha256:
-            raise StudyError(
-                "This folder holds another rehearsal",
-                f"{folder.name} in {rehearsal.data} was begun with another --model.",
-                "Choose another folder with --out, or the same --model to continue.",
-                saved="Nothing was changed.",
-            )
+            raise _make_other_rehearsal_error(place, "another --model", "--model")
         if session_opened.observer != make_rehearsed_observer(rehearsal, number).name:
-            raise StudyError(
-                "This folder holds another rehearsal",
-                f"{folder.name} in {rehearsal.data} was begun with the observer {session_opened.observer}.",
-                "Choose another folder with --out, or the same --observer and --seed to continue.",
-                saved="Nothing was changed.",
-            )
+            raise _make_other_rehearsal_error(place, f"the observer {session_opened.observer}", "--observer and --seed")
         is_same_seed = session_opened.seed == derive_subject_seed(rehearsal.seed, number)
         if not is_same_seed or session_opened.protocol_text != rehearsal.protocol_text:
-            raise StudyError(
-                "This folder holds another rehearsal",
-                f"{folder.name} in {rehearsal.data} was begun with another seed or protocol.",
-                "Choose another folder with --out, or the same --seed and --protocol to continue.",
-                saved="Nothing was changed.",
-            )
+            raise _make_other_rehearsal_error(place, "another seed or protocol", "--seed and --protocol")
+
+
+def _make_other_rehearsal_error(place: str, difference: str, options: str) -> StudyError:
+    """Make the error for a session of another rehearsal. place: its folders; difference: what it was begun with;
+    options: of the command, that must be the same to continue."""
+    return StudyError(
+        "This folder holds another rehearsal",
+        f"{place} was begun with {difference}.",
+        f"Choose another folder with --out, or the same {options} to continue.",
+        saved="Nothing was changed.",
+    )

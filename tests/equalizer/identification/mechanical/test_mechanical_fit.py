@@ -8,7 +8,6 @@ from scipy.linalg import expm
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines
 from equalizer.identification.mechanical.mechanical_response import (
     compute_free_response,
     compute_pole_form,
@@ -299,19 +298,3 @@ def test_a_model_that_runs_away_within_a_sample_answers_with_numbers():
     model = MechanicalModel("thrown", "position", 1e-9 * np.eye(1), np.eye(1), np.eye(1), np.eye(1), np.eye(1))
     thrown = replace(model, damping=-np.eye(1))
     assert np.isfinite(compute_free_response(thrown, np.array([1.0, 70.0]), RATE_HZ)).all()
-
-
-def test_only_complete_periods_after_the_first_are_without_a_transient():
-    rng = np.random.default_rng(4)
-    command = multisine(rng, 3)[:, None]
-    segment = Segment(0, 3000, "multisine", 1.0, 1000, "fit")
-
-    def has_transient(missing):
-        response = command.copy()
-        response[missing] = np.nan
-        return compute_segment_lines(recording(command, response, segments=(segment,)), segment).transient
-
-    assert not has_transient([])
-    assert not has_transient([100, 1100])  # the last period is complete
-    assert has_transient([1100, 2100])  # only the first is
-    assert has_transient([100, 1900, 2950])  # none is: the longest run begins within the first

@@ -1,0 +1,23 @@
+"""Spectra of segments: which of them contain a transient."""
+
+import numpy as np
+
+from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines
+from equalizer.signals.recording import Segment
+from tests.equalizer.identification.mechanical.test_mechanical_fit import multisine, recording
+
+
+def test_only_complete_periods_after_the_first_are_without_a_transient():
+    rng = np.random.default_rng(4)
+    command = multisine(rng, 3)[:, None]
+    segment = Segment(0, 3000, "multisine", 1.0, 1000, "fit")
+
+    def has_transient(missing):
+        response = command.copy()
+        response[missing] = np.nan
+        return compute_segment_lines(recording(command, response, segments=(segment,)), segment).transient
+
+    assert not has_transient([])
+    assert not has_transient([100, 1100])  # the last period is complete
+    assert has_transient([1100, 2100])  # only the first is
+    assert has_transient([100, 1900, 2950])  # none is: the longest run begins within the first
