@@ -1,4 +1,5 @@
-"""Local time of this computer, for texts that people read: app, commands and reports. Logs and data keep UTC."""
+"""Local time of this computer, for texts that people read; logs and data keep UTC. Called by the app (`study.tui`), the
+commands (`study.cli`) and the modules that write reports."""
 
 from datetime import UTC, datetime
 
@@ -6,8 +7,8 @@ from study.session.views.local_time import format_time_in_zone
 
 
 def convert_to_machine_zone(time: datetime) -> datetime:
-    """Convert a moment to the local time of this computer, summer time included. The function is a
-    `study.session.views.local_time.Zone`. A moment without UTC offset is taken as local time.
+    """Convert a moment to the local time of this computer, summer time included. This is a time zone as
+    `study.session.views.local_time.Zone` defines it. A moment without UTC offset is taken as local time.
 
     Raises ValueError, OverflowError or OSError for a moment that cannot be converted.
     """
@@ -15,5 +16,5 @@ def convert_to_machine_zone(time: datetime) -> datetime:
 
 
 def format_local_now() -> str:
-    """Format the present local time, such as "2026-11-22 14:05 +01:00"."""
+    """Format the current local time, such as "2026-11-22 14:05 +01:00"."""
     return format_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)

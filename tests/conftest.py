@@ -230,7 +230,7 @@ def sketched(monkeypatch) -> None:
         svg = f'<svg xmlns="http://www.w3.org/2000/svg" id="{picture.name}"><path d="M0 0L9 9"/></svg>'
         return svg, b"a sketch" if picture.bitmap else b""
 
-    monkeypatch.setattr("study.workflows.picture_files._render_files", sketch)
+    monkeypatch.setattr("study.workflows.picture_files._render_svg_and_png", sketch)
 
 
 @pytest.fixture

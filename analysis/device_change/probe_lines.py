@@ -44,7 +44,7 @@ class ProbeLines:
     """Spectra of the mean period of one probe, as amplitudes: a cosine of 1 N has 1 N."""
 
     frequency_hz: FloatArray
-    """(lines,): all lines between zero and half the sample rate, driven or not."""
+    """(lines,): lines from 1 / period to below half the sample rate, driven or not."""
     driven: npt.NDArray[np.bool_]
     """(lines, axes): whether the probe's multisine drives the axis at the line."""
     force_n: ComplexArray
@@ -52,13 +52,14 @@ class ProbeLines:
     acceleration_mps2: ComplexArray
     """(lines, axes): as measured, in m/s^2."""
     position_m: ComplexArray
-    """(lines, axes): from the encoders, in m; NaN without encoders, or with another number of them than of axes."""
+    """(lines, axes): from the encoders, in m; NaN without encoders, with another number of them than of axes, or with
+    missing samples."""
 
 
 def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     """Compute the spectra of the mean period of a probe; of its first segment where the recording has segments.
-    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples of
-    command or response are missing."""
+    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples of command or
+    response are missing."""
     period_samples = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
     excitation_signal = recording.command if recording.excitation is None else recording.excitation
@@ -102,7 +103,7 @@ def estimate_apparent_mass_kg(probe: ProbeLines) -> float:
         raise ValueError(
             f"it has no driven line between {low_hz:g} and {high_hz:g} Hz, from which the handle's mass is estimated"
         )
-    with np.errstate(divide="ignore", invalid="ignore"):  # a dead sensor reads zero
+    with np.errstate(divide="ignore", invalid="ignore"):  # a disconnected sensor reads zero
         mass_kg = float(
             np.median(
                 (probe.force_n[line_indices, axis_indices] / probe.acceleration_mps2[line_indices, axis_indices]).real
@@ -114,8 +115,8 @@ def estimate_apparent_mass_kg(probe: ProbeLines) -> float:
 
 
 def _compute_mean_spectrum(samples: FloatArray, period_samples: int) -> ComplexArray:
-    """Compute (lines, axes): spectrum of the mean of the last whole periods, lines 1 to below half the sample rate.
-    samples: (n, axes). Raises ValueError where they are shorter than a period."""
+    """Compute (lines, axes): spectrum of the mean period, over all whole periods up to the end, on lines 1 to
+    period_samples // 2 - 1. samples: (n, axes). Raises ValueError where they are shorter than a period."""
     period_count = len(samples) // period_samples
     if not period_count:
         raise ValueError("less than one whole period was recorded")
@@ -134,16 +135,16 @@ def compute_friction_spectra(probes: tuple[ProbeLines, ...], period_samples: int
     over that step and whose acceleration is read at its end; so commands and friction may be added line by line.
     """
     position_m = np.stack([_estimate_position_m(probe, period_samples) for probe in probes], axis=1)
-    step_m = np.diff(position_m, axis=0, append=position_m[:1])
+    displacements_m = np.diff(position_m, axis=0, append=position_m[:1])
     lengths_m = np.array(BREAK_AWAY_LENGTHS_M)[:, None, None]
     friction_n = np.zeros((len(BREAK_AWAY_LENGTHS_M), *position_m.shape[1:]))
     last_period_n = np.zeros((period_samples, *friction_n.shape))
     for sample_index in range(INTEGRATED_PERIODS * period_samples):
-        step = step_m[sample_index % period_samples][None]
-        direction = np.sign(step)
+        displacement_m = displacements_m[sample_index % period_samples][None]
+        direction = np.sign(displacement_m)
         # Exact over a step of constant direction, so that the force never leaves -1 to 1, however long the step.
-        sliding_force = direction - (direction - friction_n) * np.exp(-np.abs(step) / lengths_m)
-        friction_n = np.where(step == 0, friction_n, sliding_force)
+        moving_friction_n = direction - (direction - friction_n) * np.exp(-np.abs(displacement_m) / lengths_m)
+        friction_n = np.where(displacement_m == 0, friction_n, moving_friction_n)
         last_period_n[sample_index % period_samples] = friction_n
     spectrum: ComplexArray = 2 / period_samples * np.fft.rfft(last_period_n, axis=0)[1 : period_samples // 2]
     friction_spectra: ComplexArray = np.moveaxis(spectrum, 0, 2)
@@ -152,7 +153,7 @@ def compute_friction_spectra(probes: tuple[ProbeLines, ...], period_samples: int
 
 def _estimate_position_m(probe: ProbeLines, period_samples: int) -> FloatArray:
     """Estimate the position in m over one period, (period_samples, axes): from the encoders, which are where friction
-    acts; without them, the acceleration integrated twice."""
+    acts; without them, the acceleration integrated twice, above `LOWEST_INTEGRATED_HZ`."""
     frequency_hz = probe.frequency_hz[:, None]
     if np.isfinite(probe.position_m).all():
         position_lines_m = np.where(frequency_hz <= HIGHEST_POSITION_HZ, probe.position_m, 0)

@@ -115,9 +115,11 @@ class LawWords:
     """Words, units and place of a law that the vocabulary lacks."""
 
     words: EffectWords
+    """Its noun, and how its parameters are printed."""
     units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """SI units by parameter, of a translational and of a rotational model."""
     place: Place = "mechanism"
+    """Component at which it acts."""
 
 
 _FORCE, _DAMPING, _STIFFNESS = ("N", "N m"), ("N s/m", "N m s/rad"), ("N/m", "N m/rad")
@@ -231,7 +233,14 @@ def get_parameter_unit(effect: str, parameter: str, system: UnitSystem) -> str:
         linear_unit, rotational_unit = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
         return rotational_unit if system.rotational else system.express(linear_unit)
     catalogue_entry = EFFECTS_BY_NAME.get(effect)
-    units = {} if catalogue_entry is None else {p.name: p.find_unit(system, "1") for p in catalogue_entry.parameters}
+    units = (
+        {}
+        if catalogue_entry is None
+        else {
+            entry_parameter.name: entry_parameter.find_unit(system, "1")
+            for entry_parameter in catalogue_entry.parameters
+        }
+    )
     return units.get(parameter, "1")
 
 
@@ -256,8 +265,8 @@ _PLACE_PHRASES: Mapping[str, tuple[str, str]] = {
 
 def format_parameters(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """Format the parameters of an effect, as "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest". An effect
-    without words for them: its main parameter, or the first one where the vocabulary lacks the effect. A
-    parameter "side" is added as a direction."""
+    without words for them: its main parameter, or the first one where the vocabulary lacks the effect. A parameter
+    "side" is added as a direction."""
     effect_words = _find_words(effect)
     format_by_parameter = dict(effect_words.parameters) if effect_words else {}
     if not format_by_parameter:

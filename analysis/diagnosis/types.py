@@ -1,4 +1,5 @@
-"""Type aliases that all packages of the diagnosis share: masks of samples, parallel maps, progress and time limits."""
+"""Type aliases that the packages of the diagnosis, and the commands that call it, share: masks of samples, parallel
+maps, progress callbacks and time limits."""
 
 from collections.abc import Callable, Iterable
 

@@ -1,5 +1,5 @@
-"""Format physical values for reports: SI prefixes, raised exponents, and as many digits as the confidence interval
-allows. Used by the sentences, tables and figures of a diagnosis.
+"""Format physical values, errors, shares and probabilities for reports: SI prefixes, superscript exponents, and digits
+limited by the confidence interval. Called by the sentences, tables and figures of a diagnosis.
 """
 
 import re
@@ -18,9 +18,9 @@ _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
 _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
 """Units without a prefix; `choose_scale` treats kg and kg m^2 separately."""
 _NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
-"""Units that begin with a reciprocal or a power: a prefix would be raised to it as well."""
+"""Units that are a reciprocal or begin with a power: the power would apply to a prefix as well."""
 _SUPERSCRIPTS = {"^2": "²", "^3": "³"}
-"""Raised exponents by their ASCII notation."""
+"""Superscript exponents by their ASCII notation."""
 _SYMBOLS = {"deg": "°"}
 """Symbols of units that are not shown by their ASCII name."""
 _MOST_DIGITS, _USUAL_DIGITS = 5, 3
@@ -42,8 +42,8 @@ _LEAST_INERTIA = 0.1
 
 
 def choose_scale(unit: str, magnitude: float) -> Scale:
-    """Choose the displayed unit, and the factor from SI to it, for values of about this magnitude (SI). unit: SI in
-    ASCII, such as "m/s^2"."""
+    """Choose the displayed unit, and the factor from SI to it, for values of about this magnitude (SI; of any sign; NaN
+    and infinity count as 0, which has no prefix). unit: SI in ASCII, such as "m/s^2"."""
     absolute_value = abs(magnitude) if np.isfinite(magnitude) else 0.0
     if unit == "kg":
         return Scale(1.0, "kg") if absolute_value >= 1 or absolute_value == 0 else Scale(1e3, "g")
@@ -56,44 +56,47 @@ def choose_scale(unit: str, magnitude: float) -> Scale:
             ),
             _INERTIA_SCALES[-1],
         )
-    in_range = _RANGE_WITHOUT_PREFIX[0] <= absolute_value < _RANGE_WITHOUT_PREFIX[1] and unit not in _ALWAYS_PREFIXED
-    if in_range or absolute_value == 0 or unit in _NEVER_PREFIXED or _NO_PREFIX.match(unit):
+    is_in_plain_range = (
+        _RANGE_WITHOUT_PREFIX[0] <= absolute_value < _RANGE_WITHOUT_PREFIX[1] and unit not in _ALWAYS_PREFIXED
+    )
+    if is_in_plain_range or absolute_value == 0 or unit in _NEVER_PREFIXED or _NO_PREFIX.match(unit):
         return Scale(1.0, typeset_unit(unit))
     # The tolerance is for values that rounding leaves just below a power of 1000.
     factor, prefix = max(
-        (prefixed for prefixed in _PREFIXES if prefixed[0] <= absolute_value * (1 + 1e-9)), default=_PREFIXES[0]
+        (factor_and_prefix for factor_and_prefix in _PREFIXES if factor_and_prefix[0] <= absolute_value * (1 + 1e-9)),
+        default=_PREFIXES[0],
     )
     return Scale(1 / factor, prefix + typeset_unit(unit))
 
 
 def typeset_unit(unit: str) -> str:
-    """Typeset the unit with raised exponents: "m/s^2" gives "m/s²", "1/m" gives "per m", and "1" gives an empty
+    """Typeset the unit with superscript exponents: "m/s^2" gives "m/s²", "1/m" gives "per m", and "1" gives an empty
     string."""
-    text = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
-    for power, raised in _SUPERSCRIPTS.items():
-        text = text.replace(power, raised)
-    return _SYMBOLS.get(text, text)
+    unit_text = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
+    for power, superscript in _SUPERSCRIPTS.items():
+        unit_text = unit_text.replace(power, superscript)
+    return _SYMBOLS.get(unit_text, unit_text)
 
 
 def format_value(value: float, unit: str, ci95: tuple[float, float] | None = None) -> str:
     """Format a value with its 95 % interval, such as "54 µm [49, 60]"; three significant digits without an interval.
     value, ci95: in `unit`, SI."""
     scale = choose_scale(unit, value)
-    scaled = value * scale.factor
+    scaled_value = value * scale.factor
     interval = None if ci95 is None else (ci95[0] * scale.factor, ci95[1] * scale.factor)
-    decimals = _choose_decimals(scaled, interval)
+    decimals = _choose_decimals(scaled_value, interval)
     space = "" if scale.unit in ("", "°") else " "
-    text = f"{_format_number(scaled, decimals)}{space}{scale.unit}"
+    value_text = f"{_format_number(scaled_value, decimals)}{space}{scale.unit}"
     if interval is None:
-        return text
-    return f"{text} [{_format_number(interval[0], decimals)}, {_format_number(interval[1], decimals)}]"
+        return value_text
+    return f"{value_text} [{_format_number(interval[0], decimals)}, {_format_number(interval[1], decimals)}]"
 
 
 def format_percent(share: float, ci95: tuple[float, float] | None = None) -> str:
     """Format a share (0 to 1) as per cent, with its 95 % interval."""
-    text = format_value(100 * share, "1", None if ci95 is None else (100 * ci95[0], 100 * ci95[1]))
-    value, bracket, interval = text.partition(" [")
-    return f"{value} %{bracket}{interval}"
+    formatted_share = format_value(100 * share, "1", None if ci95 is None else (100 * ci95[0], 100 * ci95[1]))
+    value_text, bracket, interval_text = formatted_share.partition(" [")
+    return f"{value_text} %{bracket}{interval_text}"
 
 
 def format_error(error: float | None) -> str:
@@ -131,8 +134,8 @@ def _choose_decimals(value: float, interval: tuple[float, float] | None) -> int:
 
 
 def _format_number(value: float, decimals: int) -> str:
-    """Format the value with this number of decimals; in exponent notation from 1e6 on, or with more than five
-    decimals."""
+    """Format the value with this number of decimals; with three significant digits in exponent notation for a magnitude
+    from 1e6 on or more than five decimals (limits chosen)."""
     if value and (abs(value) >= 1e6 or decimals > 5):
         return typeset(f"{value:.3g}")
     return typeset(f"{value:.{decimals}f}")

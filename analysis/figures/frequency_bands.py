@@ -21,14 +21,15 @@ from equalizer.identification.frequency_response.frequency_bands import Frequenc
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.octave_bins import average_octave_bins
 
-_COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
+_BAND_COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
 """Colour of each frequency band, by its name."""
 _HALF_HEIGHT, _EXTRA_HALF_HEIGHT = 0.4, 0.35
-"""Half the height of a row, and additional half height of the row of control methods, in units of the ordinate."""
+"""Half the height of a row, and additional half height of the row of control methods, in units of the ordinate. Chosen
+by hand."""
 _LETTERS_PER_AXES = 110
-"""Approximate number of letters that fit into the width of the axes, for line breaks."""
-_Shade = tuple[str, float]
-"""Colour and opacity (0 to 1) of a bar."""
+"""Approximate number of letters that fit into the width of the axes, for line breaks. Chosen by hand."""
+_Fill = tuple[str, float]
+"""Fill of a bar: colour and opacity (0 to 1)."""
 
 
 def make_frequency_bands_picture(
@@ -50,7 +51,8 @@ def make_frequency_bands_picture(
 def draw_frequency_bands(
     response: FrequencyResponse, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float
 ) -> Figure:
-    """Draw the measured coupling above, and perception and control by band below, over a logarithmic frequency axis."""
+    """Draw the measured coupling above, and perception and control by band below, over a logarithmic frequency axis.
+    Parameters: as for `make_frequency_bands_picture`."""
     figure = create_figure(8.6, 4.6)
     coupling_axes, band_axes = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1])
     lowest_hz, highest_hz = bands[0].low_hz, bands[-1].high_hz
@@ -91,7 +93,7 @@ def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset
 
 
 def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
-    """Mark the onset of coupling, with its confidence interval as a shade."""
+    """Mark the onset of coupling at `frequency_hz`, with its confidence interval, if known, as a shade."""
     threshold_percent = 100 * onset.threshold
     if onset.interval_hz is not None:
         axes.axvspan(*onset.interval_hz, color=VERMILLION, alpha=0.3, linewidth=0)
@@ -106,15 +108,15 @@ def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
 def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float) -> None:
     """Draw three rows of bars: coupling of the device, direction perception, control method by band."""
     lowest_hz, highest_hz = bands[0].low_hz, bands[-1].high_hz
-    coupled_hz = highest_hz if onset.frequency_hz is None else min(max(onset.frequency_hz, lowest_hz), highest_hz)
-    _draw_bar(axes, 2, (lowest_hz, coupled_hz), "axes hardly couple", (GREY, 0.18))
-    _draw_bar(axes, 2, (coupled_hz, highest_hz), "axes couple", (GREY, 0.45))
+    onset_hz = highest_hz if onset.frequency_hz is None else min(max(onset.frequency_hz, lowest_hz), highest_hz)
+    _draw_bar(axes, 2, (lowest_hz, onset_hz), "axes hardly couple", (GREY, 0.18))
+    _draw_bar(axes, 2, (onset_hz, highest_hz), "axes couple", (GREY, 0.45))
     _draw_bar(axes, 1, (lowest_hz, direction_limit_hz), "directions are felt", (ORANGE, 0.45))
     _draw_bar(axes, 1, (direction_limit_hz, highest_hz), "hardly felt", (ORANGE, 0.18))
     for band in bands:
         letters_per_line = int(_LETTERS_PER_AXES * np.log(band.high_hz / band.low_hz) / np.log(highest_hz / lowest_hz))
         label = f"{band.name}\n{fill(band.method, max(letters_per_line, 10))}"
-        _draw_bar(axes, 0, (band.low_hz, band.high_hz), label, (_COLOURS[band.name], 0.35))
+        _draw_bar(axes, 0, (band.low_hz, band.high_hz), label, (_BAND_COLOURS[band.name], 0.35))
     axes.set_yticks([2, 1, -_EXTRA_HALF_HEIGHT], ["Device", "Person", "Driven by"])
     axes.set_ylim(-1.2, 2.5)
     axes.tick_params(axis="y", length=0)
@@ -122,13 +124,13 @@ def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand],
         axes.spines[spine_side].set_visible(False)
 
 
-def _draw_bar(axes: Axes, row: int, band_hz: tuple[float, float], label: str, colour: _Shade) -> None:
+def _draw_bar(axes: Axes, row: int, band_hz: tuple[float, float], label: str, fill_style: _Fill) -> None:
     """Draw a labelled bar over a frequency band; none for an empty band. row: ordinate; 0 is the taller row of
     methods."""
     low_hz, high_hz = band_hz
     if high_hz <= low_hz:
         return
     half_height = _HALF_HEIGHT + (_EXTRA_HALF_HEIGHT if row == 0 else 0.0)
-    middle = row - (_EXTRA_HALF_HEIGHT if row == 0 else 0.0)
-    axes.fill_between([low_hz, high_hz], middle - half_height, middle + half_height, color=colour, linewidth=0)
-    axes.text(float(np.sqrt(low_hz * high_hz)), middle, label, ha="center", va="center", fontsize=8.5, linespacing=1.1)
+    centre = row - (_EXTRA_HALF_HEIGHT if row == 0 else 0.0)
+    axes.fill_between([low_hz, high_hz], centre - half_height, centre + half_height, color=fill_style, linewidth=0)
+    axes.text(float(np.sqrt(low_hz * high_hz)), centre, label, ha="center", va="center", fontsize=8.5, linespacing=1.1)

@@ -1,7 +1,7 @@
 """Figures of a recording before any model is fitted: time series, spectra, coherence, levels, derivatives.
 
-Called by `look_report`. They show the values of `analysis.look.overview.Overview`; each figure is drawn only where the
-recording has its data.
+They show the values of `analysis.look.overview.Overview`; each figure is drawn only where the recording has its data.
+Called by `analysis.reports.look_report`.
 """
 
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 
 ENVELOPE_COLUMNS = 1200
-"""Columns of a drawn time series, each from its lowest to its highest sample. The numbers of this module are chosen by
-hand."""
+"""Largest number of columns of a drawn time series, each from its lowest to its highest sample. The numbers of this
+module are chosen by hand."""
 SHOWN_SAMPLES = 600
-"""Samples that are shown where two time series are compared."""
+"""Number of samples that are shown where two time series are compared."""
 _FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 """Background colours of samples to fit, of samples to test, and of the driven band."""
 _SHOWN_DECADES = 8
@@ -34,18 +34,18 @@ _ROLE_COLOURS = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "pos
 """Colour of a channel by its role."""
 
 
-def make_look_pictures(overview: Overview, number: int) -> tuple[Picture, ...]:
-    """Make all figures of one recording; in samples instead of seconds where its time axis is unknown. number: number
-    of the recording on the page, from 1, for the names of the pictures."""
-    pictures = [_make_signals_picture(overview, f"signals-{number}")]
+def make_look_pictures(overview: Overview, recording_number: int) -> tuple[Picture, ...]:
+    """Make all figures of one recording; in samples instead of seconds where its time axis is unknown.
+    recording_number: its number on the page, from 1, for the names of the pictures."""
+    pictures = [_make_signals_picture(overview, f"signals-{recording_number}")]
     if overview.spectra is not None:
-        pictures.append(_make_spectra_picture(overview, f"spectra-{number}"))
+        pictures.append(_make_spectra_picture(overview, f"spectra-{recording_number}"))
     if overview.coherences:
-        pictures.append(_make_coherence_picture(overview, f"coherence-{number}"))
+        pictures.append(_make_coherence_picture(overview, f"coherence-{recording_number}"))
     if len(overview.levels) > 2:
-        pictures.append(_make_levels_picture(overview, f"levels-{number}"))
+        pictures.append(_make_levels_picture(overview, f"levels-{recording_number}"))
     if overview.pairs:
-        pictures.append(_make_derivatives_picture(overview, f"derivatives-{number}"))
+        pictures.append(_make_derivatives_picture(overview, f"derivatives-{recording_number}"))
     return tuple(pictures if overview.recording.is_timed else map(convert_to_sample_units, pictures))
 
 
@@ -60,7 +60,7 @@ def _make_channel_panels(overview: Overview, height_in: float) -> tuple[Figure, 
 
 
 def _make_signals_picture(overview: Overview, name: str) -> Picture:
-    """Draw the time series of all channels, with the samples to fit and to test, and the boundaries of parts."""
+    """Make the picture of the time series of all channels, with the samples to fit and to test, and gaps in time."""
     figure, axes = _make_channel_panels(overview, 1.15)
     rate_hz = overview.recording.sample_rate_hz
     for channel, panel in zip(overview.channels, axes, strict=True):
@@ -86,11 +86,11 @@ def _make_signals_picture(overview: Overview, name: str) -> Picture:
 
 
 def compute_envelope(
-    samples: FloatArray, rate_hz: float, columns: int = ENVELOPE_COLUMNS
+    samples: FloatArray, rate_hz: float, most_columns: int = ENVELOPE_COLUMNS
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute start times (s), lowest and highest samples of equal stretches, (k,) each, k at most `columns`. Missing
-    samples (NaN) are ignored."""
-    starts = np.unique(np.linspace(0, len(samples), min(columns, len(samples)), endpoint=False).astype(int))
+    """Compute start times (s), lowest and highest samples of equally long columns, (k,) each, k at most `most_columns`;
+    each range is extended to touch that of the column before. Missing samples (NaN) are ignored."""
+    starts = np.unique(np.linspace(0, len(samples), min(most_columns, len(samples)), endpoint=False).astype(int))
     low = np.fmin.reduceat(samples, starts)
     high = np.fmax.reduceat(samples, starts)
     # Each column is extended to touch the one before it, so that steep curves have no gaps.
@@ -99,22 +99,29 @@ def compute_envelope(
 
 
 def _make_spectra_picture(overview: Overview, name: str) -> Picture:
-    """Draw the amplitude densities of all channels, in their units per root hertz."""
+    """Make the picture of the amplitude densities of all channels, in their units per √Hz."""
     assert overview.spectra is not None
     figure, axes = _make_channel_panels(overview, 1.25)
     frequency_hz = overview.spectra.frequency_hz
-    for k, (channel, panel) in enumerate(zip(overview.channels, axes, strict=True)):
-        amplitude = np.sqrt(overview.spectra.get_power_density(k))
+    for channel_index, (channel, panel) in enumerate(zip(overview.channels, axes, strict=True)):
+        amplitude_density = np.sqrt(overview.spectra.get_power_density(channel_index))
         if np.nanmin(channel.samples) == np.nanmax(channel.samples):
             panel.text(0.5, 0.5, "constant", transform=panel.transAxes, ha="center", fontsize=9, color=GREY)
             continue
-        panel.plot(frequency_hz, np.where(amplitude > 0, amplitude, np.nan), color=_ROLE_COLOURS[channel.role], lw=1.0)
+        panel.plot(
+            frequency_hz,
+            np.where(amplitude_density > 0, amplitude_density, np.nan),
+            color=_ROLE_COLOURS[channel.role],
+            lw=1.0,
+        )
         panel.set_yscale("log")
-        if amplitude.max() > 0:
-            largest_amplitude = float(amplitude.max())
+        if amplitude_density.max() > 0:
+            largest_density = float(amplitude_density.max())
             panel.set_ylim(
-                max(0.5 * float(amplitude[amplitude > 0].min()), largest_amplitude * 10.0**-_SHOWN_DECADES),
-                2 * largest_amplitude,
+                max(
+                    0.5 * float(amplitude_density[amplitude_density > 0].min()), largest_density * 10.0**-_SHOWN_DECADES
+                ),
+                2 * largest_density,
             )
         _shade_bands(panel, overview)
     axes[0].set_xscale("log")
@@ -132,7 +139,7 @@ def _make_spectra_picture(overview: Overview, name: str) -> Picture:
 
 
 def _shade_bands(panel: Axes, overview: Overview) -> None:
-    """Shade from the lowest to the highest driven frequency."""
+    """Shade from the lowest to the highest driven frequency, where any is driven."""
     if overview.bands:
         low_hz, high_hz = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
         panel.axvspan(low_hz, high_hz, color=_BAND_COLOUR, zorder=0)
@@ -146,19 +153,19 @@ def _select_band_lines(overview: Overview) -> Mask:
 
 
 def _make_coherence_picture(overview: Overview, name: str) -> Picture:
-    """Draw the multiple coherence of each response with all commands; faint outside the driven band."""
+    """Make the picture of the multiple coherence of each response with all commands; faint outside the driven band."""
     assert overview.spectra is not None
     figure = create_figure(8.6, 3.0)
     panel = figure.subplots()
     style_axes(panel)
     _shade_bands(panel, overview)
-    for k, coherence in enumerate(overview.coherences):
-        colour = COLOURS[k % len(COLOURS)]
+    for response_index, coherence in enumerate(overview.coherences):
+        colour = COLOURS[response_index % len(COLOURS)]
         panel.plot(overview.spectra.frequency_hz, coherence.multiple, color=colour, lw=0.7, alpha=0.3)
-        in_band = _select_band_lines(overview)
+        is_in_band = _select_band_lines(overview)
         panel.plot(
-            overview.spectra.frequency_hz[in_band],
-            coherence.multiple[in_band],
+            overview.spectra.frequency_hz[is_in_band],
+            coherence.multiple[is_in_band],
             color=colour,
             lw=1.3,
             label=coherence.response,
@@ -180,29 +187,30 @@ def _make_coherence_picture(overview: Overview, name: str) -> Picture:
 
 
 def _make_levels_picture(overview: Overview, name: str) -> Picture:
-    """Draw the rms of each command and response by segment, relative to its largest: curves of a linear device
-    coincide."""
+    """Make the picture of the rms of each command and response by segment, relative to its largest; for a linear device
+    the curves coincide."""
     figure = create_figure(8.6, 3.2)
     panel = figure.subplots()
     style_axes(panel)
-    numbers = [level.number for level in overview.levels]
-    largest_rms = [max(level.rms[k] for level in overview.levels) for k in range(len(overview.channels))]
+    segment_numbers = [level.number for level in overview.levels]
+    largest_rms = [max(level.rms[column] for level in overview.levels) for column in range(len(overview.channels))]
     drawn_channels = [
-        k
-        for k, channel in enumerate(overview.channels)
-        if channel.role in ("command", "response") and largest_rms[k] > 0
+        column
+        for column, channel in enumerate(overview.channels)
+        if channel.role in ("command", "response") and largest_rms[column] > 0
     ]
-    for position, k in enumerate(drawn_channels):
-        relative_rms = np.array([level.rms[k] for level in overview.levels]) / largest_rms[k]
+    for curve_index, column in enumerate(drawn_channels):
+        relative_rms = np.array([level.rms[column] for level in overview.levels]) / largest_rms[column]
         panel.plot(
-            numbers,
+            segment_numbers,
             np.where(relative_rms > 0, relative_rms, np.nan),
-            color=COLOURS[position % len(COLOURS)],
-            marker=MARKERS[position % len(MARKERS)],
+            color=COLOURS[curve_index % len(COLOURS)],
+            marker=MARKERS[curve_index % len(MARKERS)],
             markersize=5,
             linewidth=0.8,
-            linestyle=":" if overview.channels[k].role == "command" else "-",
-            label=f"{overview.channels[k].label} ({_format_unit(overview.channels[k].format(largest_rms[k]))})",
+            linestyle=":" if overview.channels[column].role == "command" else "-",
+            label=f"{overview.channels[column].label} "
+            f"({_format_unit(overview.channels[column].format(largest_rms[column]))})",
         )
     panel.set_ylim(0, 1.05)
     panel.set_xlabel("Segment", fontsize=10)
@@ -220,7 +228,7 @@ def _make_levels_picture(overview: Overview, name: str) -> Picture:
 
 
 def _make_derivatives_picture(overview: Overview, name: str) -> Picture:
-    """Draw recorded velocities or accelerations compared with the differentiated signals of the same motion."""
+    """Make the picture of recorded velocities or accelerations and the differentiated signals of the same motion."""
     pairs = overview.pairs
     figure = create_figure(8.6, 0.8 + 1.9 * len(pairs))
     axes = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
@@ -244,12 +252,12 @@ def _make_derivatives_picture(overview: Overview, name: str) -> Picture:
 def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
     """Draw a recorded channel, and central differences of the channel whose derivative it should be."""
     rate_hz = overview.recording.sample_rate_hz
-    by_label = {channel.label: channel for channel in overview.channels}
-    recorded = by_label[pair.derivative]
+    channels_by_label = {channel.label: channel for channel in overview.channels}
+    recorded = channels_by_label[pair.derivative]
     start, stop = _find_most_varying_part(recorded, overview.stretches)
     times_s = np.arange(start, stop) / rate_hz
     # Differences within this stretch only: positions jump where two parts of a recording meet.
-    differences = differentiate(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
+    differences = differentiate(channels_by_label[pair.place].samples[start:stop], pair.order, rate_hz)
     style_axes(panel)
     panel.plot(times_s, recorded.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
     panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
@@ -260,19 +268,19 @@ def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
 
 
 def _find_most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
-    """Find first and end sample of the `SHOWN_SAMPLES` samples (or fewer, in a shorter stretch) in which the channel's
-    variance is largest; missing samples count as the mean."""
-    largest_variance, best_part = -1.0, stretches[0]
+    """Find first and end sample (exclusive) of the `SHOWN_SAMPLES` successive samples, or of a whole shorter stretch,
+    in which the channel's variance is largest; missing samples count as the mean."""
+    largest_variance, most_varying_part = -1.0, stretches[0]
     for start, stop in stretches:
         centred = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
         length = min(SHOWN_SAMPLES, len(centred))
-        sums, sums_of_squares = (np.concatenate([[0.0], np.cumsum(values)]) for values in (centred, centred**2))
+        sums, sums_of_squares = (np.concatenate([[0.0], np.cumsum(summands)]) for summands in (centred, centred**2))
         mean = (sums[length:] - sums[:-length]) / length
         variance = (sums_of_squares[length:] - sums_of_squares[:-length]) / length - mean**2
         if variance.max() > largest_variance:
-            first = start + int(np.argmax(variance))
-            largest_variance, best_part = float(variance.max()), (first, first + length)
-    return best_part
+            first_sample = start + int(np.argmax(variance))
+            largest_variance, most_varying_part = float(variance.max()), (first_sample, first_sample + length)
+    return most_varying_part
 
 
 def _format_unit(unit: str) -> str:

@@ -29,7 +29,7 @@ def make_model_order_picture(report: OrderReport, chosen_order: int) -> Picture:
 
 def draw_model_order(report: OrderReport, chosen_order: int) -> Figure:
     """Draw the singular values (left), and errors and multiplications by order (right). chosen_order: order of the
-    identified model."""
+    identified model, a vertical line."""
     figure = create_figure(8.6, 3.2)
     left_axes, right_axes = figure.subplots(1, 2)
     _draw_singular_values(left_axes, report)
@@ -40,13 +40,13 @@ def draw_model_order(report: OrderReport, chosen_order: int) -> Figure:
 def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
     """Draw the singular values in units of the noise; those of the first `visible_order` states are filled."""
     style_axes(axes)
-    values = report.singular_values
-    state_numbers = np.arange(1, len(values) + 1)
+    singular_values = report.singular_values
+    state_numbers = np.arange(1, len(singular_values) + 1)
     is_visible = state_numbers <= report.visible_order
-    axes.semilogy(state_numbers[is_visible], values[is_visible], "o", color=BLUE, markersize=4, label="seen")
+    axes.semilogy(state_numbers[is_visible], singular_values[is_visible], "o", color=BLUE, markersize=4, label="seen")
     axes.semilogy(
         state_numbers[~is_visible],
-        values[~is_visible],
+        singular_values[~is_visible],
         "o",
         color=GREY,
         markersize=4,

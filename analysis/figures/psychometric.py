@@ -45,13 +45,13 @@ _LARGEST_MARKER_TRIALS = 100
 
 
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
-    """Draw all people together, one panel per frequency, over the level in dB re each person's threshold. answers: at
-    least one."""
+    """Draw all people together, one panel per frequency, over the level in dB re each person's threshold. answers: of
+    at least one trial."""
     frequency_count = len(fit.frequencies_hz)
     figure, panels = create_panel_grid(frequency_count, _ROW_HEIGHT_IN, sharex=True)
     shares_by_frequency = [compute_group_shares(answers, fit, index) for index in range(frequency_count)]
-    levels = [share.level_db for shares in shares_by_frequency for share in shares]
-    level_re_threshold_db = np.linspace(min(levels) - 1.0, max(levels) + 1.0, 200)
+    levels_db = [share.level_db for shares in shares_by_frequency for share in shares]
+    level_re_threshold_db = np.linspace(min(levels_db) - 1.0, max(levels_db) + 1.0, 200)
     for index, (axes, shares) in enumerate(zip(panels, shares_by_frequency, strict=False)):
         _draw_shares(axes, [share.level_db for share in shares], shares)
         axes.plot(
@@ -74,8 +74,8 @@ def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
 
 
 def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: float) -> Figure:
-    """Draw one person, one panel per frequency with answers, over the level in newtons; a note without answers. person:
-    index in `answers`. cap_n: cap of the level, a dashed line."""
+    """Draw one person, one panel per frequency with answers, over the level in newtons; the figure contains a note
+    where there are no answers. person: index in `answers`. cap_n: cap of the level, a dashed line."""
     estimate, frequency_count = fit.persons[person], len(fit.frequencies_hz)
     answered_frequencies = [
         (index, shares) for index in range(frequency_count) if (shares := compute_person_shares(answers, person, index))
@@ -86,11 +86,11 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
     for axes, (index, shares) in zip(panels, answered_frequencies, strict=False):
         levels_n = [10.0 ** (share.level_db / 20.0) for share in shares]
         low_n, high_n = 0.8 * min(levels_n), 1.15 * max(*levels_n, cap_n)
-        level_n = np.geomspace(low_n, high_n, 200)
-        level_re_threshold_db = 20.0 * np.log10(level_n) - to_db(estimate.thresholds_n[index])
+        curve_levels_n = np.geomspace(low_n, high_n, 200)
+        level_re_threshold_db = 20.0 * np.log10(curve_levels_n) - to_db(estimate.thresholds_n[index])
         _draw_shares(axes, levels_n, shares)
         axes.plot(
-            level_n,
+            curve_levels_n,
             100 * evaluate_person_curve(level_re_threshold_db, estimate, fit),
             color=BLACK,
             linewidth=1.4,
@@ -113,8 +113,8 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
 
 
 def _draw_shares(axes: Axes, levels: Sequence[float], shares: Sequence[ObservedShare]) -> None:
-    """Draw shares in percent at these levels (N or dB), with their intervals and a dotted line at the threshold's
-    share."""
+    """Draw shares in percent at these levels (N or dB), with their intervals and a dotted line at
+    `TARGET_PROPORTION`, the share at the threshold."""
     style_axes(axes)
     axes.axhline(100 * TARGET_PROPORTION, color=GREY, linestyle=":", linewidth=1.0)
     for level, share in zip(levels, shares, strict=True):
@@ -125,10 +125,10 @@ def _draw_shares(axes: Axes, levels: Sequence[float], shares: Sequence[ObservedS
     axes.set_yticks([0, 25, 50, 75, 100])
 
 
-def _compute_marker_size(trials: int) -> float:
+def _compute_marker_size(trial_count: int) -> float:
     """Compute the marker size in points: it rises with the square root of the trials up to `_LARGEST_MARKER_TRIALS`."""
     return _SMALLEST_MARKER + (_LARGEST_MARKER - _SMALLEST_MARKER) * math.sqrt(
-        min(1.0, trials / _LARGEST_MARKER_TRIALS)
+        min(1.0, trial_count / _LARGEST_MARKER_TRIALS)
     )
 
 
@@ -136,8 +136,10 @@ def _make_legend_handles(curve_label: str) -> list[Line2D]:
     """Make the handles of the legend. curve_label: text for the fitted curve."""
     return [
         *(
-            Line2D([], [], marker="o", color=BLUE, linewidth=0.8, markersize=_compute_marker_size(trials), label=label)
-            for trials, label in (
+            Line2D(
+                [], [], marker="o", color=BLUE, linewidth=0.8, markersize=_compute_marker_size(trial_count), label=label
+            )
+            for trial_count, label in (
                 (5, "5 trials, 95 % interval"),
                 (_LARGEST_MARKER_TRIALS, f"{_LARGEST_MARKER_TRIALS} trials or more"),
             )

@@ -1,8 +1,8 @@
 """Figure of a participant's staircases: one panel per run, the level (N, logarithmic) over the number of the trial.
 
-Dots and crosses are right and wrong answers, rings are reversals; the threshold averages the levels at the last of
-them (black rings), or is the mean of Psi's posterior. A dashed line is the cap, the highest level allowed.
-`analysis.figures.study_pictures` puts it into a study report.
+Dots and crosses are right and wrong answers, rings are reversals. The threshold is the mean of the levels at the last
+reversals (black rings), or, for the Psi method, the mean of the posterior. A dashed line is the cap, the highest level
+allowed. Called by `analysis.figures.study_pictures`.
 """
 
 from collections.abc import Sequence
@@ -34,17 +34,17 @@ _PANEL_ROW_HEIGHT_IN = 2.2
 
 
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
-    """Draw one panel per run, ordered by frequency, session and run; a note where there is no run. runs: of a single
-    participant; rule: their staircase rule."""
+    """Draw one panel per run, ordered by frequency, session and run; the figure contains a note where there is no run.
+    runs: of a single participant. rule: their staircase rule."""
     if not runs:
         return draw_no_data_note(create_figure(PAGE_WIDTH_IN, 2.0), "There is no run to draw.")
-    lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
+    axis_minimum_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
     ordered_runs = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
     figure, panels = create_panel_grid(len(ordered_runs), _PANEL_ROW_HEIGHT_IN)
     for panel, run in zip(panels, ordered_runs, strict=False):
         _draw_staircase(panel, run, rule)
-        panel.set_ylim(lowest_n, 1.25 * rule.cap_n)
-        set_newton_ticks(panel.yaxis, lowest_n, rule.cap_n)
+        panel.set_ylim(axis_minimum_n, 1.25 * rule.cap_n)
+        set_newton_ticks(panel.yaxis, axis_minimum_n, rule.cap_n)
     label_panel_axes(panels, len(ordered_runs), "Trial", "Level (N)")
     panels[-1].legend(handles=_make_legend_handles(rule), loc="center", fontsize=8.5, frameon=False)
     return figure

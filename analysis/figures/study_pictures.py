@@ -8,7 +8,7 @@ Called by `study.workflows.results.analyze_data` and `reproduction_pictures`; ex
 import re
 from collections.abc import Sequence
 
-from analysis.figures.delivered import draw_delivered
+from analysis.figures.delivered_acceleration import draw_delivered_acceleration
 from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.medians import draw_medians
 from analysis.figures.picture import Picture
@@ -173,7 +173,7 @@ def _make_delivered_picture(analysis: StudyAnalysis) -> Picture:
         caption="Amplitude at the stimulus frequency, measured in every counted trial, along and off the direction of "
         "the stimulus; all participants. Points off the line mark levels or trials where the device did not follow "
         "in proportion; the distance between the two kinds is the coupling.",
-        figure=draw_delivered(analysis.trials),
+        figure=draw_delivered_acceleration(analysis.trials),
     )
 
 

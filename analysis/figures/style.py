@@ -1,8 +1,6 @@
-"""Common style of all figures: colours that colour-blind readers can distinguish, and redundant markers.
+"""Common style of all figures: a palette for colour-blind readers, markers, ticks, panel grids and sizes.
 
-Every module of `analysis.figures` creates its figures and axes with these functions.
-
-Palette: M. Okabe, K. Ito, Color Universal Design (2008).
+Called by the drawing modules of `analysis.figures`. Palette: M. Okabe, K. Ito, Color Universal Design (2008).
 """
 
 import numpy as np
@@ -17,9 +15,9 @@ WINE, OLIVE, TEAL = "#882255", "#999933", "#117766"
 COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK, WINE, OLIVE, TEAL)
 """Ten colours, for the ten participants of the published study; the last three after P. Tol's muted scheme."""
 MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
-"""As many as colours, so that participants differ without colour, too."""
+"""Markers, as many as colours, so that participants can be distinguished without colour."""
 CENSORED_MARKER = "$\\uparrow$"
-"""An arrow above the participant's own marker: the cap (largest level) limited this threshold."""
+"""Marker in legends for a threshold that the cap (largest level) limited: an arrow upwards."""
 _TICK_MULTIPLES = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
 """Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. Chosen by hand."""
 
@@ -50,13 +48,13 @@ def choose_colour(participant_index: int) -> str:
 
 
 def choose_marker(participant_index: int) -> str:
-    """Return the marker of a participant by index from 0, so that participants differ in a grey print, too."""
+    """Return the marker of a participant by index from 0; markers recur after the last of `MARKERS`."""
     return MARKERS[participant_index % len(MARKERS)]
 
 
 def create_panel_grid(panel_count: int, height_in: float, sharex: bool = False) -> tuple[Figure, list[Axes]]:
-    """Create a page-wide figure of up to three columns, and its axes row by row: at least one more than panels, for the
-    legend; axes without a panel are switched off. height_in: height of a row of panels (inches)."""
+    """Create a page-wide figure of up to three columns; returns it and its axes row by row, at least one more than
+    panels, for the legend. Axes without a panel are switched off. height_in: height of a row of panels (inches)."""
     column_count = min(3, panel_count + 1)
     row_count = -(-(panel_count + 1) // column_count)
     figure = create_figure(PAGE_WIDTH_IN, height_in * row_count)
@@ -88,8 +86,8 @@ def set_newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
 
 
 def set_ratio_ticks(axis: Axis, low: float, high: float) -> None:
-    """Set ticks from low to high on a logarithmic axis, at the multiples of powers of ten of `_TICK_MULTIPLES`: fewer
-    of them the more decades there are. Call after the scale is set."""
+    """Set ticks from low to high (both > 0) on a logarithmic axis, at the multiples of powers of ten of
+    `_TICK_MULTIPLES`, fewer for more decades. Call after the scale is set."""
     decades = np.log10(high / low)
     tick_multiples = next(
         candidate_multiples for most_decades, candidate_multiples in _TICK_MULTIPLES if decades <= most_decades
@@ -102,8 +100,8 @@ def set_ratio_ticks(axis: Axis, low: float, high: float) -> None:
 
 
 def format_power_of_ten(value: float) -> str:
-    """Format a power of ten as text, such as "10⁻³" for 0.001; other values are rounded to one, and 0 or less is empty.
-    Without matplotlib's mathtext, whose first use takes a second."""
+    """Format a value, rounded to a power of ten, as text, such as "10⁻³" for 0.001; empty for 0 or less. Plain text,
+    because the first use of Matplotlib's mathtext takes a second."""
     return "10" + f"{np.log10(value):.0f}".translate(_SUPERSCRIPTS) if value > 0 else ""
 
 

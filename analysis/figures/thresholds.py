@@ -1,7 +1,7 @@
 """Figure of individual thresholds and group means by frequency (the published figure 2).
 
 Thresholds that the cap cut (censored) are hollow with an arrow upwards; runs that the trial limit stopped have no
-threshold and are drawn above the cap. Called by `study_pictures`; `thresholds_by_unit` and `medians` use
+threshold and are drawn above the cap. Called by `study_pictures`; `thresholds_by_unit` and `medians` call
 `draw_threshold` alone.
 """
 
@@ -25,9 +25,9 @@ from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
 
 _MARKER_SPREAD_TICKS = 0.5
-"""Width over which the participants' markers are spread at each frequency, in distances between ticks."""
+"""Width over which the participants' markers are spread at each frequency, in distances between ticks. Chosen."""
 _LARGEST_LEGEND = 24
-"""Largest number of participants for which the legend lists each one; with more it lists none."""
+"""Largest number of participants for which the legend lists each one; with more it lists none. Chosen."""
 _STOPPED_RUN_HEIGHT = 1.07
 """Height at which stopped runs are drawn, as a multiple of the cap: chosen between the cap and the end of the axis."""
 
@@ -35,9 +35,8 @@ _STOPPED_RUN_HEIGHT = 1.07
 def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> Figure:
     """Draw each participant's thresholds, joined by a line, and the group mean with its comparison interval.
 
-    table: thresholds in newtons; a figure with a note where it has no participant. comparisons: of the same table;
-    where it has no intervals, means are drawn without.
-    cap_n: largest force of the study (N), drawn as a line.
+    table: thresholds in newtons; where it has no participant, the figure contains a note. comparisons: of the same
+    table; without intervals, means are drawn alone. cap_n: largest force of the study (N), a dashed line.
     """
     figure = create_figure(PAGE_WIDTH_IN, 4.2)
     if not table.subjects:
@@ -52,7 +51,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     _draw_participants(axes, table)
     _draw_stopped_runs(axes, table, cap_n)
     _draw_means(axes, table, comparisons)
-    axes.set_xticks(range(len(table.frequencies_hz)), [f"{f:g}" for f in table.frequencies_hz])
+    axes.set_xticks(range(len(table.frequencies_hz)), [f"{frequency_hz:g}" for frequency_hz in table.frequencies_hz])
     axes.set_xlim(-0.6, len(table.frequencies_hz) - 0.4)
     axes.set_ylim(0, 1.15 * cap_n)
     axes.set_xlabel("Frequency (Hz)")
@@ -64,7 +63,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
 
 
 def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
-    """Draw each participant's thresholds in a colour and marker, joined by a thin line; gaps are left open."""
+    """Draw each participant's thresholds in a colour and marker, joined by a thin line that is broken at a gap."""
     participant_count = len(table.subjects)
     # A fixed offset from the tick instead of random jitter: a participant has the same offset at every frequency.
     offsets = (
@@ -72,13 +71,15 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
         if participant_count > 1
         else np.zeros(1)
     )
-    for index, row in enumerate(table.values):
-        positions = np.arange(len(row)) + offsets[index]
-        threshold_values = np.array([np.nan if value is None else value for value in row], dtype=float)
-        axes.plot(positions, threshold_values, "-", color=choose_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
-        for position, value, is_censored in zip(positions, row, table.censored[index], strict=True):
-            if value is not None:
-                draw_threshold(axes, position, value, index, is_censored)
+    for participant, row in enumerate(table.values):
+        positions = np.arange(len(row)) + offsets[participant]
+        threshold_values = np.array([np.nan if threshold is None else threshold for threshold in row], dtype=float)
+        axes.plot(
+            positions, threshold_values, "-", color=choose_colour(participant), linewidth=0.7, alpha=0.45, zorder=1
+        )
+        for position, threshold, is_censored in zip(positions, row, table.censored[participant], strict=True):
+            if threshold is not None:
+                draw_threshold(axes, position, threshold, participant, is_censored)
 
 
 def draw_threshold(axes: Axes, position: float, threshold: float, participant: int, is_censored: bool) -> None:
@@ -97,18 +98,18 @@ def draw_threshold(axes: Axes, position: float, threshold: float, participant: i
 def _draw_stopped_runs(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
     """Draw a hollow marker above the cap for each stopped run, which has no threshold."""
     offsets = np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, max(2, len(table.subjects)))
-    for index, row in enumerate(table.stopped):
+    for person, row in enumerate(table.stopped):
         for position, is_stopped in enumerate(row):
             if is_stopped:
-                axes.plot(position + offsets[index], _STOPPED_RUN_HEIGHT * cap_n, choose_marker(index), markersize=6,
-                          color=choose_colour(index), markerfacecolor="none")  # fmt: skip
+                axes.plot(position + offsets[person], _STOPPED_RUN_HEIGHT * cap_n, choose_marker(person), markersize=6,
+                          color=choose_colour(person), markerfacecolor="none")  # fmt: skip
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
-    """Draw the mean of the measured thresholds at each frequency, with its comparison interval where there is one."""
+    """Draw the mean of the thresholds at each frequency that has any, with its comparison interval if it has one."""
     intervals = {interval.name: interval for interval in comparisons.intervals}
-    for position, (name, values) in enumerate(table.group_by_frequency().items()):
-        measured_thresholds = [value for value in values if value is not None]
+    for position, (name, thresholds) in enumerate(table.group_by_frequency().items()):
+        measured_thresholds = [threshold for threshold in thresholds if threshold is not None]
         if not measured_thresholds:
             continue
         mean = float(np.mean(measured_thresholds))

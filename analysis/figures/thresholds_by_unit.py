@@ -34,11 +34,11 @@ _AXIS_LABELS: dict[Quantity, str] = {
 }
 """Label of the vertical axis, by quantity."""
 _MARKER_SPREAD_TICKS = 0.4
-"""Width over which the participants' markers are spread at each frequency, in distances between ticks."""
+"""Width over which the participants' markers are spread at each frequency, in distances between ticks. Chosen."""
 _MEDIAN_HALF_LENGTH = 0.32
 """Half-length of the line of a median, in distances between ticks: the line is a little wider than the markers."""
 _PANEL_HEIGHT_IN, _LEGEND_HEIGHT_IN = 2.5, 0.4
-"""Height of a row of panels, and of the legend above them (inches)."""
+"""Height of a row of panels, and of the legend above them (inches). Chosen."""
 _LOWER_LIMIT_FACTOR, _UPPER_LIMIT_FACTOR = 0.8, 1.35
 """Lower limit of a logarithmic axis over the smallest value, and upper limit over the largest: chosen for the
 markers."""
@@ -62,31 +62,31 @@ def draw_thresholds_by_unit(tables: Sequence[ThresholdTable]) -> Figure:
     return figure
 
 
-def can_be_drawn(value: float | None, quantity: Quantity) -> bool:
-    """Whether a threshold can be drawn in its panel: not where it is missing, nor, on the logarithmic axes, where it is
-    0, as in m/s² where the accelerometer reads nothing. dB above detection have a linear axis and may be negative."""
-    return value is not None and (value > 0 or quantity == "above_detection_db")
+def can_be_drawn(threshold: float | None, quantity: Quantity) -> bool:
+    """Whether a threshold can be drawn in its panel: it must not be None or, on the logarithmic axes, 0 or less, as in
+    m/s² where the accelerometer reads 0. dB above detection have a linear axis and may be negative."""
+    return threshold is not None and (threshold > 0 or quantity == "above_detection_db")
 
 
 def _draw_panel(axes: Axes, table: ThresholdTable) -> None:
     """Draw one panel; values that are missing or cannot be drawn are gaps. Medians are those of the drawn values."""
     style_axes(axes)
     drawable_values = [
-        [value if can_be_drawn(value, table.quantity) else np.nan for value in row] for row in table.values
+        [threshold if can_be_drawn(threshold, table.quantity) else np.nan for threshold in row] for row in table.values
     ]
-    values = np.array(drawable_values, dtype=float)
+    thresholds = np.array(drawable_values, dtype=float)
     offsets = (
-        np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, len(values))
-        if len(values) > 1
+        np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, len(thresholds))
+        if len(thresholds) > 1
         else np.zeros(1)
     )
-    for participant, row in enumerate(values):
+    for participant, row in enumerate(thresholds):
         positions = np.arange(len(row)) + offsets[participant]
         axes.plot(positions, row, "-", color=choose_colour(participant), linewidth=0.7, alpha=0.5, zorder=1)
-        for x, value, is_censored in zip(positions, row, table.censored[participant], strict=True):
-            if np.isfinite(value):
-                draw_threshold(axes, float(x), float(value), participant, is_censored)
-    for position, frequency_values in enumerate(values.T):
+        for marker_position, threshold, is_censored in zip(positions, row, table.censored[participant], strict=True):
+            if np.isfinite(threshold):
+                draw_threshold(axes, float(marker_position), float(threshold), participant, is_censored)
+    for position, frequency_values in enumerate(thresholds.T):
         if np.isfinite(frequency_values).any():
             median = float(np.nanmedian(frequency_values))
             axes.plot(
@@ -96,7 +96,7 @@ def _draw_panel(axes: Axes, table: ThresholdTable) -> None:
                 linewidth=2.2,
                 zorder=4,
             )
-    axes.set_xticks(range(len(table.frequencies_hz)), [f"{f:g}" for f in table.frequencies_hz])
+    axes.set_xticks(range(len(table.frequencies_hz)), [f"{frequency_hz:g}" for frequency_hz in table.frequencies_hz])
     axes.set_xlabel("Frequency (Hz)", fontsize=9)
     axes.set_ylabel(_AXIS_LABELS[table.quantity], fontsize=9)
     if table.quantity == "above_detection_db":
@@ -104,7 +104,7 @@ def _draw_panel(axes: Axes, table: ThresholdTable) -> None:
         axes.margins(y=0.12)
         return
     axes.set_yscale("log")
-    low, high = _LOWER_LIMIT_FACTOR * float(np.nanmin(values)), _UPPER_LIMIT_FACTOR * float(np.nanmax(values))
+    low, high = _LOWER_LIMIT_FACTOR * float(np.nanmin(thresholds)), _UPPER_LIMIT_FACTOR * float(np.nanmax(thresholds))
     axes.set_ylim(low, high)
     set_ratio_ticks(axes.yaxis, low, high)
 

@@ -1,7 +1,7 @@
-"""The channels of a recording as a flat list, for checks that treat each channel alike; text and rms of their values.
+"""The channels of a recording as a flat list, for checks of each channel; format and rms about the mean of its values.
 
 A recording groups its channels by signal (command, response, position and so on); here each channel is one item with
-its role, name, quantity and unit. Called by `analysis.look.overview`, its checks, and the figures of recordings.
+its role, name, quantity and unit. Called by the checks of `analysis.look` and the drawings of recordings.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class Channel:
 
     @property
     def finite_samples(self) -> FloatArray:
-        """The samples without missing ones."""
+        """The samples that are not missing, in order; infinite ones count as missing."""
         return self.samples[np.isfinite(self.samples)]
 
     def format(self, value: float) -> str:

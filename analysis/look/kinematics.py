@@ -20,7 +20,7 @@ from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
 KINEMATICS, LAGS = "derivatives", "lag between channels"
-"""Names of the two checks."""
+"""Names of the two checks, as shown in reports."""
 _DERIVATIVE_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^2": 2}
 """Order of the time derivative of position or angle, by unit."""
 _DERIVATIVE_NAMES = {1: "the derivative", 2: "the second derivative"}
@@ -31,7 +31,8 @@ Chosen, as are the limits below."""
 SAME_QUANTITY_SHARE, SAME_QUANTITY_SPREAD = 0.8, 0.2
 """Least coherent share, and largest spread of the ratio, of two channels that measure the same quantity."""
 LARGEST_GAIN_ERROR, WRONG_GAIN_ERROR = 0.05, 0.2
-"""Deviation of the gain's magnitude from 1 above which it is reported, and above which it counts as wrong."""
+"""Deviation of the gain's magnitude from 1 above which it is reported (also the tolerance for factors of unit errors),
+and above which it counts as wrong."""
 LARGEST_LAG_SAMPLES = 0.6
 """Largest lag (samples) that is not reported: a zero-order hold of the force delays the acceleration by half a sample,
 and a backward difference delays a derivative by as much."""
@@ -67,8 +68,8 @@ class KinematicPair:
 def find_kinematic_pairs(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> tuple[KinematicPair, ...]:
-    """Find, for each velocity and acceleration but excitations, the channel whose derivative has the largest coherent
-    share with it; no pair where that share is below `LEAST_COHERENT_SHARE`."""
+    """Find, for each velocity and acceleration that is no excitation, the channel whose derivative has the largest
+    coherent share with it; no pair where that share is below `LEAST_COHERENT_SHARE`. Constant channels are left out."""
     varying_channels = [
         channel
         for channel in channels
@@ -128,8 +129,8 @@ def differentiate(samples: FloatArray, order: int, rate_hz: float) -> FloatArray
 
 def _compute_difference_gain(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
     """Compute the gain (lines,) of central differences relative to the exact derivative, with w = 2 pi f / rate: sin(w)
-    / w for the first, (sin(w / 2) / (w / 2))^2 for the second derivative. At least 1e-6, because
-    it is a divisor and that of the first derivative is 0 at half the sample rate."""
+    / w for the first, (sin(w / 2) / (w / 2))^2 for the second derivative. At least 1e-6, because it is a divisor and
+    that of the first derivative is 0 at half the sample rate."""
     angle_rad = 2 * np.pi * spectra.frequency_hz / rate_hz
     gain = np.sin(angle_rad) / angle_rad if order == 1 else (np.sin(angle_rad / 2) / (angle_rad / 2)) ** 2
     return np.maximum(gain, 1e-6)
@@ -144,7 +145,7 @@ def _check_pair(pair: KinematicPair, rate_hz: float) -> Check:
     """Check one pair and report the most serious deviation: sign, then gain, then lag."""
     agreement = pair.agreement
     lag_text = _format_lag(agreement.lag_samples, rate_hz)
-    text = (
+    finding_text = (
         f"{pair.derivative} is {typeset(f'{agreement.gain:.4g}')} times {_DERIVATIVE_NAMES[pair.order]} of "
         f"{pair.place}{lag_text} "
         f"(lines with {agreement.coherent_share:.0%} of its power)."
@@ -152,7 +153,7 @@ def _check_pair(pair: KinematicPair, rate_hz: float) -> Check:
     gain_error = abs(abs(agreement.gain) - 1)
     if agreement.gain < 0:
         return Check(
-            KINEMATICS, "wrong", text, f"Reverse the sign of one of them{_describe_unit_error(agreement.gain)}."
+            KINEMATICS, "wrong", finding_text, f"Reverse the sign of one of them{_describe_unit_error(agreement.gain)}."
         )
     if (
         gain_error > WRONG_GAIN_ERROR
@@ -161,21 +162,24 @@ def _check_pair(pair: KinematicPair, rate_hz: float) -> Check:
         and not _describe_unit_error(agreement.gain)
     ):
         # A wrong unit or factor causes no delay; a gain below 1 with a lag is typical of a filter or a flexible part.
-        return Check(KINEMATICS, "notice", text, _FILTER_ADVICE)
+        return Check(KINEMATICS, "notice", finding_text, _FILTER_ADVICE)
     if gain_error > WRONG_GAIN_ERROR:
         return Check(
-            KINEMATICS, "wrong", text, f"Check the units and factors of both{_describe_unit_error(agreement.gain)}."
+            KINEMATICS,
+            "wrong",
+            finding_text,
+            f"Check the units and factors of both{_describe_unit_error(agreement.gain)}.",
         )
     if gain_error > LARGEST_GAIN_ERROR:
-        return Check(KINEMATICS, "notice", text, "Check the calibration of both, and filters between them.")
+        return Check(KINEMATICS, "notice", finding_text, "Check the calibration of both, and filters between them.")
     if abs(agreement.lag_samples) > LARGEST_LAG_SAMPLES:
         return Check(
             KINEMATICS,
             "notice",
-            text,
+            finding_text,
             "A filter or the data transfer delays one of them; correct the time shift, or model it.",
         )
-    return Check(KINEMATICS, "fine", text)
+    return Check(KINEMATICS, "fine", finding_text)
 
 
 def _format_lag(lag_samples: float, rate_hz: float) -> str:
@@ -200,17 +204,20 @@ def _describe_unit_error(gain: float) -> str:
 
 def check_lags(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
     """Check the lags between channels that measure the same quantity, such as a command and its measurement or two
-    sensors of one motion."""
+    sensors of one motion; where there are none, the result is a single check with the level "fine"."""
     checks = tuple(_generate_lag_checks(channels, spectra, rate_hz))
     return checks or (Check(LAGS, "fine", "No two channels measure the same quantity, so no lag can be measured."),)
 
 
 def _generate_lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> Iterator[Check]:
     """Generate a check for every two channels of the same unit with a nearly constant gain (`SAME_QUANTITY_SHARE`,
-    `SAME_QUANTITY_SPREAD`)."""
+    `SAME_QUANTITY_SPREAD`), except a command and an excitation."""
     for first_index, second_index in combinations(range(len(channels)), 2):
-        first, second = channels[first_index], channels[second_index]
-        if first.unit != second.unit or {first.role, second.role} == {"command", "excitation"}:
+        first_channel, second_channel = channels[first_index], channels[second_index]
+        if first_channel.unit != second_channel.unit or {first_channel.role, second_channel.role} == {
+            "command",
+            "excitation",
+        }:
             continue
         agreement = estimate_gain_and_lag(spectra, first_index, second_index)
         if (
@@ -220,9 +227,9 @@ def _generate_lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rat
         ):
             continue
         lag_text = _format_lag(agreement.lag_samples, rate_hz)
-        text = (
-            f"{second.label} is {typeset(f'{agreement.gain:.4g}')} times {first.label}"
+        finding_text = (
+            f"{second_channel.label} is {typeset(f'{agreement.gain:.4g}')} times {first_channel.label}"
             f"{lag_text or ', at the same time'}."
         )
         advice = "Shift the later one, or model what delays it." if lag_text else ""
-        yield Check(LAGS, "notice" if lag_text else "fine", text, advice)
+        yield Check(LAGS, "notice" if lag_text else "fine", finding_text, advice)

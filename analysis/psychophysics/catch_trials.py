@@ -2,7 +2,8 @@
 
 A wrong answer is no proof of inattention: at high frequencies a person may not perceive a direction even at full level.
 The rate per participant and frequency is wrong over answered trials, with Wilson's 95 % interval.
-Called by `study_analysis`; `observed_shares`, `coverage_words` and `power_curve` use `compute_wilson_interval` alone.
+Called by `study_analysis`; `observed_shares`, `coverage_words`, `power_curve` and `study_warnings` call
+`compute_wilson_interval` alone.
 """
 
 from collections.abc import Iterable
@@ -13,7 +14,7 @@ from scipy.stats import binomtest
 from protocols.trial import Phase, Trial
 
 CONFIDENCE = 0.95
-"""Confidence level of the interval of the lapse rate."""
+"""Confidence level of Wilson's interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,27 +37,32 @@ class CatchTally:
 
 def tally_catch_trials(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
     """Tally the valid catch trials per participant and frequency, over all sessions: participants in the order of their
-    first trial, frequencies ascending."""
+    first catch trial, frequencies ascending."""
     wrong_by_subject: dict[str, dict[float, list[bool]]] = {}
     for trial in trials:
         if trial.phase is Phase.CATCH and trial.is_valid:
             wrong_by_subject.setdefault(trial.subject, {}).setdefault(trial.frequency_hz, []).append(not trial.correct)
     return tuple(
         _make_tally(subject, frequency_hz, sum(is_wrong), len(is_wrong))
-        for subject, by_frequency in wrong_by_subject.items()
-        for frequency_hz, is_wrong in sorted(by_frequency.items())
+        for subject, wrong_by_frequency in wrong_by_subject.items()
+        for frequency_hz, is_wrong in sorted(wrong_by_frequency.items())
     )
 
 
-def compute_wilson_interval(count: int, total: int) -> tuple[float, float]:
-    """Compute Wilson's score interval (95 %) of the rate count / total; total >= 1. Source: E. B. Wilson, J. Am. Stat.
-    Assoc. 22 (1927), 209-212."""
-    interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
+def compute_wilson_interval(event_count: int, trial_count: int) -> tuple[float, float]:
+    """Compute the limits of Wilson's score interval (95 %) of the rate event_count / trial_count; trial_count >= 1.
+    Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212."""
+    interval = binomtest(event_count, trial_count).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
 
 
-def _make_tally(subject: str, frequency_hz: float, wrong: int, answered: int) -> CatchTally:
-    """Tally from the numbers of wrong and of all answers."""
+def _make_tally(subject: str, frequency_hz: float, wrong_count: int, answered_count: int) -> CatchTally:
+    """Make the tally from the numbers of wrong and of all answers."""
     return CatchTally(
-        subject, frequency_hz, answered, wrong, wrong / answered, *compute_wilson_interval(wrong, answered)
+        subject,
+        frequency_hz,
+        answered_count,
+        wrong_count,
+        wrong_count / answered_count,
+        *compute_wilson_interval(wrong_count, answered_count),
     )

@@ -67,8 +67,9 @@ class Comparisons:
 
 
 def compare_group_means(anova: OneWayAnova, confidence: float = 0.95) -> Comparisons:
-    """Compare all pairs of the groups of an ANOVA that have a value, with a comparison interval for each. Without a
-    spread within groups the result is empty and its notes give the reason. confidence: 0 to 1."""
+    """Compare all pairs of the groups of an ANOVA that have a value, with a comparison interval for each. Where the
+    ANOVA has no mean square within groups (no spread, or values in fewer than two groups), the result has no pairs and
+    a note. confidence: 0 to 1."""
     if anova.mean_square_within is None or anova.df_within is None:
         return Comparisons(confidence, None, (), (), ("Without a spread within groups no pairs can be compared.",))
     groups = [group for group in anova.groups if group.n > 0]
@@ -78,29 +79,30 @@ def compare_group_means(anova: OneWayAnova, confidence: float = 0.95) -> Compari
 def compute_tukey_kramer(
     groups: Sequence[GroupSummary], mean_square_within: float, df_within: int, confidence: float = 0.95
 ) -> Comparisons:
-    """Compute Tukey-Kramer intervals and p-values of all pairs. mean_square_within, df_within: of the error term of the
-    ANOVA. Raises ValueError unless there are at least two groups, all with a mean."""
+    """Compute Tukey-Kramer intervals and p-values of all pairs. mean_square_within, df_within: mean square (squared
+    unit of the values) and degrees of freedom of the ANOVA's error term. Raises ValueError unless there are at least
+    two groups, all with a mean."""
     means = [group.mean for group in groups if group.mean is not None]
     if len(means) != len(groups) or len(groups) < 2:
         raise ValueError(f"a comparison needs two or more groups that all have a mean; got {len(means)}")
-    sizes = [group.n for group in groups]
+    group_sizes = [group.n for group in groups]
     critical_range = float(studentized_range.ppf(confidence, len(groups), df_within))
-    half_widths = compute_comparison_half_widths(sizes, mean_square_within, critical_range)
+    half_widths = compute_comparison_half_widths(group_sizes, mean_square_within, critical_range)
     pairs = []
     for i, j in itertools.combinations(range(len(groups)), 2):
         difference = means[j] - means[i]
-        # Kramer's form: the range is studentized by the mean of the two variances.
-        scale = math.sqrt(mean_square_within / 2 * (1 / sizes[i] + 1 / sizes[j]))
-        p = float(studentized_range.sf(abs(difference) / scale, len(groups), df_within))
-        margin = critical_range * scale
+        # Kramer: the difference is divided by the root of the mean of both means' variances.
+        standard_error = math.sqrt(mean_square_within / 2 * (1 / group_sizes[i] + 1 / group_sizes[j]))
+        p = float(studentized_range.sf(abs(difference) / standard_error, len(groups), df_within))
+        pair_half_width = critical_range * standard_error
         # The tail is a numerical integral and may leave [0, 1] by its rounding.
         pairs.append(
             PairDifference(
                 first=groups[i].name,
                 second=groups[j].name,
                 difference=difference,
-                lower=difference - margin,
-                upper=difference + margin,
+                lower=difference - pair_half_width,
+                upper=difference + pair_half_width,
                 p=min(1.0, max(0.0, p)),
             )
         )
@@ -112,7 +114,7 @@ def compute_tukey_kramer(
 
 
 def compute_comparison_half_widths(
-    sizes: Sequence[int], mean_square_within: float, critical_range: float
+    group_sizes: Sequence[int], mean_square_within: float, critical_range: float
 ) -> tuple[float, ...]:
     """Compute the half-width (q / sqrt(2)) w_i of the comparison interval of each of k >= 2 groups with the sizes n_i.
 
@@ -120,8 +122,8 @@ def compute_comparison_half_widths(
     w_i = ((k - 1) sum_j d_ij - sum of d over all pairs) / ((k - 1) (k - 2)), and d_12 / 2 for k = 2. For equal sizes n
     and s^2 = mean_square_within, the half-width is q s / (2 sqrt(n)).
     """
-    k = len(sizes)
-    variances = mean_square_within / np.asarray(sizes, dtype=np.float64)
+    k = len(group_sizes)
+    variances = mean_square_within / np.asarray(group_sizes, dtype=np.float64)
     d = np.sqrt(variances[:, None] + variances[None, :])
     np.fill_diagonal(d, 0.0)
     row_sums, pair_sum = d.sum(axis=1), d.sum() / 2

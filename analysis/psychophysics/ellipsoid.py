@@ -11,7 +11,7 @@ Two definitions, both for a sinusoidal force of constant amplitude along a test 
 
 Frame: first axis = test direction; third = the device axis most nearly perpendicular to it, made perpendicular;
 second = third x first. For a direction in a plane of device axes the first two axes span that plane. Called by
-`study.workflows.results.analyze_data` and by the reproduction of the paper.
+`study.workflows.results.analyze_data` and `study.evaluation.reproduction.reproduce_paper`.
 """
 
 import math
@@ -48,7 +48,7 @@ class MomentEllipsoid:
 
     @property
     def normalised_axes(self) -> tuple[float, float]:
-        """The two largest semi-axes, divided by the largest."""
+        """The two largest semi-axes, divided by the largest: 1, and a ratio from 0 to 1."""
         return 1.0, self.semi_axes_mps2[1] / self.semi_axes_mps2[0]
 
 
@@ -86,7 +86,7 @@ class EllipsoidResult:
 
 
 def compute_ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None) -> tuple[EllipsoidResult, ...]:
-    """Compute one result per sinusoid of the recording, in the order played.
+    """Compute the ellipsoids of each sinusoid of the recording, in the order played.
 
     The response must be acceleration in m/s^2 on three axes; meta["segments"] states frequency_hz, along and
     unit_vector (in the device's frame) of each sinusoidal segment. sensor_to_device: (3, 3) rotation from the sensor's
@@ -101,7 +101,7 @@ def compute_ellipsoids(recording: Recording, sensor_to_device: FloatArray | None
         )
     descriptions = _read_segment_descriptions(recording)
     rotation = np.eye(3) if sensor_to_device is None else np.asarray(sensor_to_device, dtype=np.float64)
-    results = []
+    ellipsoids = []
     for segment_number, (segment, description) in enumerate(
         zip(recording.segments, descriptions, strict=True), start=1
     ):
@@ -110,18 +110,18 @@ def compute_ellipsoids(recording: Recording, sensor_to_device: FloatArray | None
         acceleration_mps2 = response.samples[segment.start : segment.stop] @ rotation.T
         if not np.isfinite(acceleration_mps2).all():
             raise ValueError(f"segment {segment_number} (sine): the response has missing values")
-        results.append(_compute_segment_ellipsoid(acceleration_mps2, recording.sample_rate_hz, segment, description))
-    if not results:
+        ellipsoids.append(_compute_segment_ellipsoid(acceleration_mps2, recording.sample_rate_hz, segment, description))
+    if not ellipsoids:
         raise ValueError(
             "the recording has no segment of kind sine, so there is no ellipsoid to compute; "
             "record sinusoids along several directions"
         )
-    return tuple(results)
+    return tuple(ellipsoids)
 
 
 def read_sensor_frame(recording: Recording) -> FloatArray | None:
-    """Read the rotation (3, 3) from the sensor's axes to the device's, as the recording states it; None if it states
-    none.
+    """Read the rotation (3, 3) from the sensor's axes to the device's from the recording's metadata (sensor,
+    frame_to_device); None if it states none.
 
     Raises ValueError where it is not a (3, 3) matrix of numbers, where its rows are not orthonormal, which would
     distort every ellipse, and for a reflection, which would mirror it.
@@ -147,15 +147,15 @@ def compute_direction_frame(unit_vector: FloatArray) -> FloatArray:
     """Compute the matrix (3, 3) whose rows are the axes of the test direction's frame, so that frame @ v has the
     components of a vector v of the device's frame. Raises ValueError unless unit_vector is (3,) and of norm 1 (within
     0.1 %)."""
-    first = np.asarray(unit_vector, dtype=np.float64)
-    length = float(np.linalg.norm(first))
-    if first.shape != (3,) or not math.isclose(length, 1.0, rel_tol=1e-3):
-        raise ValueError(f"unit_vector must be three numbers of norm 1, not {first.tolist()}")
-    first = first / length
-    third = np.eye(3)[int(np.argmin(np.abs(first)))]
-    third = third - (third @ first) * first
-    third = third / np.linalg.norm(third)
-    return np.stack([first, np.cross(third, first), third])
+    first_axis = np.asarray(unit_vector, dtype=np.float64)
+    norm = float(np.linalg.norm(first_axis))
+    if first_axis.shape != (3,) or not math.isclose(norm, 1.0, rel_tol=1e-3):
+        raise ValueError(f"unit_vector must be three numbers of norm 1, not {first_axis.tolist()}")
+    first_axis = first_axis / norm
+    third_axis = np.eye(3)[int(np.argmin(np.abs(first_axis)))]
+    third_axis = third_axis - (third_axis @ first_axis) * first_axis
+    third_axis = third_axis / np.linalg.norm(third_axis)
+    return np.stack([first_axis, np.cross(third_axis, first_axis), third_axis])
 
 
 def compute_moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
@@ -169,7 +169,7 @@ def compute_moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
     semi_axes_mps2 = np.sqrt(np.maximum(eigenvalues[::-1], 0.0))
     tilt_deg, turn_deg = _compute_axis_angles_deg(eigenvectors[:, -1])
     return MomentEllipsoid(
-        mean_square=tuple(tuple(float(value) for value in row) for row in mean_square),
+        mean_square=tuple(tuple(float(entry) for entry in row) for row in mean_square),
         semi_axes_mps2=(float(semi_axes_mps2[0]), float(semi_axes_mps2[1]), float(semi_axes_mps2[2])),
         tilt_deg=tilt_deg,
         turn_deg=turn_deg,
@@ -206,26 +206,27 @@ def compute_phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency
 def _compute_segment_ellipsoid(
     samples: FloatArray, sample_rate_hz: float, segment: Segment, description: dict[str, Any]
 ) -> EllipsoidResult:
-    """Compute the result of one segment. samples: (n, 3), m/s^2, in the device's frame. description: its entry of
+    """Compute the ellipsoids of one segment. samples: (n, 3), m/s^2, in the device's frame. description: its entry of
     meta["segments"]. Raises ValueError where the segment is shorter than one period."""
     frequency_hz = float(description["frequency_hz"])
-    frame_samples = samples @ compute_direction_frame(np.asarray(description["unit_vector"], dtype=np.float64)).T
+    frame_samples_mps2 = samples @ compute_direction_frame(np.asarray(description["unit_vector"], dtype=np.float64)).T
     # 1e-9: a whole number of periods is not rounded down by a rounding error.
-    whole_periods = int(len(frame_samples) * frequency_hz / sample_rate_hz + 1e-9)
-    if whole_periods < 1:
+    period_count = int(len(frame_samples_mps2) * frequency_hz / sample_rate_hz + 1e-9)
+    if period_count < 1:
         raise ValueError(f"the sinusoid of {frequency_hz:g} Hz is shorter than one period")
     return EllipsoidResult(
         frequency_hz=frequency_hz,
         along=str(description["along"]),
         amplitude_n=segment.amplitude,
         # Only whole periods: a partial period would bias the mean squares.
-        moments=compute_moment_ellipsoid(frame_samples[: round(whole_periods * sample_rate_hz / frequency_hz)]),
-        phasor=compute_phasor_ellipse(frame_samples, sample_rate_hz, frequency_hz),
+        moments=compute_moment_ellipsoid(frame_samples_mps2[: round(period_count * sample_rate_hz / frequency_hz)]),
+        phasor=compute_phasor_ellipse(frame_samples_mps2, sample_rate_hz, frequency_hz),
     )
 
 
 def _read_segment_descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
-    """Read the entries of meta["segments"]. Raises ValueError unless there is a complete one for every sinusoid."""
+    """Read the entries of meta["segments"]. Raises ValueError unless there is one per segment, complete for
+    sinusoids."""
     descriptions = recording.meta.get("segments")
     if not isinstance(descriptions, Sequence) or len(descriptions) != len(recording.segments):
         raise ValueError(

@@ -2,7 +2,8 @@
 
 The ratio is computed per direction of the device (its angle), not per number on the screen. The numbers may be swapped
 between people; a device that delivers too much along one direction and too little along the other would then seem
-correct on average. Called by `analysis.psychophysics.study_analysis`.
+correct on average. Called by `analysis.psychophysics.study_analysis` (the warning) and
+`analysis.reports.supplementary_tables` (the table).
 """
 
 from collections.abc import Sequence
@@ -26,8 +27,8 @@ class Delivery:
     trials: int
     """Number of those trials, of both directions."""
     along: tuple[float | None, float | None]
-    """Delivered over requested amplitude, along the protocol's directions 1 and 2; None for a direction without
-    trials."""
+    """Delivered over requested amplitude along the protocol's directions 1 and 2 (`_find_played_direction`); None for a
+    direction without trials."""
     off_axis: float
     """Delivered amplitude off the direction over that along it; 0 for a trial without a measurement off the
     direction."""
@@ -42,7 +43,8 @@ class Delivery:
 
 
 def compute_deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
-    """Compute the delivery at each frequency, ascending; empty where levels are commanded forces."""
+    """Compute the delivery at each frequency, ascending; empty without trials that have a requested acceleration, as
+    where levels are forces, and a measured one."""
     measured_trials = [trial for trial in trials if trial.is_valid and trial.wanted_mps2 and trial.delivered_mps2]
     ordered_trials, first_angle_deg = (
         sorted(measured_trials, key=lambda trial: trial.frequency_hz),
@@ -74,8 +76,8 @@ def make_delivery_warning(deliveries: Sequence[Delivery]) -> str:
 
 
 def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_angle_deg: float | None) -> Delivery:
-    """Compute the medians of the trials at one frequency. first_angle_deg: angle of direction 1; None where it is not
-    known."""
+    """Compute the medians of the trials (at least one) at one frequency. first_angle_deg: angle of direction 1; None
+    where it is not known."""
     median_ratios: list[float | None] = []
     for direction in (1, 2):
         ratios = [
@@ -95,13 +97,17 @@ def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_angle_de
 def _find_larger_angle_deg(trials: Sequence[Trial]) -> float | None:
     """Find the angle of the protocol's direction 1, the larger of the two; None unless the trials have exactly two
     angles."""
-    angles = {trial.angle_deg for trial in trials}
-    return max((angle for angle in angles if angle is not None), default=None) if len(angles - {None}) == 2 else None
+    angles_deg = {trial.angle_deg for trial in trials}
+    return (
+        max((angle_deg for angle_deg in angles_deg if angle_deg is not None), default=None)
+        if len(angles_deg - {None}) == 2
+        else None
+    )
 
 
 def _find_played_direction(trial: Trial, first_angle_deg: float | None) -> int:
-    """Find the protocol's direction that was played, 1 or 2; its number on the screen where the angles are not
-    known."""
+    """Find the protocol's direction that was played, 1 or 2, by its angle; where the angles are not known, the number
+    that the direction had on the screen."""
     if first_angle_deg is None or trial.angle_deg is None:
         return trial.direction_shown
     return 1 if trial.angle_deg == first_angle_deg else 2

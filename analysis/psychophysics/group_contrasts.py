@@ -21,13 +21,14 @@ from scipy.stats import t as student
 from equalizer.signals.signal import FloatArray
 
 EQUIVALENCE_DB = 2.0
-"""Margin of equivalence (dB): two small steps of the published staircase, or half a large step."""
+"""Margin of equivalence (dB). Chosen: two small steps of the published staircase, or half a large step."""
 EQUIVALENCE_UP_TO_HZ = 25.0
 """Highest frequency (Hz) tested for equivalence: up to it the published thresholds are similar, and none is
 censored."""
 
 ROUNDING_DB = 1e-9
-"""Range of differences (dB) up to which they count as equal: sums of the same steps may differ by rounding."""
+"""Range of differences (dB) up to which they count as equal, because sums of the same steps differ by rounding.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,28 +61,27 @@ class Contrast:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanErrors:
-    """Standard errors of means over people, (m,) each."""
+    """Standard errors of the means of m columns of values over people; arrays are (m,)."""
 
     people: NDArray[np.intp]
-    """Number of people with answers of their own at each place."""
+    """Number of people with answers of their own, per column."""
     error: FloatArray
-    """Standard error; infinite below two such people."""
+    """Standard error, in the unit of the values; infinite below two such people."""
     df: FloatArray
     """Degrees of freedom for Student's t."""
 
 
-def compute_mean_errors(values: FloatArray, has_answers: NDArray[np.bool_]) -> MeanErrors:
-    """Compute standard errors of the means of pseudo-values. values: (n, m), a row per person; has_answers: (n, m),
-    True where the value rests on answers of the person there, False where it rests only on answers at other
-    frequencies.
+def compute_mean_errors(pseudo_values: FloatArray, has_answers: NDArray[np.bool_]) -> MeanErrors:
+    """Compute standard errors of the means of pseudo-values (n, m), a row per person. has_answers: (n, m), True where
+    the value rests on answers of the person there, False where it rests only on answers at other frequencies.
 
     Where all have answers this is s / sqrt(n) with n - 1 degrees of freedom. Otherwise the variances of both groups
     add, with the degrees of freedom of F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114: the estimate depends
     mostly on the few people with answers, so that their number counts, not that of all.
     """
-    person_count = len(values)
+    person_count = len(pseudo_values)
     answered_count = has_answers.sum(axis=0)
-    squared_deviations = ((values - values.mean(axis=0)) / person_count) ** 2
+    squared_deviations = ((pseudo_values - pseudo_values.mean(axis=0)) / person_count) ** 2
     answered_df = np.maximum(answered_count - 1, 1)
     answered_variance = np.sum(squared_deviations * has_answers, axis=0) * answered_count / answered_df
     unanswered_variance, unanswered_df = (
@@ -90,7 +90,7 @@ def compute_mean_errors(values: FloatArray, has_answers: NDArray[np.bool_]) -> M
     )
     error = np.where(
         answered_count == person_count,
-        values.std(axis=0, ddof=1) / math.sqrt(person_count),
+        pseudo_values.std(axis=0, ddof=1) / math.sqrt(person_count),
         np.sqrt(answered_variance + unanswered_variance),
     )
     # Where all values are equal both variances are 0, and df stays that of the people with answers.
@@ -111,21 +111,21 @@ def compute_contrasts(
     confidence: float,
     has_answers: NDArray[np.bool_] | None = None,
 ) -> tuple[Contrast, ...]:
-    """Compute the contrasts of each frequency against the first. values_db: (n, k), NaN for a gap. Contrasts with fewer
-    than two participants, or with the same difference in all, are left out, but count in Holm's family: its size is
-    planned, not chosen by the data. has_answers: (n, k), for pseudo-values, which have no gaps; see
-    `compute_mean_errors`."""
+    """Compute the contrasts of each frequency against the first. values_db: (n, k), NaN for a gap. confidence: of the
+    intervals, 0 to 1. Contrasts with answers of fewer than two participants, or with the same difference in all, are
+    left out, but count in Holm's family: its size is planned, not chosen by the data. has_answers: (n, k), for
+    pseudo-values, which have no gaps (`compute_mean_errors`); by default True where there is a value."""
     has_answers = np.isfinite(values_db) if has_answers is None else has_answers
     pairs = []
-    for index in range(1, len(frequencies_hz)):
-        paired_db = values_db[:, [0, index]]
+    for column in range(1, len(frequencies_hz)):
+        paired_db = values_db[:, [0, column]]
         is_complete = np.isfinite(paired_db).all(axis=1)
         paired_db, answered_both = (
             paired_db[is_complete],
-            np.asarray(has_answers[is_complete][:, [0, index]].all(axis=1)),
+            np.asarray(has_answers[is_complete][:, [0, column]].all(axis=1)),
         )
         if answered_both.sum() >= 2 and np.ptp(paired_db[:, 1] - paired_db[:, 0]) > ROUNDING_DB:
-            pairs.append((frequencies_hz[index], _PairedDifferences(paired_db, answered_both)))
+            pairs.append((frequencies_hz[column], _PairedDifferences(paired_db, answered_both)))
     corrected_p_values = apply_holm_correction([pair.p for _, pair in pairs], len(frequencies_hz) - 1)
     return tuple(
         _compute_contrast(frequency_hz, frequencies_hz[0], pair, p_holm, confidence)
@@ -147,8 +147,8 @@ def compute_pair_contrast(
     has one test, so that `p_holm` equals `p`."""
     if len(pair_hz) != 2 or not set(pair_hz) <= set(frequencies_hz):
         return None
-    first, second = (list(frequencies_hz).index(frequency_hz) for frequency_hz in pair_hz)
-    columns = [second, first]
+    first_column, second_column = (list(frequencies_hz).index(frequency_hz) for frequency_hz in pair_hz)
+    columns = [second_column, first_column]
     pair_has_answers = None if has_answers is None else has_answers[:, columns]
     return next(
         iter(compute_contrasts((pair_hz[1], pair_hz[0]), values_db[:, columns], confidence, pair_has_answers)), None
@@ -160,9 +160,9 @@ def apply_holm_correction(p_values: Sequence[float], planned: int | None = None)
     without a p value, which rank last; None: the number of p values."""
     family_size = len(p_values) if planned is None else planned
     corrected_p_values, largest_p = [0.0] * len(p_values), 0.0
-    for rank, index in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
-        largest_p = max(largest_p, min(1.0, (family_size - rank) * p_values[index]))
-        corrected_p_values[index] = largest_p
+    for rank, original_index in enumerate(sorted(range(len(p_values)), key=lambda test_index: p_values[test_index])):
+        largest_p = max(largest_p, min(1.0, (family_size - rank) * p_values[original_index]))
+        corrected_p_values[original_index] = largest_p
     return tuple(corrected_p_values)
 
 
@@ -207,5 +207,5 @@ def _compute_contrast(
 
 
 def _compute_equivalence_p(mean_db: float, error_db: float, df: float, margin_db: float = EQUIVALENCE_DB) -> float:
-    """Compute the p value of Schuirmann's two one-sided t tests: the larger of the two."""
+    """Compute the p value of Schuirmann's two one-sided t tests against +-margin_db: the larger of the two."""
     return float(student.sf((margin_db - abs(mean_db)) / error_db, df))

@@ -23,8 +23,8 @@ class Population(Enum):
 
 
 def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial, ...]]:
-    """Split the trials by population: those of each population that occurs, session by session in order of first
-    trials.
+    """Split the trials by population, in the order of `Population`; trials are ordered by session, and sessions by
+    their first trial. A population without trials has no key.
 
     Raises ValueError, with the name of the session, where the answers of one session belong to different populations.
     """

@@ -1,10 +1,10 @@
 """Warning about participants who often made presentations void: by repeats, pauses, leaving, or answers outside the
-time.
+allowed time.
 
 A void presentation is played again. A participant who makes presentations void when unsure therefore gains evidence
 from several presentations, which biases the threshold downwards: in simulations with unlimited repeats by 1.9 to
-4.8 dB. A session limits the repeat key, but not pauses and leaving. Called by `thresholds`, `study_analysis` and the
-study report.
+4.8 dB. A session limits the use of the repeat key, but not pauses and leaving. Called by `thresholds` and
+`study_analysis`; `analysis.reports.study_tables` prints the limits.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ VOID_LIMITS_TEXT = f"at least {LEAST_VOID_COUNT}, and at least {100 * LEAST_VOID
 """The two limits in words, for the warning and the report."""
 
 
-def is_frequent(void_count: int, presentation_count: int) -> bool:
+def has_frequent_voids(void_count: int, presentation_count: int) -> bool:
     """Whether the void presentations are at least `LEAST_VOID_COUNT` in number and at least the share
     `LEAST_VOID_SHARE` of all presentations."""
     return void_count >= LEAST_VOID_COUNT and void_count >= LEAST_VOID_SHARE * presentation_count
@@ -44,13 +44,14 @@ def format_repeat_warning(trials: Sequence[Trial]) -> str:
     )
 
 
-def _list_frequent_repeats(trials: Sequence[Trial], get_name: Callable[[Trial], str]) -> list[str]:
-    """List a text for each group of trials with the same name in which void presentations are frequent."""
-    void_by_name: dict[str, list[bool]] = {}
+def _list_frequent_repeats(trials: Sequence[Trial], get_group_name: Callable[[Trial], str]) -> list[str]:
+    """List a text for each group of trials in which void presentations are frequent. get_group_name: gives the name of
+    a trial's group."""
+    voids_by_group: dict[str, list[bool]] = {}
     for trial in trials:
-        void_by_name.setdefault(get_name(trial), []).append(trial.void_cause in PARTICIPANT_CAUSES)
+        voids_by_group.setdefault(get_group_name(trial), []).append(trial.void_cause in PARTICIPANT_CAUSES)
     return [
-        f"{name} {sum(is_void)} of {len(is_void)} presentations ({100 * sum(is_void) / len(is_void):.1f} %)"
-        for name, is_void in void_by_name.items()
-        if is_frequent(sum(is_void), len(is_void))
+        f"{group_name} {sum(is_void)} of {len(is_void)} presentations ({100 * sum(is_void) / len(is_void):.1f} %)"
+        for group_name, is_void in voids_by_group.items()
+        if has_frequent_voids(sum(is_void), len(is_void))
     ]

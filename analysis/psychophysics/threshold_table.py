@@ -1,6 +1,7 @@
 """Table of thresholds by participant and frequency, the input of the analyses of variance; missing ones are gaps.
 
-Made by `analysis.psychophysics.study_analysis` from the rows of `thresholds`."""
+`analysis.psychophysics.study_analysis` and `analysis.figures.study_pictures` call `tabulate_thresholds` with the rows
+of `thresholds`."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ class ThresholdTable:
     frequencies_hz: tuple[float, ...]
     """Ascending: the columns."""
     values: tuple[tuple[float | None, ...], ...]
-    """values[subject][frequency]; None where there is no completed run."""
+    """values[subject][frequency]; None where there is no completed run, or it has no value of this quantity."""
     censored: tuple[tuple[bool, ...], ...]
     """Same shape as `values`: True where the value is cut by the cap."""
     stopped: tuple[tuple[bool, ...], ...]
@@ -74,8 +75,8 @@ class ThresholdTable:
         return tuple(
             (subject, frequency_hz)
             for subject, row in zip(self.subjects, self.values, strict=True)
-            for frequency_hz, value in zip(self.frequencies_hz, row, strict=True)
-            if value is None
+            for frequency_hz, threshold in zip(self.frequencies_hz, row, strict=True)
+            if threshold is None
         )
 
 
@@ -109,15 +110,15 @@ def tabulate_thresholds(
         subjects=subjects,
         frequencies_hz=ordered_hz,
         values=tuple(
-            tuple(_read_finite_value(first_runs.get((subject, hz)), quantity) for hz in ordered_hz)
+            tuple(_read_finite_value(first_runs.get((subject, f_hz)), quantity) for f_hz in ordered_hz)
             for subject in subjects
         ),
         censored=tuple(
-            tuple((subject, hz) in first_runs and first_runs[subject, hz].censored for hz in ordered_hz)
+            tuple((subject, f_hz) in first_runs and first_runs[subject, f_hz].censored for f_hz in ordered_hz)
             for subject in subjects
         ),
         stopped=tuple(
-            tuple((subject, hz) in trial_limited_cells and (subject, hz) not in first_runs for hz in ordered_hz)
+            tuple((subject, f_hz) in trial_limited_cells and (subject, f_hz) not in first_runs for f_hz in ordered_hz)
             for subject in subjects
         ),
         notes=tuple(notes),
@@ -131,5 +132,5 @@ def format_frequency(frequency_hz: float) -> str:
 
 def _read_finite_value(row: Threshold | None, quantity: Quantity) -> float | None:
     """Read a quantity of a run; None without a run, and for NaN."""
-    value: float | None = None if row is None else getattr(row, quantity)
-    return None if value is None or math.isnan(value) else value
+    threshold: float | None = None if row is None else getattr(row, quantity)
+    return None if threshold is None or math.isnan(threshold) else threshold

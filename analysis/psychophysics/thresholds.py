@@ -11,7 +11,7 @@ from enum import StrEnum
 from statistics import fmean
 
 from analysis.psychophysics.bias import estimate_response_bias
-from analysis.psychophysics.repeated_trials import is_frequent
+from analysis.psychophysics.repeated_trials import has_frequent_voids
 from analysis.psychophysics.runs import Run, recompute_runs
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.psi import compute_posterior, estimate_threshold
@@ -89,7 +89,7 @@ class Threshold:
     repeat_rate: float = 0.0
     """`repeats_at_will` over all presentations of the run."""
     asked_often: bool = False
-    """Whether presentations were made void often: see `analysis.psychophysics.repeated_trials.is_frequent`."""
+    """Whether presentations were made void often: see `analysis.psychophysics.repeated_trials.has_frequent_voids`."""
 
 
 def compute_thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.0) -> tuple[Threshold, ...]:
@@ -140,7 +140,7 @@ def compute_run_threshold(run: Run, rule: StaircaseRule) -> Threshold:
         ended=_find_run_end(run, rule),
         repeats_at_will=run.repeats_at_will,
         repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
-        asked_often=is_frequent(run.repeats_at_will, run.presentations),
+        asked_often=has_frequent_voids(run.repeats_at_will, run.presentations),
     )
 
 

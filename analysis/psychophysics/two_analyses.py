@@ -68,9 +68,9 @@ def describe_declaration(declared: AnalysisSettings) -> str:
             f"Declared as primary in the protocol: {_ANALYSIS_NOUNS[declared.primary]}. "
             f"{interval_label} of the contrast: {_INTERVAL_DESCRIPTIONS[declared.primary]}"
         )
-    first, second = declared.contrast_hz or (0.0, 0.0)
+    first_hz, second_hz = declared.contrast_hz or (0.0, 0.0)
     declared_sentences = [
-        f"Primary contrast: {first:g} Hz minus {second:g} Hz." if declared.contrast_hz else "",
+        f"Primary contrast: {first_hz:g} Hz minus {second_hz:g} Hz." if declared.contrast_hz else "",
         f"Planned participants: {declared.participants}." if declared.participants else "",
         f"Exclusions: {' '.join(declared.exclusions)}" if declared.exclusions else "",
     ]
@@ -140,8 +140,8 @@ def describe_measured_coverage(analyses: Sequence[str], table: ThresholdTable, r
 
 
 def _describe_differences(primary: PrimaryAnalysis, mean_contrasts: Sequence[Contrast], rule: StaircaseRule) -> str:
-    """Describe the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DIFFERENCE_DB`,
-    or where not."""
+    """Describe the frequencies at which the differences in dB by the model and by the thresholds of runs differ by at
+    least `NOTABLE_DIFFERENCE_DB`, or that there are none."""
     means_noun = select_threshold_words(rule).noun
     means_by_frequency = {contrast.frequency_hz: contrast for contrast in mean_contrasts}
     reference = f"{primary.frequencies_hz[0]:g} Hz"

@@ -64,8 +64,8 @@ def _describe_no_cue(findings: Sequence[CueFinding]) -> str:
     )
 
 
-def _tabulate_sensitivity(findings: Sequence[CueFinding], target_note: str) -> Table:
-    """Tabulate d' by each cue alone, a row per cue and frequency. target_note: sentence on the d' of the answers that
+def _tabulate_sensitivity(findings: Sequence[CueFinding], d_prime_note: str) -> Table:
+    """Tabulate d' by each cue alone, a row per cue and frequency. d_prime_note: sentence on the d' of the answers that
     the staircase keeps."""
     return Table(
         caption="Sensitivity that each cue alone would give",
@@ -88,7 +88,7 @@ def _tabulate_sensitivity(findings: Sequence[CueFinding], target_note: str) -> T
             "difference over internal noise and spread (root of the sum of squares), for three internal noises; d' = 1 "
             "is one just noticeable difference.",
             f"Noticeable: shown, by a 95 % interval of the difference, to reach d' 1 at an internal noise of "
-            f"{TYPICAL_NOISE_DB:g} dB. {target_note}",
+            f"{TYPICAL_NOISE_DB:g} dB. {d_prime_note}",
         ),
     )  # fmt: skip
 
@@ -125,7 +125,8 @@ def _format_slope_and_interval(answers: AnswersOnDelivery) -> tuple[str, str]:
 
 
 def _describe_dependence(finding: CueFinding) -> str:
-    """Describe in a table cell whether the answers depend on the cue, after Holm's correction."""
+    """Describe in a table cell whether the answers depend on the cue, after Holm's correction, or that the data cannot
+    test it."""
     if finding.affects_answers:
         return "depend on the cue"
     return "do not" if finding.answers.is_conclusive else "not testable"

@@ -38,7 +38,7 @@ def _is_anything_declared(result: DeclaredResult) -> bool:
 
 
 def _describe_contrast(contrast: ContrastResult, result: DeclaredResult) -> str:
-    """Describe the contrast by one analysis, with interval, p and notes."""
+    """Describe the contrast by one analysis, with interval, p and notes, or that its difference is not known."""
     first_hz, second_hz = result.contrast_hz
     role = ", the declared analysis" if contrast.declared else ""
     opening = (
@@ -55,7 +55,7 @@ def _describe_contrast(contrast: ContrastResult, result: DeclaredResult) -> str:
 
 
 def _tabulate_contrasts(result: DeclaredResult) -> Table:
-    """Tabulate the contrast, a row per analysis."""
+    """Tabulate the declared contrast, a row per analysis."""
     first_hz, second_hz = result.contrast_hz
     rows = []
     for contrast in result.results:
@@ -115,8 +115,8 @@ def _tabulate_sample(result: DeclaredResult) -> Table:
 def _format_interval(contrast: ContrastResult) -> str:
     """Format the limits of the interval without unit; `MISSING` for a limit that is not determined."""
     limit_texts = [
-        MISSING if limit is None else format_signed(limit, _choose_decimals(contrast))
-        for limit in (contrast.lower, contrast.upper)
+        MISSING if interval_limit is None else format_signed(interval_limit, _choose_decimals(contrast))
+        for interval_limit in (contrast.lower, contrast.upper)
     ]
     return " to ".join(limit_texts)
 

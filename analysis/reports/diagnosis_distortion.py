@@ -30,7 +30,7 @@ _TREND_DESCRIPTIONS = {
 }
 """Predicate of a sentence for each value of `LevelTrend.level_dependence`."""
 _LEAST_RESPONSE_RATIO = 0.1
-"""Response relative to the largest of its quantity, input and level, below which a channel has no row. Chosen."""
+"""Response relative to the largest of its quantity, input and level, up to which a channel is left out. Chosen."""
 
 
 def make_distortion_sections(findings: Findings) -> list[Section]:
@@ -50,7 +50,8 @@ def make_distortion_sections(findings: Findings) -> list[Section]:
 
 
 def _describe_trends(cells: Sequence[Distortion]) -> tuple[str, ...]:
-    """Describe for each kind of distortion how it depends on the level, by channel; empty without cells."""
+    """Describe how each kind of distortion depends on the level, with the channels in which it does so; empty without
+    cells."""
     if not cells:
         return ()
     responding_cells = [cell for cell in cells if cell.whole_band and _is_responding(cell, cells)]
@@ -88,10 +89,12 @@ def _tabulate_distortion(findings: Findings) -> Table | None:
                 output,
                 input_name,
                 f"{amplitude:g}",
-                _format_share_of_signal(noise_rms.get((output, quantity)), next(iter(by_kind.values())).signal_rms),
-                *(_format_distortion(by_kind.get(kind)) for kind in kinds),
+                _format_share_of_signal(
+                    noise_rms.get((output, quantity)), next(iter(distortion_by_kind.values())).signal_rms
+                ),
+                *(_format_distortion(distortion_by_kind.get(kind)) for kind in kinds),
             )
-            for (output, quantity, input_name, amplitude), by_kind in cells_by_row.items()
+            for (output, quantity, input_name, amplitude), distortion_by_kind in cells_by_row.items()
         ),
         (
             "Root-mean-square over the driven band. <: below the detection limit, which is stated. "

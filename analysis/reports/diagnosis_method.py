@@ -1,6 +1,6 @@
-"""Paragraphs of a diagnosis report on the method: how errors were measured, how the samples were split, how the noise
-was estimated, how the model was re-tuned and effects were chosen, how the map of the mismatch is tested. Durations and
-limits are those of the diagnosis. Called by `analysis.reports.diagnosis_report`."""
+"""Paragraphs of a diagnosis report on the method: error measure, split of the samples, noise estimate, re-tuning and
+choice of effects, tests in the map of the mismatch. Durations and limits are those of the diagnosis. Called by
+`analysis.reports.diagnosis_report`."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
@@ -31,7 +31,7 @@ _SPLIT_USES = (
 
 def write_method_paragraphs(findings: Findings) -> tuple[str, ...]:
     """Write the paragraphs in this order: error measure, split of the samples, noise, re-tuning and choice of effects,
-    map of the mismatch. Paragraphs without data are left out."""
+    map of the mismatch. The second, third and fourth are left out where they do not apply."""
     return (
         _describe_error_measure(findings),
         *_describe_sample_split(findings),
@@ -73,12 +73,12 @@ def _describe_noise_source(findings: Findings) -> tuple[str, ...]:
     if findings.floor is None:
         return ()
     source_text = _NOISE_SOURCES.get(findings.floor.method)
-    text = (
+    noise_text = (
         f"The noise was measured {source_text}."
         if source_text
         else "The noise of this recording could not be measured."
     )
-    return (" ".join([text, *findings.floor.remarks]),)
+    return (" ".join([noise_text, *findings.floor.remarks]),)
 
 
 def _describe_effect_choice(findings: Findings) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.diagnosis.localisation.localisation_words import write_localisation_sentences
-from analysis.diagnosis.result.ceiling_wording import (
+from analysis.diagnosis.result.error_wording import (
     describe_black_box,
     describe_ceiling,
     describe_confirmation,

@@ -43,8 +43,8 @@ def tabulate_parameters(effect: NamedEffect) -> Table:
 def tabulate_rivals(effect: NamedEffect) -> Table:
     """Tabulate a named effect and its rivals, with probabilities and reasons; rivals that cannot be distinguished come
     first."""
-    rows = [(capitalise(get_noun(effect.effect)), format_probability(effect.probability), "named", "")]
-    rows += [
+    rival_rows = [(capitalise(get_noun(effect.effect)), format_probability(effect.probability), "named", "")]
+    rival_rows += [
         (
             capitalise(get_noun(rival.effect)),
             format_probability(rival.probability),
@@ -53,7 +53,7 @@ def tabulate_rivals(effect: NamedEffect) -> Table:
         )
         for rival in sorted(effect.rivals, key=lambda rival: (not rival.inseparable, -rival.probability))
     ]
-    return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rows))
+    return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rival_rows))
 
 
 def tabulate_candidates(findings: Findings) -> Table | None:
@@ -98,7 +98,8 @@ def tabulate_errors(findings: Findings) -> Table:
 
 def tabulate_channel_errors(findings: Findings, part: Literal["fit", "test"]) -> Table | None:
     """Tabulate the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
-    where there are no time series. Where a statistic was fitted, its chance error takes the place of the noise."""
+    where there are no time series. part: set of samples, a key of `_PART_NAMES`. Where a statistic was fitted, its
+    chance error takes the place of the noise."""
     if not findings.time_series:
         return None
     channel_names, channel_units, noise_rms_by_channel = (
@@ -195,7 +196,7 @@ def _format_stage_error(errors: Errors, stage: str) -> str:
 
 
 def _format_ratio(ratio: float) -> str:
-    """Format the ratio of an error to the noise, such as 1.25×."""
+    """Format the ratio of an error to the noise, such as 1.25×; from 10 on with three significant digits."""
     return f"{ratio:.2f}×" if ratio < 10 else f"{ratio:.3g}×"
 
 
@@ -203,6 +204,6 @@ def _format_interval(estimate: Estimate) -> str:
     """Format the 95 % interval of an estimate with the digits of `format_value`; `MISSING` without an interval."""
     if estimate.ci95 is None:
         return MISSING
-    text = format_value(estimate.value, estimate.unit, estimate.ci95)
-    lower_text, upper_text = text[text.index("[") + 1 : -1].split(", ")
+    formatted_value = format_value(estimate.value, estimate.unit, estimate.ci95)
+    lower_text, upper_text = formatted_value[formatted_value.index("[") + 1 : -1].split(", ")
     return f"{lower_text} to {upper_text}"

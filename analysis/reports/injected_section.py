@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.injected_faults import (
     ANSWER_CLASSES,
-    DETECTABLE,
+    LEAST_DETECTABLE_CHANGE,
     InjectedOutcome,
     Tally,
     make_tallies,
@@ -58,7 +58,7 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
             "the other a fault of mechanism, actuator or sensor, drawn and sealed beforehand, was injected, or none. "
             "The diagnosis was given the model of the real device, both stretches, and nothing else.",
             f"A fault is detectable where it changes the held-out error of a base model, fitted to the clean stretch "
-            f"alone, by a factor of {DETECTABLE} or more, up or down.",
+            f"alone, by a factor of {LEAST_DETECTABLE_CHANGE} or more, up or down.",
         ),
         tables=tuple(table for table in (rate_table, kind_table, recording_table, miss_table) if table.rows),
     )

@@ -83,7 +83,7 @@ def _make_recording_sections(
 
 
 def _make_check_table(checks: Sequence[Check]) -> Table:
-    """Make the table of the checks with their level, result and advice."""
+    """Make the table of the checks: name, level, finding and advice."""
     rows = tuple((check.name, check.level, check.finding, check.advice) for check in checks)
     return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
@@ -96,7 +96,10 @@ def _make_channel_table(overview: Overview) -> Table:
             f"{summary.role} {summary.name}",
             summary.quantity,
             summary.unit,
-            *(typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)),
+            *(
+                typeset(f"{statistic:.4g}")
+                for statistic in (summary.lowest, summary.highest, summary.mean, summary.rms)
+            ),
             str(summary.missing),
         )
         for summary in overview.summaries
@@ -117,13 +120,13 @@ def _make_segment_table(overview: Overview) -> Table:
     )
     rows = tuple(
         (
-            f"{level.number} {level.kind}" if level.number else level.kind,
-            level.role,
-            f"{level.start_s:.4g}",
-            f"{level.duration_s:.4g}",
-            str(level.period) if level.period else "",
-            *(f"{value:.4g}" for value in level.rms),
+            f"{segment_level.number} {segment_level.kind}" if segment_level.number else segment_level.kind,
+            segment_level.role,
+            f"{segment_level.start_s:.4g}",
+            f"{segment_level.duration_s:.4g}",
+            str(segment_level.period) if segment_level.period else "",
+            *(f"{rms:.4g}" for rms in segment_level.rms),
         )
-        for level in overview.levels
+        for segment_level in overview.levels
     )
     return Table("Segments", header, rows, folded=len(rows) > 12)

@@ -1,7 +1,7 @@
 """Data classes of a report, and its rendering as a single self-contained HTML page (template `page.html.j2`).
 
-Figures are inline SVG, so that a page can be archived or sent as one file. All text is escaped. Every module
-`analysis.reports.*_report` makes a `Page`.
+Figures are inline SVG, so that a page can be archived or sent as one file. All text is escaped. The modules
+`analysis.reports.*_report` call `render_page`; those named `*_section` and `*_tables` make the parts of pages.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ class Table:
     notes: tuple[str, ...] = ()
     """Sentences shown below the table."""
     folded: bool = False
-    """Whether only the caption is shown, and the table after a click."""
+    """Whether only the caption is shown until a click on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Page:
     title: str
     summary: str
     banner: str
-    """Important warning, shown at the top of the page; empty = none."""
+    """Important warning, shown at the top of the page; empty: no warning."""
     sections: tuple[Section, ...]
     generated: str
     """Local time at which the report was made, with the UTC offset."""

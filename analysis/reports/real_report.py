@@ -2,7 +2,8 @@
 an injected effect.
 
 Per recording: verdict, named effects, fitted parameters, errors on held-out data, and the objections an expert may
-raise. Called by `study.evaluation.real.write_real`.
+raise. Called by `study.evaluation.real.write_real`; `real_folder` makes `UnusableInput`, and `real_summary` uses
+`VERDICT_WORDS`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +26,7 @@ VERDICT_WORDS = {
     "unexplained": "unexplained",
     "refused": "refused",
 }
-"""Words for the verdict of a diagnosis (`RealAnswer.verdict`)."""
+"""Words for the verdict, by its value in `RealAnswer.verdict`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,13 +25,13 @@ def make_detection_table(analysis: StudyAnalysis) -> Table:
         (
             subject,
             f"{frequency_hz:g} Hz",
-            *_format_detection_cells(analysis, subject, frequency_hz, detection_n, detection_is_cut),
+            *_format_detection_cells(analysis, subject, frequency_hz, detection_n, is_detection_cut),
         )
-        for subject, subject_thresholds_n, subject_is_cut in zip(
+        for subject, subject_thresholds_n, subject_cut_marks in zip(
             thresholds.subjects, thresholds.values, thresholds.censored, strict=True
         )
-        for frequency_hz, detection_n, detection_is_cut in zip(
-            thresholds.frequencies_hz, subject_thresholds_n, subject_is_cut, strict=True
+        for frequency_hz, detection_n, is_detection_cut in zip(
+            thresholds.frequencies_hz, subject_thresholds_n, subject_cut_marks, strict=True
         )
     ]
     return Table(
@@ -147,14 +147,15 @@ def make_practice_table(analysis: StudyAnalysis) -> Table:
 
 
 def _format_detection_cells(
-    analysis: StudyAnalysis, subject: str, frequency_hz: float, detection_n: float | None, detection_is_cut: bool
+    analysis: StudyAnalysis, subject: str, frequency_hz: float, detection_n: float | None, is_detection_cut: bool
 ) -> Iterator[str]:
     """Format the cells of detection threshold, direction threshold and their ratio in dB; the ratio is `MISSING` where
-    either is missing or cut. detection_n: detection threshold (N), None = missing."""
-    direction_n, direction_is_cut = _find_direction_threshold(analysis, subject, frequency_hz)
-    yield mark_cut(detection_n, detection_is_cut)
-    yield mark_cut(direction_n, direction_is_cut)
-    if detection_n is None or direction_n is None or detection_is_cut or direction_is_cut:
+    either is missing or cut. detection_n: detection threshold (N), None = missing. is_detection_cut: whether it is
+    cut."""
+    direction_n, is_direction_cut = _find_direction_threshold(analysis, subject, frequency_hz)
+    yield mark_cut(detection_n, is_detection_cut)
+    yield mark_cut(direction_n, is_direction_cut)
+    if detection_n is None or direction_n is None or is_detection_cut or is_direction_cut:
         yield MISSING
     else:
         yield format_signed(to_db(direction_n) - to_db(detection_n), 1)

@@ -2,8 +2,8 @@
 
     F = -m dv/dt        m > 0 in kg (a rotation: kg m²)
 
-It is added to the mass matrix along the driven axis: M + m a aᵀ, a the axis's unit vector. An entry of `catalogue`,
-which simulation and diagnosis look up by name.
+It is added to the mass matrix along the driven axis: M + m a aᵀ, a the axis's unit vector. The limits of m, 1e-9 and
+1e6, only keep a fit positive and finite. An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 from dataclasses import replace

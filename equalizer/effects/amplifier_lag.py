@@ -2,8 +2,8 @@
 
     T dF/dt + F = u        T in s, command u and actuator force F in N (a rotation: N m)
 
-The solution for a command that is held over a step is exact (`simulation.command_path`). An entry of `catalogue`, which
-simulation and diagnosis look up by name.
+The solution for a command that is held over a step is exact (`simulation.command_path`). The limits of T, 1e-6 and 1 s,
+only keep a fit positive and finite. An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
 
 import numpy as np
@@ -20,19 +20,21 @@ SHORTEST_TIME_CONSTANT_S, LONGEST_TIME_CONSTANT_S = 2e-5, 0.05
 
 
 def _compute_mean_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Compute the mean force (n,) over each step: `OnCommand.change` of this effect."""
+    """Compute the mean force (n,) over each step, in the unit of the commands (n,): `OnCommand.change` of this
+    effect."""
     return compute_lagged_mean(commands, step_s, values["time_constant"])
 
 
 def _compute_end_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Compute the force (n,) at the end of each step: `OnCommand.at_end` of this effect."""
+    """Compute the force (n,) at the end of each step, in the unit of the commands (n,): `OnCommand.at_end`."""
     return compute_lagged_end(commands, step_s, values["time_constant"])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find time constants to start a fit from, the largest first: the time shift of the response, and the value that
-    fits the missing force best (grid search, refined). Empty where the response is early."""
-    likeliest_s = find_command_parameter(
+    fits the missing force best (grid search of 16 values, refined), at least a fifth of a sample each. Empty where the
+    response is early by more than that (`list_lag_starts`)."""
+    best_fitting_s = find_command_parameter(
         evidence,
         axis,
         compute_lagged_mean,
@@ -41,7 +43,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     )
     return tuple(
         {"time_constant": time_constant_s}
-        for time_constant_s in list_lag_starts(evidence, axis, likeliest_s, LONGEST_TIME_CONSTANT_S)
+        for time_constant_s in list_lag_starts(evidence, axis, best_fitting_s, LONGEST_TIME_CONSTANT_S)
     )
 
 

@@ -1,6 +1,6 @@
 """Backlash in a drive: within the gap the motor moves alone, at either end of it contact drives the handle.
 
-The moving mass along the driven axis is split: the motor becomes a body of its own, which the command drives, and acts
+The moving mass along the driven axis is split: the motor becomes a separate body, which the command drives, and acts
 on the handle through a spring and a damper that only push. The gap and the displacement r of motor minus handle are in
 m (a rotation: rad). An entry of `catalogue`, which simulation and diagnosis look up by name.
 """
@@ -35,7 +35,7 @@ length (s) of each simulated excerpt; length (s) of a spectrum's window. Chosen.
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Compute the mean force (N) of the contact's spring and damper over the step, solved for implicitly; the contact
     never pulls. parameters: gap (m), stiffness (N/m), damping (N s/m). step_motion: motion of motor minus handle
-    (`instant`); the force at the step's end is written to it."""
+    (`instant`); the force at the step's end is written to it. memory is not used."""
     half_gap, stiffness, damping_over_step = 0.5 * parameters[0], parameters[1], parameters[2] / step_motion[STEP_S]
     for side in (1.0, -1.0):
         start_penetration, end_penetration = (
@@ -66,8 +66,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _derive_motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
-    """Derive mass of the motor (kg, at most 0.9 of the mass along the axis), and stiffness (N/m) and damping (N s/m) of
-    the contact, with defaults for values that are left out."""
+    """Derive mass of the motor (kg; at most 0.9, chosen, of the mass along the axis, so that the handle keeps a mass),
+    and stiffness (N/m) and damping (N s/m) of the contact, with defaults for values that are left out."""
     axis_mass = compute_quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
     motor_mass = min(values.get("motor_mass", MOTOR_SHARE * axis_mass), 0.9 * axis_mass)
     stiffness = values.get("contact_stiffness", motor_mass * (2 * np.pi * CONTACT_HZ) ** 2)
@@ -109,7 +109,8 @@ def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> Float
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find the two gaps whose simulated impacts match the residual's spectrum best (mean squared log ratio); empty
     without a command. Spectra are compared because the waveform of impacts cannot be predicted. The tried gaps scale
-    with the rms travel that the command would give the free motor if all its power were at 10 Hz."""
+    with the rms travel that the command would give the free motor if all its power were at 10 Hz (chosen; the tried
+    gaps span two decades)."""
     motor_mass, contact_stiffness, contact_damping = _derive_motor_and_contact(evidence.model, axis, {})
     contact_values = {
         "motor_mass": motor_mass,
@@ -117,14 +118,14 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         "contact_damping": contact_damping,
     }
     excerpts = _find_weakest_and_strongest_excerpt(evidence, axis)
-    free_motor_travel = float(np.std(evidence.command[excerpts[-1], axis])) / motor_mass / (2 * np.pi * 10.0) ** 2
+    free_motor_rms_travel = float(np.std(evidence.command[excerpts[-1], axis])) / motor_mass / (2 * np.pi * 10.0) ** 2
     noise_density = evidence.noise**2 / (0.5 * evidence.sample_rate_hz)
     residual_spectra = [
         _estimate_spectrum(evidence, (evidence.response - evidence.predicted)[excerpt]) for excerpt in excerpts
     ]
     linear_responses = [_simulate_excerpt(evidence, axis, None, excerpt) for excerpt in excerpts]
     candidates = []
-    for gap in (RELATIVE_GAPS * free_motor_travel).tolist():
+    for gap in (RELATIVE_GAPS * free_motor_rms_travel).tolist():
         spectral_error = 0.0
         for excerpt, residual_spectrum, linear_response in zip(
             excerpts, residual_spectra, linear_responses, strict=True
@@ -141,15 +142,16 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _find_weakest_and_strongest_excerpt(evidence: Evidence, axis: int) -> list[slice]:
-    """Find two excerpts of `EXCERPT_S`: that with the least command power above a thousandth of the largest, and that
-    with the largest. Samples that do not count add no power."""
-    length = min(int(EXCERPT_S * evidence.sample_rate_hz), len(evidence.command))
+    """Find two excerpts of `EXCERPT_S`: that with the least command power above a thousandth (chosen) of the largest,
+    and that with the largest. Samples with `evidence.used` = 0 add no power. Shorter in a recording below that
+    length."""
+    excerpt_samples = min(int(EXCERPT_S * evidence.sample_rate_hz), len(evidence.command))
     cumulative_power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
-    first_samples = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))
-    excerpt_power = cumulative_power[first_samples + length] - cumulative_power[first_samples]
+    first_samples = np.arange(0, len(evidence.command) - excerpt_samples + 1, max(excerpt_samples // 4, 1))
+    excerpt_power = cumulative_power[first_samples + excerpt_samples] - cumulative_power[first_samples]
     significant_power = np.where(excerpt_power > 1e-3 * excerpt_power.max(), excerpt_power, np.inf)
     return [
-        slice(int(first_sample), int(first_sample) + length)
+        slice(int(first_sample), int(first_sample) + excerpt_samples)
         for first_sample in (first_samples[np.argmin(significant_power)], first_samples[np.argmax(excerpt_power)])
     ]
 

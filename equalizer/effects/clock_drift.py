@@ -35,7 +35,8 @@ def _apply_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[in
 
 
 def _apply_position_drift(position: FloatArray, sample_rate_hz: float, values: Values) -> FloatArray:
-    """Resample the position likewise where `with_position` is 1, its default: `OnResponse.on_position`."""
+    """Resample the position (n, p) as `_apply_drift` does where `with_position` (default 1) is above 0.5, else return
+    it unchanged: `OnResponse.on_position`."""
     return _apply_drift(position, sample_rate_hz, (), values) if values.get("with_position", 1.0) > 0.5 else position
 
 
@@ -55,7 +56,8 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
 
 
 def _compute_misfit(evidence: Evidence, values: Values) -> float:
-    """Compute the sum of squares of the response's residual over the noise, over the samples that count."""
+    """Compute the sum of squares of the response's residual over the noise, over the samples with `evidence.used` >
+    0."""
     drifted_prediction = _apply_drift(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - drifted_prediction) / evidence.noise) ** 2)[evidence.used > 0]))
 
@@ -67,11 +69,14 @@ def _detect_position_drift(evidence: Evidence, response_shift_rate: float) -> fl
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
     position_noise = evidence.position_noise
-    position_shift = _estimate_shift_rate(
+    position_rate_and_error = _estimate_shift_rate(
         evidence, evidence.position / position_noise, evidence.predicted_position / position_noise
     )
     return (
-        1.0 if position_shift is None or abs(position_shift[0] - response_shift_rate) < abs(position_shift[0]) else 0.0
+        1.0
+        if position_rate_and_error is None
+        or abs(position_rate_and_error[0] - response_shift_rate) < abs(position_rate_and_error[0])
+        else 0.0
     )
 
 
@@ -93,8 +98,9 @@ def _estimate_significant_shift_rate(evidence: Evidence) -> float | None:
 
 def _estimate_shift_rate(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
     """Estimate the slope of the time shift over time (s per s; Theil-Sen estimator), and its standard error from the
-    scaled median absolute deviation of the residuals. None with too few windows in which most samples count and the
-    prediction moves, or a sample period above `LARGEST_SHIFT_S`. measured, predicted: (n, channels), over the noise."""
+    scaled median absolute deviation of the residuals. None for fewer than `LEAST_WINDOWS` windows in which more than
+    half of the samples are used and the prediction is not zero, and for a sample period above `LARGEST_SHIFT_S`.
+    measured, predicted: (n, channels), over the noise."""
     sample_rate_hz = evidence.sample_rate_hz
     window_samples = int(WINDOW_S * sample_rate_hz)
     if LARGEST_SHIFT_S * sample_rate_hz < 1:

@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Return the force (N), the same at every instant. parameters: force."""
+    """Return the force (N), the same at every instant. parameters: force; memory and motion are not used."""
     return float(parameters[0])
 
 

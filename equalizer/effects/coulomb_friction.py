@@ -19,8 +19,8 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Compute the mean friction force (N) over a step. parameters: level; memory: deflection of the bristle over its
-    largest."""
+    """Compute the mean friction force (N) over a step. parameters: level (N). memory: deflection of the bristle,
+    relative to that at which it slips; advanced to the step's end."""
     return float(compute_friction_force(parameters[0], parameters[0], memory[0], memory, step_motion))
 
 

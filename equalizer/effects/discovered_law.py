@@ -2,8 +2,8 @@
 
 A law (`equalizer.laws.law`) is found in recordings (`analysis.diagnosis.discovery`) or written in a model file, and has
 no name in the vocabulary. This module binds the signals of its formula (x, vx, ax, fx, t, channel names) to the columns
-of a recording, compiles it, and derives the fit parameters p0, p1, … from their roles in the formula. Used by
-`placing`, `law_entry`, the diagnosis and `equalizer.tracking.compensation`.
+of a recording, compiles it, and derives the fit parameters p0, p1, … from their roles in the formula. Called by
+`placing`, `law_entry`, `command_sign`, the diagnosis, `analysis.evaluation.laws` and `equalizer.tracking.compensation`.
 """
 
 import re
@@ -72,7 +72,7 @@ def make_law_effect(law: Law, channels: Channels = Channels()) -> Effect:
 
     A formula names its signals by axis and quantity (x, vx, ax, fx; y, …) or by the recording's channel names. Where
     the channel names do not end in x, y, z, these letters denote the axes in their order. The effect has no starting
-    values of its own. Raises LawError for a signal that the recording lacks.
+    values. Raises LawError for a signal that the recording lacks.
     """
     action_makers: dict[str, Callable[[Law, Channels], Action]] = {
         "force": _make_force_action, "command": _make_command_action, "response": _make_response_action
@@ -115,14 +115,20 @@ def derive_law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
-    orders = [compute_motion_dimension(derivative) for derivative in range(len(DERIVATIVE_PREFIXES))]
-    signals = {"t": SECOND, **dict.fromkeys(channels.outputs, orders[order]), **dict.fromkeys(channels.inputs, FORCE)}
+    motion = [compute_motion_dimension(derivative) for derivative in range(len(DERIVATIVE_PREFIXES))]
+    dimensions = {
+        "t": SECOND,
+        **dict.fromkeys(channels.outputs, motion[order]),
+        **dict.fromkeys(channels.inputs, FORCE),
+    }
     for letter in AXIS_LETTERS:
-        signals |= {prefix + letter: orders[derivative] for derivative, prefix in enumerate(DERIVATIVE_PREFIXES)}
-        signals[COMMAND_PREFIX + letter] = FORCE
+        dimensions |= {prefix + letter: motion[derivative] for derivative, prefix in enumerate(DERIVATIVE_PREFIXES)}
+        dimensions[COMMAND_PREFIX + letter] = FORCE
     # A formula divides a condition by its own unit, so conditions are counted in that unit.
-    signals = dict.fromkeys(law.variables, DIMENSIONLESS) | signals
-    return derive_units(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
+    dimensions = dict.fromkeys(law.variables, DIMENSIONLESS) | dimensions
+    return derive_units(
+        law.tree, law.numbers, dimensions, motion[order] if law.acts_on == "response" else FORCE, system
+    )
 
 
 def get_law_values(law: Law) -> Values:
@@ -136,8 +142,7 @@ def with_law_values(law: Law, values: Values) -> Law:
 
 
 def make_law_parameters(law: Law) -> tuple[Parameter, ...]:
-    """Make the parameters p0, p1, … for a fit: range and scale follow from each parameter's role in the formula, and
-    its sign."""
+    """Make the fit parameters p0, p1, …, with range and scale by each parameter's role in the formula and its sign."""
     parameter_roles = find_parameter_roles(law.tree)
     vanishing_value = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
     return tuple(
@@ -154,8 +159,8 @@ def _adds_to_signal(tree: Node) -> bool:
 
 
 def _make_parameter(name: str, value: float, role: Role, vanishing_value: float | None) -> Parameter:
-    """Make the fit parameter of a role (`equalizer.laws.law.Role`). vanishing_value: value at which a factor makes the
-    effect vanish; None: at none."""
+    """Make the fit parameter of a role (`equalizer.laws.law.Role`), with chosen ranges. vanishing_value: value at which
+    a factor makes the effect vanish; None: at none."""
     if role == "factor":
         return Parameter(name, -LARGEST_PARAMETER, LARGEST_PARAMETER, vanishing_value, scale="signed")
     if role == "phase":
@@ -177,8 +182,7 @@ def _format_left_hand_side(law: Law) -> str:
 
 
 def has_memory(law: Law) -> bool:
-    """Whether the formula has an operator with memory (lag, play, delay, integral): it depends on past
-    signals."""
+    """Whether the formula has an operator with memory: lag, play, delay or integral."""
     return any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree))
 
 
@@ -258,7 +262,7 @@ def _make_command_action(law: Law, channels: Channels) -> OnCommand:
     command."""
     signals = {COMMAND_PREFIX + letter: axis for axis, letter in enumerate(derive_axis_letters(channels.inputs))}
     signals |= {name: axis for axis, name in enumerate(channels.inputs)}
-    # Compiled only to raise LawError now, instead of in the first simulation.
+    # Compiled only to raise LawError now, not in the first simulation: the columns, such as -1 of t, are not read.
     compile_program(law.tree, {**signals, "t": -1})
 
     def compute_force(

@@ -86,7 +86,8 @@ class JointForce:
     """Arguments as in `Structure`. Returns the model with the joint in it (its additional coordinates come last), and
     the direction (n,) in these coordinates along which the joint moves and its force acts."""
     law: Any
-    """As in `AxisForce`; so are `memory`, `steps` and `acceleration`."""
+    """Compiled function as in `AxisForce`; `memory`, `steps` and `acceleration` have the meaning that they have
+    there."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
     """The law's `parameters`; the model is that before `change`."""
     memory: int = 0
@@ -135,7 +136,8 @@ class OnResponse:
     """For a random effect, the response conditioned on a measurement: samples (n, p), measured (n, p), its noise (p,),
     channels, values. Without a measurement `change` draws a realisation."""
     conditioned_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
-    """Likewise for the position. Arguments: response before and after, position (n, p), measured position (n, p)."""
+    """For a random effect, the positions conditioned on a measurement. Arguments: response before and after the effect,
+    position, measured position, (n, p) each."""
 
 
 Action = Structure | AxisForce | JointForce | OnCommand | OnResponse

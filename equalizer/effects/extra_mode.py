@@ -48,7 +48,7 @@ def _attach_oscillator(model: MechanicalModel, axis: int, values: Values) -> Mec
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find up to `MAX_MODES` oscillators that explain most of the missing force, each by a coarse and a fine grid
-    search over natural frequency (up to 0.4 of the sample rate) and damping ratio."""
+    search over natural frequency (first 90 values up to 0.4 of the sample rate, chosen) and damping ratio."""
     missing_force, starting_values = estimate_missing_force_spectra(evidence, axis), []
     natural_hz = np.geomspace(LOWEST_NATURAL_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(MAX_MODES):

@@ -17,8 +17,8 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _INITIAL_MODEL_SHARE = 0.1
-"""Second starting values, as shares of the model's own mass, damping and stiffness. In the first, a tenth of them
-replaces each value that the regression finds negative or zero. Chosen."""
+"""Second set of starting values, relative to the model's own mass, damping and stiffness along the axis. In the first
+set, a tenth of the value of the second set replaces each estimate that is not positive. Chosen."""
 
 
 def _add_impedance(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
@@ -34,7 +34,8 @@ def _add_impedance(model: MechanicalModel, axis: int, values: Values) -> Mechani
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find values by linear regression of the missing force, then shares of the model's own values."""
+    """Find two sets of starting values: by linear regression of the missing force, and as a share of the model's own
+    mass, damping and stiffness (`_INITIAL_MODEL_SHARE`)."""
     motion = select_axis_motion(evidence, axis)
     regression = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
     estimates = regression.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
@@ -43,13 +44,14 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         _INITIAL_MODEL_SHARE * compute_quadratic_form(matrix, direction)
         for matrix in (model.mass, model.damping, model.stiffness)
     ]
-    values = [
+    positive_estimates = [
         estimate if estimate > 0 else 0.1 * model_share
         for estimate, model_share in zip(estimates, model_shares, strict=True)
     ]
     parameter_names = ("mass", "damping", "stiffness")
     return tuple(
-        dict(zip(parameter_names, parameter_values, strict=True)) for parameter_values in (values, model_shares)
+        dict(zip(parameter_names, parameter_values, strict=True))
+        for parameter_values in (positive_estimates, model_shares)
     )
 
 

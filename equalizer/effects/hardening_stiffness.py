@@ -1,5 +1,4 @@
-"""Cubic (Duffing) stiffness: a spring whose stiffness changes with the square of the deflection, in both directions
-alike.
+"""Cubic (Duffing) stiffness: the stiffness of a spring changes with the square of its deflection, symmetrically.
 
     F = -k3 x³        k3 > 0: hardening, k3 < 0: softening; N/m³ (a rotation: N m/rad³)
 

@@ -21,7 +21,7 @@ SMALLEST_OFFSET_SAMPLES = 1e-3
 def _shift_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """Delay the response (n, c) by `offset` seconds. `interpolated`: share (0 to 1) of linear interpolation between
+    """Delay the response (n, p) by `offset` seconds. `interpolated`: share (0 to 1) of linear interpolation between
     samples; the rest is band-limited (windowed sinc). `channels` is not used: all are delayed alike."""
     return resample_response(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
 

@@ -47,10 +47,10 @@ _NO_FORCE: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Compute the mean force (N) of spring and friction over the step. parameters: gap (m), stiffness (N/m), slip force
-    (N). memory: the state of friction. step_motion: relative motion of the bodies (`instant`); the force at the end is
-    written to it."""
+    (N). memory: deflection of the friction bristle (`dry_friction_kernel`). step_motion: relative motion of the bodies
+    (`instant`); the force at the end is written to it."""
     half_gap, stiffness, slip_force = 0.5 * parameters[0], parameters[1], parameters[2]
-    spring = spring_at_end = 0.0
+    spring_force = end_spring_force = 0.0
     for side in (1.0, -1.0):
         start_deflection, end_deflection = (
             max(side * step_motion[X] - half_gap, 0.0),
@@ -67,13 +67,13 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
             # Contact is lost within the step: no force at its end.
             if end_deflection - step_motion[X_PER_N] * contact_force < 0:
                 contact_force = stiffness * (1 - end_weight) * start_deflection
-            spring = -side * max(contact_force, 0.0)
-            spring_at_end = -side * stiffness * max(end_deflection + side * step_motion[X_PER_N] * spring, 0.0)
+            spring_force = -side * max(contact_force, 0.0)
+            end_spring_force = -side * stiffness * max(end_deflection + side * step_motion[X_PER_N] * spring_force, 0.0)
             break
-    step_motion[V_FREE] += step_motion[V_PER_N] * spring
-    friction = compute_friction_force(slip_force, slip_force, memory[0], memory, step_motion)
-    step_motion[F_END] += spring_at_end
-    return float(spring + friction)
+    step_motion[V_FREE] += step_motion[V_PER_N] * spring_force
+    friction_force = compute_friction_force(slip_force, slip_force, memory[0], memory, step_motion)
+    step_motion[F_END] += end_spring_force
+    return float(spring_force + friction_force)
 
 
 def find_joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
@@ -81,7 +81,8 @@ def find_joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
 
     The joint connects the axis to the undriven body that would have the largest kinetic energy if it followed the axis
     quasi-statically (mass times squared static displacement per displacement of the axis). Where no undriven body with
-    a spring is coupled to the axis, the joint connects the axis to the ground.
+    a spring is coupled to the axis, the joint connects the axis to the ground. A coordinate is undriven where all its
+    components of the driven axes are below 1e-9 (rounding).
     """
     direction, axes = compute_driven_axes(model)[:, axis], compute_driven_axes(model)
     is_undriven = np.linalg.norm(axes, axis=1) < 1e-9
@@ -110,7 +111,8 @@ def _locate_joint(model: MechanicalModel, axis: int, values: Values) -> tuple[Me
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find the two best sets of values of a coarse grid by the mean square error of a simulated excerpt: first all gaps
-    and stiffnesses with the middle slip force, then the best of these pairs with the other slip forces."""
+    and stiffnesses with the middle slip force, then the best of these pairs with the other slip forces. The scale of
+    stiffness is that of the model along the joint, at least 1e-6 N/m, the lower limit of the parameter."""
     excerpt, direction = _find_strongest_excerpt(evidence, axis), find_joint_direction(evidence.model, axis)
     travel = float(np.std(_simulate_excerpt(evidence, axis, _NO_FORCE, excerpt)[1]))
     model_stiffness = max(
@@ -145,12 +147,12 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 def _find_strongest_excerpt(evidence: Evidence, axis: int) -> slice:
     """Find the excerpt of at most `EXCERPT_S` in which the acceleration of the axis has the largest sum of squares over
-    the samples that count."""
-    length = min(int(EXCERPT_S * evidence.sample_rate_hz), len(evidence.command))
+    the samples with `evidence.used` > 0."""
+    excerpt_samples = min(int(EXCERPT_S * evidence.sample_rate_hz), len(evidence.command))
     acceleration = np.gradient(evidence.axis_velocity[:, axis])
     cumulative_power = np.cumsum(np.append(0.0, acceleration**2 * evidence.used))
-    first_sample = int(np.argmax(cumulative_power[length:] - cumulative_power[:-length]))
-    return slice(first_sample, first_sample + length)
+    first_sample = int(np.argmax(cumulative_power[excerpt_samples:] - cumulative_power[:-excerpt_samples]))
+    return slice(first_sample, first_sample + excerpt_samples)
 
 
 def _simulate_excerpt(evidence: Evidence, axis: int, values: Values, excerpt: slice) -> tuple[FloatArray, FloatArray]:

@@ -20,17 +20,17 @@ DISTINGUISHABLE_SIGMA = 4.0
 """Difference of two successive samples, over the noise, above which a repeated sample is distinguishable. Chosen, as
 are the limits below."""
 LEAST_LOST_SAMPLES = 8
-"""Fewest repeated readings that count as lost samples."""
+"""Fewest lost samples for a fraction to be estimated."""
 LARGEST_FRACTION = 0.3
 """Largest fraction of lost samples."""
 FRACTION_ITERATIONS = 4
-"""Iterations between the fraction and the decisions on which samples are lost."""
+"""Number of iterations; each decides with the last fraction which samples are lost, and counts them for the next."""
 LEAST_CONTROL_RATIO = 3.0
 """Negative control: repeated samples must be more than this many times as frequent as samples that equal the next
 sample, for which there is no physical cause."""
 
 
-def _lose_at_random(
+def _repeat_at_random(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
     """Repeat samples of these channels of the response (n, p) at random: `OnResponse.change` of this effect."""
@@ -42,7 +42,7 @@ def _lose_at_random(
     return readings
 
 
-def _lose_as_measured(
+def _repeat_as_measured(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
     """Repeat the samples of the response (n, p) that the measurement shows as lost; unchanged for a fraction of 0 or
@@ -73,7 +73,7 @@ def _repeat_by_likelihood(
     return readings, is_lost
 
 
-def _lose_positions_as_measured(
+def _repeat_positions_as_measured(
     response_before: FloatArray, response_after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
     """Repeat positions (n, p) where samples of the response are lost, provided that this brings them closer to the
@@ -85,7 +85,7 @@ def _lose_positions_as_measured(
     repeated_position = _repeat_rows(position, is_lost)
     if not np.nansum((measured - repeated_position)[is_lost] ** 2) < np.nansum((measured - position)[is_lost] ** 2):
         return position
-    return _repeat_rows(position, is_lost | _is_clearly_repeated(position, measured))
+    return _repeat_rows(position, is_lost | _find_clear_repetitions(position, measured))
 
 
 def _repeat_rows(position: FloatArray, is_lost: BoolArray) -> FloatArray:
@@ -95,7 +95,7 @@ def _repeat_rows(position: FloatArray, is_lost: BoolArray) -> FloatArray:
     return repeated_position
 
 
-def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> BoolArray:
+def _find_clear_repetitions(position: FloatArray, measured: FloatArray) -> BoolArray:
     """Mark the samples (n,) whose measured position is clearly nearer to the simulated position of the preceding sample
     than to their own: the difference of the squared distances, in units of the noise (1.4826 times the median absolute
     deviation), exceeds half of `DISTINGUISHABLE_SIGMA` squared."""
@@ -109,7 +109,8 @@ def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> BoolArra
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Find the fraction of lost samples; empty where they are too few or the negative control has as many."""
+    """Find the fraction of lost samples; empty where they are too few, or not `LEAST_CONTROL_RATIO` times as frequent
+    as in the negative control. For all channels together (ALL_SITES, -1) the last channel is used."""
     columns = [channel]
     fraction = _estimate_fraction(evidence, columns, 1)
     return (
@@ -149,7 +150,7 @@ EFFECT = Effect(
     "that another logger read",
     parameters=(Parameter("fraction", 1e-6, LARGEST_FRACTION, none=0.0, fixed=True),),
     action=OnResponse(
-        _lose_at_random, stage=5, conditioned=_lose_as_measured, conditioned_position=_lose_positions_as_measured
+        _repeat_at_random, stage=5, conditioned=_repeat_as_measured, conditioned_position=_repeat_positions_as_measured
     ),
     starts=_find_starting_values,
     of_time=True,

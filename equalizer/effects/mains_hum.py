@@ -15,10 +15,10 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import fit_coefficients
 from equalizer.signals.signal import FloatArray
 
-MAINS_HZ = (45.0, 65.0)
-"""Range of mains frequencies, 50 and 60 Hz with a margin, that is searched first."""
+MAINS_BAND_HZ = (45.0, 65.0)
+"""Band (Hz) of mains frequencies, 50 and 60 Hz with a margin, that is searched first."""
 LEAST_PEAK_RATIO = 12.0
-"""Least ratio of a tone's power to the median power of the lines around it. Chosen, as are the limits below."""
+"""Least ratio of a tone's power to the median power of the lines around it. Chosen, as are the constants below."""
 NEIGHBOURHOOD_HZ = 3.0
 """Half-width (Hz) of the band around a line over which that median is taken."""
 FREQUENCY_STEPS = 4
@@ -29,7 +29,7 @@ tone."""
 COMMANDED_RATIO = 0.1
 """Half the amplitude of a tone in a command, over the command's rms, above which the tone counts as commanded."""
 DOMINANT_RATIO, HIGHEST_HARMONIC = 0.5, 9
-"""The same ratio for a tone with half of a command's power, and highest order up to which harmonics of such a tone
+"""That ratio for a tone with half of a command's power, and highest order up to which harmonics of such a tone
 count as commanded."""
 
 
@@ -43,14 +43,15 @@ def _add_tone(response: FloatArray, sample_rate_hz: float, channels: tuple[int, 
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Find the strongest line of the residual, summed over all channels, between 45 and 65 Hz and from 1 Hz to 0.49 of
-    the sample rate, with this channel's amplitude and phase. A line that does not stand out, is not steady or is
-    commanded is left out, and so is the second where both are the same."""
+    """Find the strongest line of the residual, summed over all channels, in `MAINS_BAND_HZ` and from 1 Hz to 0.49 of
+    the sample rate (chosen: just below half of it), with this channel's amplitude and phase. A line that does not stand
+    out, is not steady or is commanded is left out, and so is the second tone if it is closer to the first than the
+    spacing of the lines."""
     residual = (evidence.response - evidence.predicted) * evidence.used[:, None]
     power = np.sum(np.abs(np.fft.rfft(residual / evidence.noise, axis=0)) ** 2, axis=1)
     lines_hz = np.fft.rfftfreq(len(residual), 1 / evidence.sample_rate_hz)
     tones: list[Values] = []
-    for low_hz, high_hz in (MAINS_HZ, (1.0, 0.49 * evidence.sample_rate_hz)):
+    for low_hz, high_hz in (MAINS_BAND_HZ, (1.0, 0.49 * evidence.sample_rate_hz)):
         band_lines = np.flatnonzero((lines_hz >= low_hz) & (lines_hz <= high_hz))
         if not len(band_lines):
             continue

@@ -2,7 +2,7 @@
 values).
 
 A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
-file, `to_model_effects` back. Called by `analysis.diagnosis`, by `command_sign`, and by
+file, `to_model_effects` back. Called by `analysis.diagnosis` and its figures, by `command_sign`, and by
 `study.workflows.files.check_model_channels` to check a model.
 """
 
@@ -95,7 +95,7 @@ def shorten_axis_name(channel: str, channels: tuple[str, ...]) -> str:
 
 def _iterate_axis_names(placed_effect: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
     """Iterate over the axis names of the sites, or yield a single None for all sites. Raises PlacingError for a site
-    that is not there."""
+    beyond the channels."""
     is_at_all_sites = placed_effect.effect.law is None and set(placed_effect.sites) == set(range(len(channels)))
     if is_at_all_sites and (len(channels) > 1 or "one" not in placed_effect.effect.sites):
         yield None
@@ -126,7 +126,8 @@ def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
 
 
 def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
-    """Place the effect of a discovered law at its site. Raises PlacingError for a signal or axis that is not there."""
+    """Place the effect of a discovered law at its site. Raises PlacingError for a signal or axis that the channels
+    lack."""
     try:
         placed_law = make_law_effect(law, channels)
     except LawError as error:

@@ -16,14 +16,14 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import fit_coefficients
 from equalizer.signals.signal import FloatArray
 
-LEAST_DRIFT_SIGMA = 5.0
-"""Least linear drift, in its standard errors, for the effect to be tried."""
+LEAST_OFFSET_CHANGE_SIGMA = 5.0
+"""Least total of a linear drift, in its standard errors, for the effect to be tried. Chosen."""
 LARGEST_RATIO = 3.0
-"""Largest magnitude of `bend` and `start`, which are relative to the total drift."""
+"""Largest magnitude of `bend` and `start`, which are relative to the total drift. Chosen."""
 
 
 def _compute_drift_shape(sample_count: int, bend: float, start: float = 0.0) -> FloatArray:
-    """Compute the drift (sample_count,) relative to its total."""
+    """Compute the drift (sample_count,) relative to its total, by the equation of the module."""
     time_share = np.linspace(0.0, 1.0, sample_count)
     return np.asarray(start + time_share + 4 * bend * time_share * (1 - time_share))
 
@@ -39,9 +39,13 @@ def _add_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int,
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find starting values from the residual by linear least squares: with a quadratic term, then without; none where
     the linear drift is not significant."""
-    residual, n = (evidence.response - evidence.predicted)[:, channel], len(evidence.response)
+    residual, sample_count = (evidence.response - evidence.predicted)[:, channel], len(evidence.response)
     basis = np.column_stack(
-        [_compute_drift_shape(n, 0.0), _compute_drift_shape(n, 1.0) - _compute_drift_shape(n, 0.0), np.ones(n)]
+        [
+            _compute_drift_shape(sample_count, 0.0),
+            _compute_drift_shape(sample_count, 1.0) - _compute_drift_shape(sample_count, 0.0),
+            np.ones(sample_count),
+        ]
     )
     total, bend_coefficient, offset = fit_coefficients(residual, basis, evidence.used).tolist()
     linear_total, linear_offset = fit_coefficients(residual, basis[:, [0, 2]], evidence.used).tolist()
@@ -50,7 +54,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
     )
     # With white residuals, the standard error of a slope that is fitted together with an offset, over s from 0 to 1, is
     # sqrt(12 / n) times the residual's rms: the variance of s is 1/12.
-    if abs(linear_total) * np.sqrt(evidence.used.sum() / 12) < LEAST_DRIFT_SIGMA * residual_rms:
+    if abs(linear_total) * np.sqrt(evidence.used.sum() / 12) < LEAST_OFFSET_CHANGE_SIGMA * residual_rms:
         return ()
     return (
         {"total": total, "bend": _limit_ratio(bend_coefficient, total), "start": _limit_ratio(offset, total)},

@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 ANGLE_NAMES = ("about_x", "about_y", "about_z")
 """Parameters: components of the rotation vector, in degrees."""
 LARGEST_ANGLE_DEG = 120.0
-"""Largest angle (degrees): below half a turn the rotation vector is unique."""
+"""Largest angle (degrees). Chosen below half a turn, because the rotation vector is unique only there."""
 LEAST_ANGLE_DEG = 0.01
 """Least angle (degrees) that is tried. Chosen."""
 
@@ -47,8 +47,12 @@ def _compute_rotation_matrix(vector: FloatArray) -> FloatArray:
     """Compute the rotation matrix (3, 3) of a rotation vector in radians (Rodrigues' formula)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector / angle if angle > 0 else vector
-    cross_product = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross_product + (1 - np.cos(angle)) * cross_product @ cross_product)
+    cross_product_matrix = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(
+        np.eye(3)
+        + np.sin(angle) * cross_product_matrix
+        + (1 - np.cos(angle)) * cross_product_matrix @ cross_product_matrix
+    )
 
 
 def _compute_rotation_vector(matrix: FloatArray) -> FloatArray:
@@ -74,8 +78,8 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
         evidence.response[is_used],
     )
     left_vectors, _, right_vectors = np.linalg.svd(measured_xyz.T @ predicted_xyz)
-    reflection_sign = np.diag([1.0, 1.0, np.linalg.det(left_vectors @ right_vectors)])
-    rotation_vector_deg = np.degrees(_compute_rotation_vector(left_vectors @ reflection_sign @ right_vectors))
+    reflection_correction = np.diag([1.0, 1.0, np.linalg.det(left_vectors @ right_vectors)])
+    rotation_vector_deg = np.degrees(_compute_rotation_vector(left_vectors @ reflection_correction @ right_vectors))
     if not LEAST_ANGLE_DEG < np.linalg.norm(rotation_vector_deg) < LARGEST_ANGLE_DEG:
         return ()
     return (dict(zip(ANGLE_NAMES, rotation_vector_deg.tolist(), strict=True)),)

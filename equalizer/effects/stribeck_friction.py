@@ -27,7 +27,8 @@ _INITIAL_STATIC_RATIO = 1.2
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Compute the mean friction force (N) over the step, at its mean velocity, which depends on the force: at most
     three fixed-point iterations, each from the same bristle deflection, until the level changes by at most 1e-6.
-    parameters: coulomb, static, speed."""
+    parameters: as `_pack_parameters` returns them. memory: deflection of the bristle, relative to that at which it
+    slips."""
     mean_velocity, force, start_deflection, previous_level = step_motion[V], 0.0, memory[0], -1.0
     for _ in range(3):
         level = parameters[0] + (parameters[1] - parameters[0]) * np.exp(-((mean_velocity / parameters[2]) ** 2))
@@ -48,7 +49,7 @@ def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> Float
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find the levels by regression of the missing force, at the tried Stribeck velocity that explains most. Empty
     where neither level is positive; the Coulomb level is at least a twentieth of the static excess, and the static
-    level `_INITIAL_STATIC_RATIO` times it where the excess is below 2 %."""
+    level `_INITIAL_STATIC_RATIO` times it where the excess is at most 2 % of it (limits chosen)."""
     motion = select_sliding_motion(evidence, axis)
     sliding_direction, rms_velocity = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
     speed, fit = find_best_trial(

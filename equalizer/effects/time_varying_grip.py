@@ -35,8 +35,8 @@ Chosen."""
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Compute the mean force (N) over a step by the trapezoidal rule: F = -(d (v + v1) + k (x + x1)) / 2. The state x1,
     v1 at the end of the step is linear in F, so that the implicit equation is solved exactly, unless its denominator
-    falls below `_LEAST_DENOMINATOR`: x1 = X_FREE + F X_PER_N, and alike for v1. d and k are taken in the middle of the
-    step. parameters: as `_pack_parameters` returns them; step_motion: see `instant`."""
+    falls below `_LEAST_DENOMINATOR`: x1 = X_FREE + F X_PER_N, v1 = V_FREE + F V_PER_N. d and k are taken in the middle
+    of the step. parameters: as `_pack_parameters` returns them; step_motion: see `instant`."""
     modulation = parameters[1] * np.sin(
         parameters[0] * (step_motion[TIME_S] + 0.5 * step_motion[STEP_S]) + parameters[2]
     )
@@ -51,8 +51,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 def condense_to_ground(matrix: FloatArray, driven_axes: FloatArray, axis: int) -> float:
     """Compute the damping (N s/m) or stiffness (N/m) between a driven axis and the ground; coordinates on which no
-    command acts are eliminated by static condensation (Guyan 1965). matrix: (n, n), of damping or stiffness;
-    driven_axes: (n, m)."""
+    command acts (components of `driven_axes` below 1e-9, rounding) are eliminated by static condensation (Guyan 1965).
+    matrix: (n, n), of damping or stiffness; driven_axes: (n, m)."""
     is_undriven = np.linalg.norm(driven_axes, axis=1) < 1e-9
     condensed_matrix = matrix[np.ix_(~is_undriven, ~is_undriven)]
     if is_undriven.any():
@@ -83,28 +83,28 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     sample_count, sample_rate_hz = len(evidence.command), evidence.sample_rate_hz
     missing_force, damping_force = np.zeros((sample_count, len(sites))), np.zeros((sample_count, len(sites)))
     spring_force = np.zeros((sample_count, len(sites)))
-    driven_axes, used = compute_driven_axes(evidence.model), evidence.used > 0
+    driven_axes, is_used = compute_driven_axes(evidence.model), evidence.used > 0
     for column, site in enumerate(sites):
-        missing_force[used, column] = regress_out_linear_terms(select_axis_motion(evidence, site)).force
-        damping_force[used, column] = (
-            -condense_to_ground(evidence.model.damping, driven_axes, site) * evidence.axis_velocity[used, site]
+        missing_force[is_used, column] = regress_out_linear_terms(select_axis_motion(evidence, site)).force
+        damping_force[is_used, column] = (
+            -condense_to_ground(evidence.model.damping, driven_axes, site) * evidence.axis_velocity[is_used, site]
         )
-        spring_force[used, column] = (
-            -condense_to_ground(evidence.model.stiffness, driven_axes, site) * evidence.axis_position[used, site]
+        spring_force[is_used, column] = (
+            -condense_to_ground(evidence.model.stiffness, driven_axes, site) * evidence.axis_position[is_used, site]
         )
     if not damping_force.any():
         return ()
     candidates = []
     for modulation_hz in _find_likely_frequencies(missing_force, damping_force, sample_rate_hz):
         angle = 2 * np.pi * modulation_hz * np.arange(sample_count)[:, None] / sample_rate_hz
-        shapes = [
+        modulated_forces = [
             ground_force * wave
             for ground_force in (damping_force, spring_force)
             for wave in (np.sin(angle), np.cos(angle))
         ]
         fit = PartialRegression(
             missing_force.ravel(), np.column_stack([damping_force.ravel(), spring_force.ravel()])
-        ).fit(*(shape.ravel() for shape in shapes))
+        ).fit(*(modulated_force.ravel() for modulated_force in modulated_forces))
         candidates.append((fit.explained_share, _compute_grip_values(modulation_hz, fit.strengths)))
     return tuple(values for _, values in sorted(candidates, key=lambda item: -item[0]))
 
@@ -112,7 +112,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 def _compute_grip_values(modulation_hz: float, strengths: FloatArray) -> Values:
     """Compute the parameters from the weights of the damping force times sine and cosine, then of the spring force
     times these. The stiffness share is the projection of the spring force's modulation on that of the damping force,
-    limited to the range of the parameter."""
+    limited to the range of the parameter in `EFFECT` (chosen)."""
     sine, cosine, spring_sine, spring_cosine = strengths.tolist()
     depth = float(np.hypot(sine, cosine))
     stiffness_share = (spring_sine * sine + spring_cosine * cosine) / max(depth**2, np.finfo(float).tiny)
@@ -146,20 +146,20 @@ def _find_likely_frequencies(
         _compute_low_lines(np.sum(missing_force * damping_force, axis=1), padded_size, last_line + 1)
     )
     power_spectrum = np.conj(_compute_low_lines(np.sum(damping_force**2, axis=1), padded_size, 2 * last_line + 1))
-    double_frequency, total_power = power_spectrum[: 2 * last_line + 1 : 2], float(power_spectrum[0].real)
+    double_frequency_spectrum, total_power = power_spectrum[: 2 * last_line + 1 : 2], float(power_spectrum[0].real)
     normal_matrices = np.empty((last_line + 1, 3, 3))
     normal_matrices[:, 0, 0] = total_power
     normal_matrices[:, 0, 1] = normal_matrices[:, 1, 0] = power_spectrum[: last_line + 1].imag
     normal_matrices[:, 0, 2] = normal_matrices[:, 2, 0] = power_spectrum[: last_line + 1].real
     normal_matrices[:, 1, 1], normal_matrices[:, 2, 2] = (
-        (total_power - double_frequency.real) / 2,
-        (total_power + double_frequency.real) / 2,
+        (total_power - double_frequency_spectrum.real) / 2,
+        (total_power + double_frequency_spectrum.real) / 2,
     )
-    normal_matrices[:, 1, 2] = normal_matrices[:, 2, 1] = double_frequency.imag / 2
+    normal_matrices[:, 1, 2] = normal_matrices[:, 2, 1] = double_frequency_spectrum.imag / 2
     right_sides = np.stack(
         [np.full(last_line + 1, cross_spectrum[0].real), cross_spectrum.imag, cross_spectrum.real], axis=1
     )
-    # Ridge: near zero frequency the cosine equals the constant.
+    # Ridge of 1e-6 (chosen): near zero frequency the cosine equals the constant, and the equations are singular.
     normal_matrices += 1e-6 * total_power * np.eye(3)
     explained_power = np.sum(right_sides * np.linalg.solve(normal_matrices, right_sides[:, :, None])[:, :, 0], axis=1)
     # Less than one cycle per recording is not distinguishable from a constant grip.

@@ -13,7 +13,7 @@ from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable, fo
 
 ActsOn = Literal["force", "command", "response"]
 """Quantity on which a law acts, see `Law.acts_on`."""
-KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
+ACTS_ON_VALUES: tuple[ActsOn, ...] = get_args(ActsOn)
 """All values of `ActsOn`."""
 
 
@@ -36,8 +36,8 @@ class Law:
     """Letter of the axis ('y'), or name of the channel."""
 
     def __post_init__(self) -> None:
-        if self.acts_on not in KINDS:
-            raise LawError(f"a law acts on {', '.join(KINDS)}; not on '{self.acts_on}'")
+        if self.acts_on not in ACTS_ON_VALUES:
+            raise LawError(f"a law acts on {', '.join(ACTS_ON_VALUES)}; not on '{self.acts_on}'")
         if not self.axis:
             raise LawError("the law does not state the axis on which it acts; state its axis")
         used_indices = {node.index for node in iterate_nodes(self.tree) if isinstance(node, FreeParameter)}
@@ -79,7 +79,7 @@ class Law:
         )
 
     def with_numbers(self, numbers: Sequence[float]) -> "Law":
-        """The law with other values of p0, p1, … in SI units. Raises LawError for another number of them."""
+        """Return the law with other values of p0, p1, … in SI units. Raises LawError for another number of them."""
         return replace(self, numbers=tuple(float(number) for number in numbers))
 
 
@@ -130,8 +130,8 @@ def _collect_roles(node: Node, role: Role, role_by_index: dict[int, Role]) -> No
 
 
 def _find_first_argument_role(name: str, role: Role) -> Role:
-    """Role of the first argument of an operator or function `name` whose value has the role `role`; of + - * the role
-    of each argument."""
+    """Find the role of the first argument of an operator or function `name` whose value has the role `role`; of + - *
+    the role of each argument."""
     if name in ("+", "-", "neg"):
         return role
     if name in ("*", "/"):

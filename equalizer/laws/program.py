@@ -45,8 +45,8 @@ class Program:
     """Number of values in the memory, the first of which is its state (`SETTLED`, ... in `equalizer.laws.kernel`)."""
 
     def with_numbers(self, numbers: Sequence[float]) -> FloatArray:
-        """(2 k,): the rows of the program one after the other, with the values of the free parameters p0, p1, … (in SI
-        units) inserted."""
+        """Insert the values of the free parameters p0, p1, … (SI units); returns the rows one after the other, (2
+        k,)."""
         codes = self.codes.copy()
         for row, parameter_index in self.parameter_rows:
             codes[row, 1] = numbers[parameter_index]
@@ -62,7 +62,7 @@ def compile_program(tree: Node, signals: Mapping[str, int]) -> Program:
 
 
 def _append_formula(tree: Node, program: Program, signals: Mapping[str, int]) -> Program:
-    """The program with the code of a tree appended, arguments first."""
+    """Append the code of a tree to the program, arguments first. Raises LawError for an unknown signal."""
     match tree:
         case Number(value):
             return _append_row(program, "number", value)
@@ -88,12 +88,13 @@ def _append_formula(tree: Node, program: Program, signals: Mapping[str, int]) ->
 
 
 def _append_row(program: Program, name: str, operand: float) -> Program:
-    """The program with the operation `name` and its operand as a last row."""
+    """Append the operation `name` with its operand to the program as the last row."""
     return replace(program, codes=np.vstack([program.codes, [OPCODES[name], operand]]))
 
 
 def _check_depth(codes: FloatArray) -> None:
-    """Raises LawError where the stack overflows. Each code changes the stack's height by 1, 0 or -1."""
+    """Raise LawError where more than `STACK_SIZE` values are on the stack. Each code changes the stack's height by 1, 0
+    or -1."""
     growth = np.ones(len(codes))
     growth[(codes >= OPCODES["+"]) & (codes <= OPCODES["maximum"])] = -1
     growth[codes >= OPCODES["neg"]] = 0

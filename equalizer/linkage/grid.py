@@ -1,8 +1,9 @@
 """Symmetric grid of positions for the calibration of a delta linkage, and a test of its Jacobian by finite differences.
 
 The azimuths of the arms, estimated from the Jacobian, give the planes of mirror symmetry; the grid is made so that
-reflection about each of them maps it onto itself. Called by `study.workflows.recording.calibrate_linkage`. Axes as in
-the whole package: x from the base towards the operator, y to the right, z up. Azimuths are angles from y towards z.
+reflection about each of them maps it onto itself. Called by `study.workflows.recording.calibrate_linkage` and the
+simulated linkage (`study.devices.simulated`). Axes as in the whole package: x from the base towards the operator, y to
+the right, z up. Azimuths are angles from y towards z.
 """
 
 import math
@@ -46,10 +47,10 @@ def estimate_arm_azimuths(jacobian: FloatArray) -> FloatArray:
 
 def make_symmetric_grid(azimuths_rad: FloatArray, radius_m: float, depth_m: float) -> FloatArray:
     """Make the grid, (185, 3), m: twelve directions at three radii up to radius_m, and the axis, in five planes at
-    depths (x) of -depth_m to depth_m. The first is the centre.
+    depths (x) of -depth_m to depth_m; numbers chosen. The first point is the centre.
 
     The directions are multiples of 30 degrees from the first arm, so that the reflection about each arm's plane maps
-    the grid onto itself. azimuths: (3,), of the arms, rad.
+    the grid onto itself. azimuths_rad: (3,), of the arms.
     """
     points = [(0.0, 0.0, 0.0)]
     for depth_position_m in np.linspace(-depth_m, depth_m, 5):
@@ -69,15 +70,15 @@ def make_symmetric_grid(azimuths_rad: FloatArray, radius_m: float, depth_m: floa
 
 
 def list_difference_positions(position_m: FloatArray) -> FloatArray:
-    """Positions (6, 3), m: a step `DIFFERENCE_STEP_M` forwards along x, y and z, then a step backwards; for
+    """List positions (6, 3), m: a step `DIFFERENCE_STEP_M` forwards along x, y and z, then a step backwards; for
     `compute_difference_error`."""
     steps: FloatArray = DIFFERENCE_STEP_M * np.vstack([np.eye(3), -np.eye(3)])
     return position_m + steps
 
 
 def compute_difference_error(jacobian: FloatArray, positions_m: FloatArray, angles_rad: FloatArray) -> float:
-    """Largest difference between an entry of J (3, 3) and that of d position / d angle by central differences, relative
-    to the largest entry of the latter. positions_m, angles_rad: (6, 3), at the positions of
+    """Compute the largest difference between an entry of J (3, 3) and that of d position / d angle by central
+    differences, relative to the largest entry of the latter. positions_m, angles_rad: (6, 3), at the positions of
     `list_difference_positions`."""
     position_steps, angle_steps = positions_m[:3] - positions_m[3:], angles_rad[:3] - angles_rad[3:]
     difference_jacobian = np.linalg.lstsq(angle_steps, position_steps, rcond=None)[0].T

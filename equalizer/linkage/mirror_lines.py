@@ -18,8 +18,8 @@ part of the staircases' finest step (1 dB)."""
 SAME_POSITION_M = 1e-6
 """Distance (m) below which two positions count as the same. Chosen above rounding errors."""
 VALID_LINE_SHARE = 0.5
-"""Fraction of the other lines' asymmetry below which a mirror line counts as valid; the arm in that line is then the
-arm that differs from the others. Heuristic."""
+"""Fraction of the second smallest asymmetry below which the line with the smallest is named as valid, where only the
+other two lines are warned of; the arm in the valid line is then the arm that differs from the others. Heuristic."""
 LARGEST_UPRIGHT_COMPONENT = 1e-3
 """Largest magnitude of the y component of a line's direction for it to count as upright; its mirror plane then contains
 the direction of gravity. Chosen above rounding errors."""
@@ -35,20 +35,20 @@ def compute_reflection(azimuth_rad: float) -> FloatArray:
 def measure_line_asymmetry(readings: list[LinkageReading], azimuths_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Measure the asymmetry of the inertia about each line, (3,): largest |M(R p) - R M(p) R| / |M(p)| (spectral norms)
     over the readings whose mirrored position was read too, 0 without any; and the positions (3, 3), m, where it is
-    largest (zero where the asymmetry is 0). azimuths: (3,), of the lines, rad."""
-    largest_asymmetry, worst_positions = np.zeros(3), np.zeros((3, 3))
-    positions = np.array([reading.position_m for reading in readings])
+    largest (zero where the asymmetry is 0). readings: at least one; azimuths_rad: (3,), of the lines."""
+    largest_asymmetry, worst_positions_m = np.zeros(3), np.zeros((3, 3))
+    positions_m = np.array([reading.position_m for reading in readings])
     for line, azimuth_rad in enumerate(azimuths_rad):
-        mirror = compute_reflection(float(azimuth_rad))
+        reflection = compute_reflection(float(azimuth_rad))
         for reading in readings:
-            mirrored_index = _find_same_position(positions, mirror @ reading.position_m)
+            mirrored_index = _find_same_position(positions_m, reflection @ reading.position_m)
             if mirrored_index is None:
                 continue
-            difference = readings[mirrored_index].inertia_kg - mirror @ reading.inertia_kg @ mirror
+            difference = readings[mirrored_index].inertia_kg - reflection @ reading.inertia_kg @ reflection
             asymmetry = float(np.linalg.norm(difference, 2) / np.linalg.norm(reading.inertia_kg, 2))
             if asymmetry > largest_asymmetry[line]:
-                largest_asymmetry[line], worst_positions[line] = asymmetry, reading.position_m
-    return largest_asymmetry, worst_positions
+                largest_asymmetry[line], worst_positions_m[line] = asymmetry, reading.position_m
+    return largest_asymmetry, worst_positions_m
 
 
 def complete_by_symmetry(
@@ -56,39 +56,38 @@ def complete_by_symmetry(
 ) -> tuple[list[LinkageReading], FloatArray]:
     """Complete readings by symmetry: readings at those of the unread positions (k, 3), m, that one reflection, or two
     in succession, map to a position that was read; and the remaining positions (r, 3). Gravity is reflected about an
-    upright line only, and NaN otherwise. readings: at least one; azimuths: (3,), of the lines, rad."""
-    completed, remaining = [], []
-    read_positions = np.array([reading.position_m for reading in readings])
+    upright line only, and NaN otherwise. readings: at least one; azimuths_rad: (3,), of the lines."""
+    completed_readings, remaining_positions_m = [], []
+    read_positions_m = np.array([reading.position_m for reading in readings])
     single_reflections = [(line,) for line in range(3)]
-    for position in unread_positions_m:
+    for position_m in unread_positions_m:
         for reflected_lines in (
             *single_reflections,
             *((first, second) for first in range(3) for second in range(3) if first != second),
         ):
-            image_position = position
+            image_position_m = position_m
             for line in reflected_lines:
-                image_position = compute_reflection(float(azimuths_rad[line])) @ image_position
-            source_index = _find_same_position(read_positions, image_position)
+                image_position_m = compute_reflection(float(azimuths_rad[line])) @ image_position_m
+            source_index = _find_same_position(read_positions_m, image_position_m)
             if source_index is not None:
                 image_reading = readings[source_index]
                 for line in reversed(reflected_lines):
                     image_reading = _mirror_reading(image_reading, line, float(azimuths_rad[line]))
-                completed.append(image_reading)
+                completed_readings.append(image_reading)
                 break
         else:
-            remaining.append(position)
-    return completed, np.array(remaining).reshape(-1, 3)
+            remaining_positions_m.append(position_m)
+    return completed_readings, np.array(remaining_positions_m).reshape(-1, 3)
 
 
 def write_asymmetry_warnings(
-    asymmetry: FloatArray, worst_position_m: FloatArray, line_deg: FloatArray
+    asymmetry: FloatArray, worst_positions_m: FloatArray, azimuths_deg: FloatArray
 ) -> tuple[str, ...]:
     """Write warnings, a sentence each, for lines whose asymmetry (3,) exceeds `LEAST_WARNED_ASYMMETRY`; empty if there
-    are none. worst_position_m: (3, 3), where each line's asymmetry is largest; line_deg: (3,), azimuths of the
-    lines."""
+    are none. worst_positions_m: (3, 3), where each line's asymmetry is largest; azimuths_deg: (3,), of the lines."""
     warnings = [
-        f"Mirrored about the line at {line_deg[line]:.0f} degrees the inertia differs by up to {asymmetry[line]:.1%}, "
-        f"most at ({', '.join(f'{1000 * x:.0f}' for x in worst_position_m[line])}) mm; "
+        f"Mirrored about the line at {azimuths_deg[line]:.0f} degrees the inertia differs by up to "
+        f"{asymmetry[line]:.1%}, most at ({', '.join(f'{1000 * x:.0f}' for x in worst_positions_m[line])}) mm; "
         f"up to {LEAST_WARNED_ASYMMETRY:.0%} is rounding and assembly."
         for line in range(3)
         if asymmetry[line] > LEAST_WARNED_ASYMMETRY
@@ -96,29 +95,30 @@ def write_asymmetry_warnings(
     ascending_order = np.argsort(asymmetry)
     if len(warnings) == 2 and asymmetry[ascending_order[0]] < VALID_LINE_SHARE * asymmetry[ascending_order[1]]:
         warnings.append(
-            f"The line at {line_deg[ascending_order[0]]:.0f} degrees is a line of symmetry and "
+            f"The line at {azimuths_deg[ascending_order[0]]:.0f} degrees is a line of symmetry and "
             "the other two are not: the arm in that line differs from the others. "
             "Directions mirrored about that line still have the same apparent mass."
         )
     return tuple(warnings)
 
 
-def _find_same_position(positions: FloatArray, target: FloatArray) -> int | None:
-    """Index of the position that equals `target` within `SAME_POSITION_M`; None without one."""
-    distances = np.linalg.norm(positions - target, axis=1)
-    nearest_index = int(np.argmin(distances))
-    return nearest_index if distances[nearest_index] < SAME_POSITION_M else None
+def _find_same_position(positions_m: FloatArray, target_m: FloatArray) -> int | None:
+    """Find the index of the position, of (n, 3) with n >= 1, that equals `target_m` (3,) within `SAME_POSITION_M`; None
+    without one."""
+    distances_m = np.linalg.norm(positions_m - target_m, axis=1)
+    nearest_index = int(np.argmin(distances_m))
+    return nearest_index if distances_m[nearest_index] < SAME_POSITION_M else None
 
 
 def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
     """The reading reflected about a mirror line, as at the mirrored position. line: index of the arm in that plane."""
-    mirror = compute_reflection(azimuth_rad)
+    reflection = compute_reflection(azimuth_rad)
     joint_order = [line if joint == line else 3 - line - joint for joint in range(3)]
     is_upright = abs(np.cos(azimuth_rad)) < LARGEST_UPRIGHT_COMPONENT
     return LinkageReading(
-        position_m=mirror @ reading.position_m,
+        position_m=reflection @ reading.position_m,
         joint_angle_rad=reading.joint_angle_rad[joint_order],
-        jacobian=(mirror @ reading.jacobian)[:, joint_order],
-        inertia_kg=mirror @ reading.inertia_kg @ mirror,
-        gravity_n=mirror @ reading.gravity_n if is_upright else np.full(3, np.nan),
+        jacobian=(reflection @ reading.jacobian)[:, joint_order],
+        inertia_kg=reflection @ reading.inertia_kg @ reflection,
+        gravity_n=reflection @ reading.gravity_n if is_upright else np.full(3, np.nan),
     )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 NOT_STORED = "Quality not stored: the model file is of an earlier version; identify it again to know its error."
-"""Sentence for a model whose file states no quality."""
+"""Sentence for a model whose file states no quality, and for a session that was equalized with such a model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +47,12 @@ def summarise_quality(
     scatter_error: float | None,
     held_out: tuple[float, float | None, float] | None,
     remarks: tuple[str, ...] = (),
-    most_misfit: float = 0.0,
+    misfit_bound: float = 0.0,
 ) -> ModelQuality:
     """Summarise the errors of a model. The expected error is the root of the summed squares of misfit and scatter, and
-    at least the held-out error. held_out: error, noise, and length of the record (s). most_misfit: misfit that the
-    noise of the fitted lines may hide; used in place of a smaller misfit_error."""
-    model_error = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
+    at least the held-out error. held_out: error, noise, and length of the record (s). misfit_bound: upper bound of the
+    misfit that the noise of the fitted lines may hide; used in place of a smaller misfit_error."""
+    model_error = float(np.hypot(max(misfit_error, misfit_bound), scatter_error or 0.0))
     held_out_error, held_out_noise, held_out_s = held_out or (None, None, None)
     return ModelQuality(
         max(model_error, held_out_error or 0.0),
@@ -98,7 +98,8 @@ def write_quality_brief(quality: ModelQuality | None) -> str:
 
 
 def find_worst_quality(qualities: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
-    """The quality with the largest expected error of several models; None if there are none or a quality is unknown."""
+    """Find the quality with the largest expected error of several models; None without models, or where the quality of
+    a model is not stored."""
     stored_qualities = [quality for quality in qualities if quality is not None]
     return (
         max(stored_qualities, key=lambda quality: quality.expected_error)

@@ -1,7 +1,8 @@
 """Frequency response and simulation of a discrete state-space model, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k].
 
 The frequency response is C (zI - A)^-1 B + D at z = exp(2 pi j f / rate), by back substitution in the Schur form of A.
-Called by identification (misfit, bootstrap), equalization and reports. n: order, m: inputs, p: outputs.
+Called by identification (misfit, bootstrap, held-out test), equalization (`equalizer.tracking`,
+`study.workflows.equalizer`) and the identification report. n: order, m: inputs, p: outputs.
 """
 
 import numpy as np
@@ -12,8 +13,8 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def compute_model_response(model: IdentifiedModel, frequency_hz: FloatArray) -> ComplexArray:
-    """Frequency response C (zI - A)^-1 B + D, (lines, p, m), in output unit per input unit. frequency_hz: (lines,). A
-    pole exactly at a line gives inf or NaN."""
+    """Compute the frequency response C (zI - A)^-1 B + D, (lines, p, m), in output unit per input unit. frequency_hz:
+    (lines,). A pole exactly at a line gives inf or NaN."""
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / model.sample_rate_hz)
     # Schur form A = Q T Q^H, computed once: with T upper triangular, a line takes n^2 operations instead of n^3.
     T, Q = schur(model.A, output="complex")

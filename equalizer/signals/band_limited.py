@@ -21,8 +21,8 @@ LINES_PER_BLOCK = 8192
 
 
 def compute_low_pass_gain(frequency_hz: FloatArray, band_hz: float) -> FloatArray:
-    """Gain of the low pass at each frequency (Hz): 1/2 at band_hz, because each of the two passes halves the power
-    there."""
+    """Compute the gain of the low pass at each frequency (Hz): 1/2 at band_hz, because each of the two passes halves
+    the power there. band_hz: f_b of the module docstring, above zero."""
     return np.asarray(1 / (1 + (frequency_hz / band_hz) ** (2 * LOW_PASS_ORDER)))
 
 
@@ -72,6 +72,6 @@ def filter_low_pass(samples: FloatArray, sample_rate_hz: float, band_hz: float, 
         scalar_gain = compute_low_pass_gain(frequency_hz, band_hz) * np.exp(-2j * np.pi * frequency_hz * delay_s)
         return np.asarray(scalar_gain[:, None, None] * np.eye(samples.shape[1]))
 
-    line = compute_end_to_end_line(samples)
+    end_to_end_line = compute_end_to_end_line(samples)
     slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1) * sample_rate_hz
-    return np.asarray(line - slope * delay_s + filter_by_gain(samples, sample_rate_hz, compute_gain))
+    return np.asarray(end_to_end_line - slope * delay_s + filter_by_gain(samples, sample_rate_hz, compute_gain))

@@ -83,7 +83,7 @@ def find_clock_offset(reference: Samples, shifted: Samples, centre_s: float, hal
 
 
 def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
-    """Samples (n,) on a uniform grid from the first time on, without their mean; missing values are zero."""
+    """Resample to a uniform grid from the first time on, (n,), and subtract the mean; missing values become zero."""
     sample_count = int(np.floor((samples.times_s[-1] - samples.times_s[0]) * rate_hz)) + 1
     values = resample(samples, Grid(float(samples.times_s[0]), rate_hz, sample_count), "band-limited")
     centred = values - np.nanmean(values)
@@ -108,14 +108,14 @@ def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
 
 def _has_enough_overlap(lags: IntArray, first_length: int, second_length: int) -> BoolArray:
     """Mask (lags,) of the lags at which signals of these lengths overlap by at least `LEAST_OVERLAP`."""
-    overlap = np.minimum(first_length, lags + second_length) - np.maximum(0, lags)
-    has_overlap: BoolArray = overlap >= LEAST_OVERLAP * min(first_length, second_length)
+    overlap_samples = np.minimum(first_length, lags + second_length) - np.maximum(0, lags)
+    has_overlap: BoolArray = overlap_samples >= LEAST_OVERLAP * min(first_length, second_length)
     return has_overlap
 
 
 def _refuse_rival_peaks(offsets_s: FloatArray, magnitude: FloatArray, peak_index: int) -> None:
-    """Raise NoOffsetError where a peak more than two lags from the index `peak` is about as high. magnitude: |r|,
-    (lags,)."""
+    """Raise NoOffsetError where a peak more than two lags from `peak_index` is higher than `AMBIGUOUS_RATIO` times the
+    highest. magnitude: |r|, (lags,)."""
     from scipy import signal as sg
 
     peak_indices, _ = sg.find_peaks(magnitude)
@@ -133,8 +133,8 @@ def _refuse_rival_peaks(offsets_s: FloatArray, magnitude: FloatArray, peak_index
 
 
 def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak_index: int) -> ClockOffset:
-    """Maximum of |r| within one lag of the index `peak`, on a spline of degree 5 through the eight neighbours on either
-    side, in steps of 1/2000 of a lag."""
+    """Find the maximum of |r| within one lag of `peak_index`, on a spline of degree 5 through the eight neighbours on
+    either side (fewer at an end of the range), in steps of 1/2000 of a lag."""
     from scipy.interpolate import make_interp_spline
 
     neighbours = slice(max(0, peak_index - 8), peak_index + 9)

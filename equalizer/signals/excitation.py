@@ -1,7 +1,8 @@
 """Deterministic excitation signals for system identification: sinusoids, logarithmic swept sines, and fades.
 
-Called by `study.session.stimulus` for recordings and stimuli, and by the design of experiments. A signal has the unit
-of its amplitude.
+Called by `study.session.stimulus` for recordings and stimuli, by the design of experiments
+(`analysis.diagnosis.next_experiment`), and by the evaluation of playback (`reproduction` in `study.evaluation` and
+`analysis.evaluation`). A signal has the unit of its amplitude.
 """
 
 import numpy as np
@@ -31,11 +32,11 @@ def make_log_sweep(
         )
     duration_s = sample_count / sample_rate_hz
     log_ratio = np.log(to_hz / from_hz)
-    cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio * np.arange(sample_count) / sample_count) - 1.0)
+    phase_cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio * np.arange(sample_count) / sample_count) - 1.0)
     total_cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio) - 1.0)
     if total_cycles < 1.0:
         raise ValueError(f"a sweep of {duration_s:g} s from {from_hz:g} to {to_hz:g} Hz holds less than a cycle")
-    wave: FloatArray = amplitude * np.sin(2 * np.pi * cycles * np.floor(total_cycles) / total_cycles)
+    wave: FloatArray = amplitude * np.sin(2 * np.pi * phase_cycles * np.floor(total_cycles) / total_cycles)
     return wave
 
 

@@ -1,7 +1,7 @@
 """Base class of the validation errors of documents, models and tables: they list all problems, not only the first.
 
-Subclasses are raised, for example, by `plant.mechanical_model`, `feedforward.trajectory` and
-`study.store.disk.csv_rows`.
+Subclasses are raised, for example, by `equalizer.plant.mechanical_model`, `equalizer.tracking.feedforward.trajectory`
+and `study.store.disk.csv_rows`.
 """
 
 

@@ -39,8 +39,8 @@ def make_masking_noise(
             f"noise needs 0 < low_hz < high_hz <= {sample_rate_hz / 2:g} Hz (half the rate), "
             f"not {low_hz:g} to {high_hz:g}"
         )
-    # Lines are 1 / seconds apart. Whole seconds give a number of samples that is a product of small primes, hence a
-    # fast FFT, wherever `seconds` is one.
+    # Lines are 1 / seconds (Hz) apart. Where the whole number `seconds` is a product of small primes, so is the number
+    # of samples at 44 100 Hz, and the FFT is fast.
     first_line, last_line = math.ceil(low_hz * seconds), math.floor(high_hz * seconds)
     if last_line < first_line:
         raise ValueError(f"no multiple of 1 / {seconds} Hz lies between {low_hz:g} and {high_hz:g} Hz")

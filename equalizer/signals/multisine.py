@@ -8,7 +8,7 @@ averages out of an estimate only over random phases. The crest factor (peak over
 several draws. With m axes driven at once, every m experiments form a group that is orthogonal at every line
 (Dobrowiecki, Schoukens and Guillaume, IEEE Transactions on Instrumentation and Measurement 55 (2006)): each axis has
 its own random phases, and in experiment e (from 0) the phases of axis a (from 0) are advanced by 2 pi e a / m. Called
-by `study.session.stimulus` for recordings and probes.
+by `study.session.stimulus` for recordings and probes, and by `analysis.evaluation.reproduction.played_response`.
 """
 
 from collections.abc import Callable

@@ -40,15 +40,15 @@ WORDS_NEEDING_UNIT = frozenset(["spannung", "tensión", "yaw", "pitch", "roll"])
 
 
 def split_into_words(name: str) -> list[str]:
-    """Words of a name in lower case, in Unicode normal form C; digits and signs are left out. Two words each in
-    `Yaw_Rate`, `motorSpeed` and `load angle`."""
+    """Split a name into its words, in lower case and Unicode normal form C; digits and signs are left out. `Yaw_Rate`,
+    `motorSpeed` and `load angle` contain two words each."""
     return [word.lower() for word in _WORD.findall(unicodedata.normalize("NFC", name))]
 
 
 def detect_quantity(name: str) -> str:
-    """The quantity (a key of `QUANTITY_WORDS`), by the last word that names one: a load angle is an angle. An angle
-    followed by the word `rate` is a velocity. Empty where no word names a quantity, or another word makes it
-    ambiguous."""
+    """Detect the quantity (a key of `QUANTITY_WORDS`) by the last word that names one: a load angle is an angle. An
+    angle followed by the word `rate` is a velocity. Empty where no word names a quantity, or another word makes it
+    ambiguous (`_AMBIGUOUS_WORDS`)."""
     words = split_into_words(name)
     last_index = max((index for index, word in enumerate(words) if word in _QUANTITY_BY_WORD), default=None)
     if last_index is None:

@@ -2,7 +2,7 @@
 
 The results equal those of SciPy's `welch` and `csd` for the same segment length, with their other defaults.
 `scipy.signal` is not used because its import takes longer than the computation of most spectra. Called by
-identification and diagnosis.
+identification, the diagnosis and `equalizer.effects`.
 """
 
 import numpy as np
@@ -11,10 +11,11 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def estimate_spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (lines,) and the one-sided power spectral density of (n,) or (n, c), in units squared per hertz.
+    """Estimate the one-sided power spectral density of a signal (n,) or (n, c), in units squared per hertz; returned
+    after its frequencies (lines,), Hz.
 
     length: samples of a segment, at least 2; n where it is longer. The mean of each segment is removed; segments are
-    Hann-windowed and overlap by half.
+    Hann-windowed and overlap by half. Last samples that fill no segment are not used.
     """
     frequency_hz, power = _average_segments(signal, signal, rate_hz, length)
     return frequency_hz, np.asarray(power.real)
@@ -23,8 +24,8 @@ def estimate_spectral_density(signal: FloatArray, rate_hz: float, length: int) -
 def estimate_cross_density(
     first: FloatArray, second: FloatArray, rate_hz: float, length: int
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies (lines,) and the one-sided cross-spectral density of two signals of the same shape: the mean of
-    conj(first) * second, per hertz. rate_hz, length: as in `estimate_spectral_density`."""
+    """Estimate the one-sided cross-spectral density of two signals of the same shape: the mean of conj(first) * second,
+    per hertz; returned after its frequencies (lines,), Hz. rate_hz, length: as in `estimate_spectral_density`."""
     return _average_segments(first, second, rate_hz, length)
 
 
@@ -34,8 +35,8 @@ def hann(length: int) -> FloatArray:
 
 
 def compute_line_spectra(periods: FloatArray) -> ComplexArray:
-    """Spectra (periods, lines, channels) of samples (periods, length, channels): rfft / length, without the lines at
-    zero and at half the sample rate. White noise of variance s² has the mean power s² / length per line."""
+    """Compute the spectra (periods, lines, channels) of samples (periods, length, channels): rfft / length, without the
+    lines at zero and at half the sample rate. White noise of variance s² has the mean power s² / length per line."""
     length = periods.shape[1]
     return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
@@ -47,13 +48,13 @@ def _average_segments(
     length = min(length, len(first))
     window = hann(length).reshape(-1, *[1] * (first.ndim - 1))
     starts = range(0, len(first) - length + 1, length - length // 2)
-    total = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
+    spectrum_sum = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
     for start in starts:
         first_spectrum = _transform_windowed(first[start : start + length], window)
-        total += first_spectrum.conj() * (
+        spectrum_sum += first_spectrum.conj() * (
             first_spectrum if second is first else _transform_windowed(second[start : start + length], window)
         )
-    density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
+    density = spectrum_sum / (len(starts) * rate_hz * float(np.sum(window**2)))
     # One-sided: each line except those at zero and at half the sample rate includes the power at its negative
     # frequency.
     density[1 : len(density) - (length % 2 == 0)] *= 2

@@ -106,7 +106,7 @@ def respell(text: str, known_symbols: Collection[str]) -> str:
 
 def find_nearest_unit(text: str, known_symbols: Collection[str]) -> str:
     """Find the unit with each unknown symbol replaced by the nearest known one, and without a negative power behind a
-    slash (m/s^-2 becomes m/s^2); empty where no known symbol is similar to one of them."""
+    slash (m/s^-2 becomes m/s^2); empty where no known symbol is similar to one of the unknown ones."""
     spelling = re.sub(
         r"(/[A-Za-z]+)\^-([1-9])",
         lambda match: match[1] + f"^{match[2]}".removesuffix("^1"),
@@ -119,12 +119,12 @@ def find_nearest_unit(text: str, known_symbols: Collection[str]) -> str:
 
 def _convert_to_ascii(text: str) -> str:
     """The text with the signs of `_ASCII_BY_SIGN` replaced."""
-    return "".join(_ASCII_BY_SIGN.get(letter, letter) for letter in text)
+    return "".join(_ASCII_BY_SIGN.get(character, character) for character in text)
 
 
 def _respell_symbol(word: str, known_symbols: Collection[str]) -> str:
-    """Replace a symbol by its known spelling; unchanged where none is listed. In words of two letters the case is kept,
-    because it tells units apart (`mS`, `MM`)."""
+    """Replace a symbol by its known spelling; unchanged where none is listed. In words of up to two letters the case
+    counts, because it distinguishes units (`mS`, `MM`)."""
     return word if word in known_symbols else _SYMBOL_BY_SPELLING.get(word.lower() if len(word) > 2 else word, word)
 
 
@@ -138,7 +138,8 @@ def _find_nearest_symbol(word: str, known_symbols: Collection[str], is_whole_uni
     ordered_symbols = sorted(
         known_symbols, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol)
     )
-    # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
+    # Of symbols that are equal in lower case, the last in this order is suggested: `mm` for `MM`, not `Mm`; `MPa` for
+    # `Mpa`.
     symbol_by_spelling = {
         **_SYMBOL_BY_SPELLING,
         **{symbol.lower(): symbol for symbol in ordered_symbols},

@@ -3,7 +3,8 @@
 In M a + B v + K x = force, the unit of mass is force time² / length, that of damping force time / length, and that of
 stiffness force / length. In SI: N s^2/m = kg, N s/m, N/m; for a rotation N m s^2/rad and so on. Where a command is a
 current (A) or a plain number, the force constant of the motor is unknown and contained in every parameter: a "mass"
-then has the unit A s^2/m, not kg. Used by `plant.mechanical_model` and wherever the diagnosis prints a parameter.
+then has the unit A s^2/m, not kg. Called by `plant.mechanical_model`, `effects.discovered_law`, `laws.units`, the
+modules of the diagnosis that print a parameter or a law, and `study.workflows.files.format_docs`.
 """
 
 import re
@@ -31,9 +32,9 @@ class UnitSystem:
     """Unit of time; "sample" where no time is known."""
 
     def express(self, unit: str) -> str:
-        """The unit of the same quantity in this system. unit: SI unit in a translational model, such as "N s/m" or
-        "kg"; a unit that is not made of force, length and time is returned unchanged. Hz becomes one over the unit of
-        time where that is not the second."""
+        """Express an SI unit in this system, as the unit of the same quantity. unit: SI unit in a translational model,
+        such as "N s/m" or "kg"; a unit that is not made of force, length and time is returned unchanged. Hz becomes one
+        over the unit of time where that is not the second."""
         if unit == "Hz":
             return unit if self.time == "s" else f"1/{self.time}"
         numerator, _, denominator = unit.partition("/")
@@ -89,7 +90,7 @@ def determine_unit_system(commands: Sequence[str], motions: Sequence[str], time:
 
 
 def _decompose_base_unit(name: str) -> tuple[tuple[str, int], ...]:
-    """Decompose a unit (N, m, s or kg) into powers of N, m and s; kg = N s^2/m."""
+    """Decompose a unit (N, m, s or kg) into powers of N, m and s, as pairs of name and power; kg = N s^2/m."""
     return (("N", 1), ("s", 2), ("m", -1)) if name == "kg" else ((name, 1),)
 
 

@@ -1,6 +1,8 @@
 """Validation problem of one key of a protocol file, and the error that reports such problems.
 
-Raised by the validators of `protocols.definition`; `protocols.document.validation_messages` completes the keys.
+Raised by the validators of `protocols.definition`; `protocols.document.validation_messages` completes the keys. The
+reading of protocols and of translations (`protocols.document.loading`, `protocols.wording.translation`,
+`study.store.formats`) reports its own problems by the same class.
 """
 
 from dataclasses import dataclass
@@ -21,7 +23,8 @@ class Problem:
         return f"{self.key} {self.problem}. Allowed: {self.allowed}."
 
     def prefix_key(self, parent: str) -> "Problem":
-        """Return the same problem with its key prefixed by the table `parent`; an empty part is left out."""
+        """Return the same problem with its key prefixed by the table `parent` and a dot; an empty key or an empty
+        `parent` is left out."""
         return Problem(".".join(part for part in (parent, self.key) if part), self.problem, self.allowed)
 
 

@@ -1,7 +1,7 @@
 """Excitation segments of a recording protocol: sinusoids, swept sines, multisines.
 
 Each class is a table of the TOML file; Pydantic checks its values. Part of `recording_protocol`; the signals are made
-by `study.session.stimulus.recording_pieces`.
+by `study.session.stimulus.recording_pieces`; `study.session.stimulus.limits` calls `find_highest_hz`.
 """
 
 import math
@@ -15,11 +15,14 @@ from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
 Amplitude = Annotated[float, Field(gt=0, le=3.0, description="Peak of the force, in newtons.")]
+"""Peak of an excitation in newtons; 3 N is the safety limit of a stimulus with a hand (docs/safety.md)."""
 AxisName = Annotated[
     Literal["x", "y", "z", "direction_1", "direction_2"],
     Field(description="A device axis, or one of the two test directions."),
 ]
 Period = Annotated[float, Field(gt=0, le=600, description="One period.")]
+"""Duration of a period in seconds. This upper limit and the others of this module are chosen, wide enough for any
+recording."""
 Periods = Annotated[
     int,
     Field(
@@ -145,6 +148,7 @@ class MultisineSegment:
             math.ceil(self.from_hz * self.duration_s - 1e-9),
             math.floor(self.to_hz * self.duration_s + 1e-9),
         )
+        # Of two adjacent lines one is odd, so that it suffices to examine the first two.
         lines = [
             line for line in range(first_line, min(last_line, first_line + 1) + 1) if line % 2 or not self.odd_only
         ]
@@ -155,10 +159,11 @@ class MultisineSegment:
 
 
 Segment = Annotated[SineSegment | SweepSegment | MultisineSegment, Field(discriminator="kind")]
+"""A segment of any kind, chosen by its key `kind`."""
 
 
 def find_highest_hz(segment: SineSegment | SweepSegment | MultisineSegment) -> float:
-    """Find the highest frequency of the excitation (Hz)."""
+    """Find the highest frequency of the excitation (Hz); for a sweep or multisine, the upper limit `to_hz`."""
     return max(segment.frequencies_hz) if isinstance(segment, SineSegment) else segment.to_hz
 
 

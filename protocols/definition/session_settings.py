@@ -1,7 +1,7 @@
 """Session settings of a study protocol: detection runs, catch trials, start condition of a trial, limits of a sitting.
 
-Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`;
-run by `protocols.procedure.schedule` (catch trials) and `study.workflows.trial.present_trial` (start condition).
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`. Read by
+`protocols.procedure.schedule` (catch trials) and `study.workflows.trial.present_trial` (start condition), among others.
 """
 
 from typing import Annotated, Self

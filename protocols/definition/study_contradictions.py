@@ -57,7 +57,7 @@ def _find_cap_problems(protocol: StudyProtocol) -> list[Problem]:
 
 def _find_psi_problems(protocol: StudyProtocol) -> list[Problem]:
     """Find roved levels, and a trial limit that ends a test or detection run before its trials, where Psi is used."""
-    problems, psi_trials = [], protocol.staircase.bayesian.trials
+    problems, psi_trial_count = [], protocol.staircase.bayesian.trials
     if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
         problem_text = f"is {protocol.stimulus.rove_db:g} dB, but Psi assumes that levels are played as planned"
         problems.append(Problem("stimulus.rove_db", problem_text, "0, or 0 in staircase.bayesian.trials"))
@@ -67,9 +67,11 @@ def _find_psi_problems(protocol: StudyProtocol) -> list[Problem]:
         "detection.trial_limit": protocol.detection.trial_limit if protocol.detection.frequencies_hz else 0,
     }
     for key, limit in trial_limits.items():
-        if 0 < limit < psi_trials:
-            problem_text = f"is {limit}, and would end every such run before the {psi_trials} trials of Psi"
-            problems.append(Problem(key, problem_text, f"0, or at least {psi_trials}, as in staircase.bayesian.trials"))
+        if 0 < limit < psi_trial_count:
+            problem_text = f"is {limit}, and would end every such run before the {psi_trial_count} trials of Psi"
+            problems.append(
+                Problem(key, problem_text, f"0, or at least {psi_trial_count}, as in staircase.bayesian.trials")
+            )
     return problems
 
 

@@ -1,7 +1,8 @@
 """Lock of a protocol: its hash, stored before data are collected, and the check that the protocol is unchanged.
 
 With a lock, a change of the settings after the start of data collection is detected. A lock is a JSON document. Called
-by `study.store.formats.protocol_files`, which reads and writes the file.
+by `study.store.formats.protocol_files`, which reads and writes the file, and by
+`study.workflows.files.session_recognisers`.
 """
 
 import json

@@ -47,8 +47,8 @@ def make_protocol_schema(kind: str) -> Node:
 def find_node(root: Node, path: ValuePath) -> Node | None:
     """Find the schema of the value at this path; None where the schema has no such path."""
     node: Node | None = root
-    for step in path:
-        node = _find_child_node(root, node, step) if node is not None else None
+    for path_entry in path:
+        node = _find_child_node(root, node, path_entry) if node is not None else None
     return node
 
 
@@ -62,12 +62,13 @@ def resolve_reference(root: Node, node: Node) -> Node:
     of the definition. A node without "$ref" is returned unchanged."""
     if "$ref" not in node:
         return node
-    target: Node = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
-    return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+    definition: Node = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+    return {**definition, **{key: value for key, value in node.items() if key != "$ref"}}
 
 
 def describe_allowed(root: Node, node: Node, key: str = "") -> str:
-    """Describe the allowed values in words. key: name of the value, whose suffix determines the unit (`UNIT_WORDS`)."""
+    """Describe the allowed values of a node in words. key: name of the value, whose suffix determines the unit of a
+    number (`UNIT_WORDS`); empty: no unit."""
     node = resolve_reference(root, node)
     if "oneOf" in node:
         return (
@@ -92,23 +93,24 @@ def describe_allowed(root: Node, node: Node, key: str = "") -> str:
 
 
 def find_unit(key: str) -> str:
-    """Find the unit of a key in words, such as ", in newtons" for `start_n`; empty for a key without a unit."""
+    """Find the unit of a key in words, such as ", in newtons" for `start_n`, by the longest suffix of `UNIT_WORDS` that
+    the key ends in; empty for a key without a unit."""
     for suffix, unit in sorted(UNIT_WORDS.items(), key=lambda item: -len(item[0])):
         if key.endswith(f"_{suffix}"):
             return f", in {unit}"
     return ""
 
 
-def _find_child_node(root: Node, node: Node, step: str | int) -> Node | None:
-    """Find the schema of an entry of a list (`step`: its index), of a key of a table, or of the member of a union that
-    the discriminator's value `step` selects; None where there is no such schema."""
+def _find_child_node(root: Node, node: Node, path_entry: str | int) -> Node | None:
+    """Find the schema of an entry of a list (`path_entry`: its index), of a key of a table, or of the member of a union
+    that the discriminator's value `path_entry` selects; None where there is no such schema."""
     node = resolve_reference(root, node)
-    if isinstance(step, int):
+    if isinstance(path_entry, int):
         return node.get("items")
     if "oneOf" in node:
-        reference = node["discriminator"]["mapping"].get(step)
+        reference = node["discriminator"]["mapping"].get(path_entry)
         return {"$ref": reference} if reference else None
-    child: Node | None = node.get("properties", {}).get(step)
+    child: Node | None = node.get("properties", {}).get(path_entry)
     if child is None and isinstance(additional_properties := node.get("additionalProperties"), dict):
         return additional_properties
     return child
@@ -116,8 +118,8 @@ def _find_child_node(root: Node, node: Node, step: str | int) -> Node | None:
 
 def _describe_choices(values: Any) -> str:
     """Describe a choice of texts, such as: "a", "b" or "c". values: at least one."""
-    names = [f'"{value}"' for value in values]
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+    quoted_values = [f'"{value}"' for value in values]
+    return quoted_values[0] if len(quoted_values) == 1 else f"{', '.join(quoted_values[:-1])} or {quoted_values[-1]}"
 
 
 def _describe_number(node: Node) -> str:
@@ -134,8 +136,11 @@ def _describe_number(node: Node) -> str:
 def _describe_text(node: Node) -> str:
     """Describe a text: as a name where it has a pattern ("^[a-z][a-z0-9_]{0,N}$"), else by its length."""
     if "pattern" in node:
-        most = node["pattern"].partition("{0,")[2].partition("}")[0]
-        return f"text in quotes: a lower-case letter, then up to {most} lower-case letters, digits and underscores"
+        max_further_characters = node["pattern"].partition("{0,")[2].partition("}")[0]
+        return (
+            f"text in quotes: a lower-case letter, then up to {max_further_characters} lower-case letters, digits and "
+            "underscores"
+        )
     min_length, max_length = node.get("minLength", 0), node.get("maxLength")
     return f"text in quotes, {min_length} to {max_length} characters long" if max_length else "text in quotes"
 

@@ -1,8 +1,8 @@
 """Psi method: the next level is that with the least expected posterior entropy of threshold and slope.
 
 A grid holds the posterior probability p(t, s) of every threshold t and slope s after all answers of the run so far,
-from a flat prior. For every level x, with P(x; t, s) of a right answer, the entropy after the next answer is expected
-to be
+from a flat prior. For every level x, with the probability P(x; t, s) of a right answer, the entropy after the next
+answer is expected to be
 
     H(x) = - sum over both answers a, and over t, s, of  j_a log(j_a / c_a),
     j_a = P_a(x; t, s) p(t, s),    c_a = sum of j_a over t, s (the probability of the answer).
@@ -94,9 +94,9 @@ def compute_posterior(answers: tuple[LevelAndAnswer, ...], cap_db: float) -> Flo
     """Compute the posterior probability (thresholds, slopes) of every threshold and slope after these answers, from a
     flat prior; without answers, the prior. cap_db: the cap in dB re 1 N."""
     log_likelihood = np.zeros((len(list_thresholds_db(cap_db)), len(SLOPES)))
-    for level_db, correct in answers:
-        answer_probability = compute_share_right(np.array(level_db), cap_db)
-        log_likelihood += np.log(answer_probability if correct else 1.0 - answer_probability)
+    for level_db, is_right in answers:
+        right_probability = compute_share_right(np.array(level_db), cap_db)
+        log_likelihood += np.log(right_probability if is_right else 1.0 - right_probability)
     likelihood = np.exp(log_likelihood - log_likelihood.max())
     posterior: FloatArray = likelihood / likelihood.sum()
     return posterior

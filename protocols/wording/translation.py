@@ -12,7 +12,7 @@ from protocols.wording.english import ENGLISH, LANGUAGES, list_placeholders
 from protocols.wording.english_forms import PROTOCOL_TEXTS
 
 MAX_TEXT_LENGTH = 4000
-"""Largest accepted length of a text, in characters: six times the longest English text (607)."""
+"""Largest accepted length of a text, in characters. Chosen: more than six times the longest English text (607)."""
 
 
 def find_language(values: Mapping[str, Any]) -> str:
@@ -23,11 +23,12 @@ def find_language(values: Mapping[str, Any]) -> str:
     return language if isinstance(language, str) else "en"
 
 
-def find_own_texts(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Find the texts by key that unvalidated values of a protocol contain; empty without a valid table."""
+def find_stated_texts(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Find the texts by key that unvalidated values of a protocol state in `text.words`; empty without a valid
+    table."""
     text_table = values.get("text")
-    own_texts = text_table.get("words", {}) if isinstance(text_table, dict) else {}
-    return dict(own_texts) if isinstance(own_texts, dict) else {}
+    stated_texts = text_table.get("words", {}) if isinstance(text_table, dict) else {}
+    return dict(stated_texts) if isinstance(stated_texts, dict) else {}
 
 
 def find_table_problems(table: Mapping[str, Any], require_all: bool) -> tuple[Problem, ...]:
@@ -41,16 +42,17 @@ def find_table_problems(table: Mapping[str, Any], require_all: bool) -> tuple[Pr
 
 
 def translate_protocol(values: Mapping[str, Any], table: Mapping[str, str], language: str) -> dict[str, Any]:
-    """Insert all texts of a table into the values of a protocol; texts that the protocol contains have priority.
-    Sentences of the shipped protocols (`PROTOCOL_TEXTS`) are replaced by their translation, other sentences stay.
-    language: its name, as `participant_texts.read_language` gives it."""
-    sentences = {PROTOCOL_TEXTS[key]: table[key] for key in PROTOCOL_TEXTS if key in table}
+    """Insert all texts of a table into the values of a protocol; texts that the protocol states itself have priority.
+    Sentences of the shipped protocols (`PROTOCOL_TEXTS`) are replaced by their translation, other sentences stay;
+    top-level keys whose value is None are left out. language: its name, as returned by
+    `participant_texts.read_language`."""
+    translation_by_sentence = {PROTOCOL_TEXTS[key]: table[key] for key in PROTOCOL_TEXTS if key in table}
 
     def translate(text: Any) -> Any:
         """Replace a sentence of the shipped protocols by its translation; return any other value unchanged."""
-        return sentences.get(text, text) if isinstance(text, str) else text
+        return translation_by_sentence.get(text, text) if isinstance(text, str) else text
 
-    translated_values = {**values, "text": {"language": language, "words": {**table, **find_own_texts(values)}}}
+    translated_values = {**values, "text": {"language": language, "words": {**table, **find_stated_texts(values)}}}
     translated_values["title"] = translate(values.get("title"))
     for table_key, key in (("consent", "statements"), ("consent", "exclusions"), ("setup", "grip")):
         if isinstance(values.get(table_key), dict) and key in values[table_key]:

@@ -89,7 +89,8 @@ def run_resumed_session(
     session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS, hands_off: bool = False
 ) -> None:
     """Resume a session in line mode or simulated, and print its results; of a closed session, only write the results
-    that are missing and print them. session: name or path of the session; data: data folder. Raises StudyError."""
+    that are missing and print them. session: name or path of the session; device, data, as_json: as for
+    `run_new_session`; keys, hands_off: as in `SittingOptions`. Raises StudyError."""
     folder = find_session(session, data)
     if warning := format_data_folder_warning(folder.path.parent):
         typer.echo(f"Note: {warning}", err=True)

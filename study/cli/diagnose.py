@@ -85,18 +85,18 @@ def diagnose(
     Writes diagnosis.json, improved.toml, report.html and figures.
     """
     from study.cli.progress import show_steps
-    from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, find_answer, write_answer
+    from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, run_diagnosis, write_result_folder
     from study.workflows.diagnosis.diagnosed_summary import format_answer, format_paths, list_new_remarks, make_json
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
     plan = replace(plan, force_constants=tuple(force_constant or ()))
     with show_steps("Diagnosing") as show_step:
-        answer = find_answer(plan, show_step)
+        answer = run_diagnosis(plan, show_step)
     findings = answer.findings
     # Printed before the report and its figures are made, because they take much longer.
     typer.echo(json.dumps(make_json(findings), indent=2) if as_json else "\n".join(format_answer(findings)))
     with show_steps("Diagnosing") as show_step:
-        reported_answer = write_answer(answer, show_step)
+        reported_answer = write_result_folder(answer, show_step)
     if not as_json:
         typer.echo("\n".join((*list_new_remarks(reported_answer.findings, findings), *format_paths(out))))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from study.workflows.checks.examine_setup import Examination
 
 NAME_COLUMN_WIDTH = 17
-"""Width of the column of a finding's name, in characters."""
+"""Least width of the column of a finding's name, in characters; a longer name shifts its line. Chosen."""
 CALIBRATION_TIMEOUT_S = 60.0
 """Longest wait (s) until the handle is in its calibration position. Chosen: a minute suffices to move it by hand."""
 
@@ -99,7 +99,7 @@ def doctor(
 
 
 def _prepare_device(device: str, calibrate: bool, daily: bool, will_move: bool, hands_off: bool) -> None:
-    """Refuse what the options do not allow before the checks begin, and calibrate the device if this is requested.
+    """Check, before the examination, that the options are allowed, and calibrate the device if this is requested.
 
     will_move: whether --accept or --daily makes the device move. Raises WrongUseError where its motion cannot be
     confirmed, or the device is not a real one (--daily), and DeviceError where the calibration fails.
@@ -118,10 +118,10 @@ def _prepare_device(device: str, calibrate: bool, daily: bool, will_move: bool, 
 
 def _accept_device(device: str, examination: "Examination", operator: str, hands_off: bool) -> None:
     """Record the acceptance of the device for use with a hand, signed by `operator`, and print a sentence about it."""
-    from study.workflows.checks.examine_setup import accept
+    from study.workflows.checks.examine_setup import accept_examined_device
 
     with _announce_and_show_motion(hands_off) as motion_callbacks:
-        sentence = accept(device, examination, operator, motion_callbacks)
+        sentence = accept_examined_device(device, examination, operator, motion_callbacks)
     typer.echo(sentence, err=True)
 
 
@@ -190,11 +190,11 @@ def _calibrate_accelerometer(port: str, baud: int, keep: bool) -> None:
 
 def _print_findings(examination: "Examination") -> None:
     """Print all findings under the titles of their sections, then a summary."""
-    timing = examination.timing
+    timing_report = examination.timing
     findings_by_section = {
         "Installation": examination.installation,
         "Device": examination.device.findings,
-        "Timing": timing.findings if timing is not None else (),
+        "Timing": timing_report.findings if timing_report is not None else (),
     }
     for title, findings in findings_by_section.items():
         if findings:
@@ -228,14 +228,14 @@ def _print_finding(finding: "DeviceFinding") -> None:
 
 def _make_document(examination: "Examination") -> dict[str, Any]:
     """Make the JSON document of --json; its `timing` is None where the timing was not measured."""
-    timing = examination.timing
+    timing_report = examination.timing
     document = {
         "fine": all(finding.fine for finding in examination.findings),
         "installation": [asdict(finding) for finding in examination.installation],
         "device": asdict(examination.device),
         "timing": None,
     }
-    if timing is not None:
-        health = asdict(timing.health) | {"fault": timing.health.fault.name.lower()}
-        document["timing"] = asdict(timing) | {"health": health}
+    if timing_report is not None:
+        health = asdict(timing_report.health) | {"fault": timing_report.health.fault.name.lower()}
+        document["timing"] = asdict(timing_report) | {"health": health}
     return document

@@ -15,7 +15,7 @@ from study.cli.results import JsonOption
 def export(
     data: Annotated[Path, typer.Argument(help="Folder of sessions, or one session.")],
     out: Annotated[Path, typer.Option(help="Folder to write; it must not be there yet, or be empty.")],
-    form: Annotated[
+    export_format: Annotated[
         Literal["psych-ds", "bids", "mat", "csv"],
         typer.Option(
             "--format",
@@ -39,10 +39,14 @@ def export(
     from study.workflows.results.collect_sessions import collect_sessions
     from study.workflows.results.export_study import export_study
 
-    exported = export_study(collect_sessions(data, protocol), data, out, form, free_text)
+    export_result = export_study(collect_sessions(data, protocol), data, out, export_format, free_text)
     if as_json:
-        typer.echo(json.dumps({"out": str(exported.out), "files": exported.files, "trials": exported.trials}, indent=2))
+        typer.echo(
+            json.dumps(
+                {"out": str(export_result.out), "files": export_result.files, "trials": export_result.trials}, indent=2
+            )
+        )
         return
-    for remark in exported.left_out:
+    for remark in export_result.left_out:
         typer.echo(f"Left out: {remark}", err=True)
-    typer.echo(f"{exported.out}: {exported.trials} trials in {len(exported.files)} files")
+    typer.echo(f"{export_result.out}: {export_result.trials} trials in {len(export_result.files)} files")

@@ -39,22 +39,22 @@ def import_recording(
     require_new_output(out)
     try:
         with show_late_bar("Importing (%)", total=100) as show_percent:
-            imported = convert_files(
+            import_result = convert_files(
                 ImportPlan(tuple(files), map_name, out), lambda share: show_percent(round(100 * share))
             )
     except MapNeededError as error:
         typer.echo(error.skeleton, nl=False)
         raise
-    recording = imported.recording
+    recording = import_result.recording
     if as_json:
         document = {
-            "recording": str(out), "map": imported.map, "sample_rate_hz": recording.sample_rate_hz,
+            "recording": str(out), "map": import_result.map, "sample_rate_hz": recording.sample_rate_hz,
             "samples": len(recording), "command": list(recording.command.channels),
             "response": list(recording.response.channels), "segments": len(recording.segments),
-            "notes": list(imported.notes),
+            "notes": list(import_result.notes),
         }  # fmt: skip
         typer.echo(json.dumps(document, indent=2))
     else:
         typer.echo(str(out))
-    for note in imported.notes:
+    for note in import_result.notes:
         typer.echo(f"Note: {note}", err=True)

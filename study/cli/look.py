@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def look(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings, REC.h5 ...", metavar="REC.h5 ...")],
     out: Annotated[Path | None, typer.Option(help="Folder for a page with figures.")] = None,
-    everything: Annotated[bool, typer.Option("--all", help="Also the checks that found nothing.")] = False,
+    list_passed_checks: Annotated[bool, typer.Option("--all", help="Also the checks that found nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show signals, spectra, coherence, levels and repeats; check units, clock, derivatives, lags, clipping and steps.
@@ -36,14 +36,14 @@ def look(
         typer.echo(json.dumps(make_look_document(overviews), indent=2))
     else:
         for overview in overviews:
-            print_lines(format_overview(overview, everything))
+            print_lines(format_overview(overview, list_passed_checks))
     if out is not None:
         typer.echo(f"Report: {write_look_page(overviews, out)}", err=True)
 
 
-def format_overview(overview: "Overview", everything: bool) -> Iterable[str]:
-    """Format measurements and checks of one recording as lines. everything: also list the passed checks, which else
-    are only counted."""
+def format_overview(overview: "Overview", list_passed_checks: bool) -> Iterable[str]:
+    """Format measurements and checks of one recording as lines. list_passed_checks: also list the passed checks, which
+    otherwise are only counted."""
     from analysis.reports.look_report import summarise_overview
     from study.tui.text_rows import wrap_hanging
 
@@ -51,13 +51,13 @@ def format_overview(overview: "Overview", everything: bool) -> Iterable[str]:
     yield from draw_recording_lines(overview)
     yield ""
     for check in overview.checks:
-        if everything or check.level != "fine":
+        if list_passed_checks or check.level != "fine":
             yield from wrap_hanging(
                 f"{check.level:6s}  {check.name}: {check.finding} {check.advice}".rstrip(), 8, read_terminal_width()
             )
-    fine_count = sum(check.level == "fine" for check in overview.checks)
-    if not everything and fine_count:
-        yield f"fine    {fine_count} further checks (--all shows them)"
+    passed_count = sum(check.level == "fine" for check in overview.checks)
+    if not list_passed_checks and passed_count:
+        yield f"fine    {passed_count} further checks (--all shows them)"
     yield ""
 
 
@@ -82,9 +82,11 @@ def _format_tables(overview: "Overview") -> Iterable[str]:
 
     rows: list[tuple[str, ...]] = [("channel", "quantity", "unit", "lowest", "highest", "mean", "rms", "missing")]
     for summary in overview.summaries:
-        statistics = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
+        statistic_cells = [
+            typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)
+        ]
         rows.append(
-            (f"{summary.role} {summary.name}", summary.quantity, summary.unit, *statistics, str(summary.missing))
+            (f"{summary.role} {summary.name}", summary.quantity, summary.unit, *statistic_cells, str(summary.missing))
         )
     yield from align_rows(tuple(rows), read_terminal_width())
     segments = overview.recording.segments
@@ -92,10 +94,16 @@ def _format_tables(overview: "Overview") -> Iterable[str]:
         yield ""
         rms_headings = [f"rms {channel.role} {channel.name}" for channel in overview.channels]
         segment_rows: list[tuple[str, ...]] = [("segment", "role", "start s", "length s", "period", *rms_headings)]
-        for level in overview.levels[:MAX_SEGMENT_ROWS]:
-            statistics = [f"{value:.4g}" for value in level.rms]
-            time_cells = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
-            segment_rows.append((f"{level.number} {level.kind}", level.role, *time_cells, *statistics))
+        for segment_level in overview.levels[:MAX_SEGMENT_ROWS]:
+            statistic_cells = [f"{value:.4g}" for value in segment_level.rms]
+            time_cells = (
+                f"{segment_level.start_s:.4g}",
+                f"{segment_level.duration_s:.4g}",
+                str(segment_level.period) if segment_level.period else "",
+            )
+            segment_rows.append(
+                (f"{segment_level.number} {segment_level.kind}", segment_level.role, *time_cells, *statistic_cells)
+            )
         yield from align_rows(tuple(segment_rows), read_terminal_width())
         if len(segments) > MAX_SEGMENT_ROWS:
             yield f"and {len(segments) - MAX_SEGMENT_ROWS} segments more"

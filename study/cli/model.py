@@ -28,14 +28,14 @@ def model(
     from study.cli.progress import show_late_bar
     from study.workflows.diagnosis.fit_first_model import (
         FirstModelPlan,
-        fit_first_model,
+        fit_and_write_first_model,
         format_first_model,
         summarise_first_model,
     )
 
     plan = FirstModelPlan(tuple(recordings), out, structure, tuple(force_constant or ()))
     with show_late_bar("Model (%)", total=100) as show_percent:
-        fitted_model = fit_first_model(plan, lambda share: show_percent(round(100 * share)))
+        fitted_model = fit_and_write_first_model(plan, lambda share: show_percent(round(100 * share)))
     typer.echo(
         json.dumps(summarise_first_model(fitted_model), indent=2)
         if as_json

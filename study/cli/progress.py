@@ -1,4 +1,4 @@
-"""Progress bars of the commands on stderr, as context managers that yield a callback; used by all long commands.
+"""Progress bars on stderr, as context managers that yield a callback. Called by the commands that take long.
 
 Without a terminal, as in a log, a bar is written once, when it ends; `show_steps` and `show_run_and_trial` write
 nothing.

@@ -37,7 +37,7 @@ def list_protocols() -> None:
 @app.command("show")
 def show_protocol(
     name: NameArgument,
-    text: Annotated[bool, typer.Option("--text", help="The file as it is, to copy and change.")] = False,
+    print_text: Annotated[bool, typer.Option("--text", help="The file as it is, to copy and change.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
 ) -> None:
     """Show every key of a protocol with its value, its default and the reason for it."""
@@ -47,7 +47,7 @@ def show_protocol(
     from study.store.formats.protocol_files import read_protocol
 
     protocol_file = read_protocol(name)
-    if text:
+    if print_text:
         typer.echo(protocol_file.text, nl=False)
         return
     fields = explain_protocol(protocol_file.protocol)

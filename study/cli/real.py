@@ -38,7 +38,8 @@ def real(
     scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Diagnose a folder of real recordings: what was named, what remains unexplained, and possible objections.
+    """Diagnose a folder of real recordings: the effects that are named, what remains unexplained, and possible
+    objections.
 
     Maps in the folder of the recordings are used, else those that come with hapteq. After an interruption, the same
     command continues.

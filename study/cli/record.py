@@ -46,8 +46,8 @@ def record(
     from study.store.formats.protocol_files import read_recording_protocol
     from study.workflows.recording.record_device import RecordingPlan, record_device, require_new_output
 
-    source = read_recording_protocol(protocol)
-    is_held = source.protocol.hand == "held"
+    protocol_source = read_recording_protocol(protocol)
+    is_held = protocol_source.protocol.hand == "held"
     if is_held and hands_off:
         raise WrongUseError(
             "Is a hand on the handle?",
@@ -55,9 +55,9 @@ def record(
             "Leave --hands-off out, or choose a protocol for a free handle.",
             saved="Nothing moved.",
         )
-    plan = RecordingPlan(source.protocol, device=device, place_m=place, seed=seed, out=out)
+    plan = RecordingPlan(protocol_source.protocol, device=device, place_m=place, seed=seed, out=out)
     require_new_output(out)
-    with show_late_bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
+    with show_late_bar(f"{protocol_source.protocol.title} (s)", total=round(plan.total_s)) as show:
         recording = record_device(
             plan, on_progress=show, before_moving=partial(announce_motion, hands_off=hands_off, hand_on_handle=is_held)
         )

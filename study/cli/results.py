@@ -1,6 +1,6 @@
 """Output of the commands' results: the option `--json`, and printing of a session's or a study's analysis.
 
-`JsonOption` is used by most commands, `print_results` by `analyze` and by `conduct` (commands that run a session).
+`JsonOption` is used by most commands, `print_results` by `analyze`, `rehearse` and `conduct`.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Starts the full-screen interface of `hapteq study` and `hapteq resume`, and prints the results when it ends.
 
-Also tells the commands what the terminal can do: `has_screen`, `has_keyboard` and `read_terminal_width`.
+Other commands call `has_screen`, `has_keyboard` and `read_terminal_width`, which examine the terminal.
 """
 
 import os

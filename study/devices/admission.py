@@ -149,11 +149,11 @@ def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
 def _check_info(info: DeviceInfo) -> None:
     """Require rate and mass of the device within their ranges, because spring, fades and all times in ticks depend on
     them. Raises `DeviceError`."""
-    ranges = (
+    accepted_ranges = (
         ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
         ("effective_mass_kg", info.effective_mass_kg, 1e-3, MAX_EFFECTIVE_MASS_KG),
     )
-    for name, value, lowest, highest in ranges:
+    for name, value, lowest, highest in accepted_ranges:
         if not lowest <= value <= highest:
             raise DeviceError(
                 "The device was not opened: it reports implausible properties",
@@ -163,8 +163,10 @@ def _check_info(info: DeviceInfo) -> None:
 
 
 def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
-    """Require force caps (N) within the device's maximum and, unless `beyond_hand_ceiling`, within those for a hand;
-    refuse `beyond_hand_ceiling` with a hand on the handle. Raises `DeviceError`."""
+    """Require the caps (N) on total and stimulus within the device's maximum and, unless `beyond_hand_ceiling`, those
+    for a hand; the stimulus's within the total; the cap on the feedback within the device's maximum where
+    `beyond_hand_ceiling`, else within that for a hand. Refuse `beyond_hand_ceiling` with a hand on the handle. Raises
+    `DeviceError`."""
     limits, exceeds_hand_ceiling = settings.limits, settings.beyond_hand_ceiling
     if exceeds_hand_ceiling and settings.hand_on_handle:
         raise _make_settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
@@ -179,8 +181,8 @@ def _check_within(name: str, value: float, max_value: float, *, allows_zero: boo
     """Require 0 < value <= max_value, or 0 <= value <= max_value where `allows_zero`. Raises `DeviceError`, also for
     NaN."""
     if not (0 < value <= max_value or (allows_zero and value == 0)):
-        allowed = "at least 0" if allows_zero else "above 0"
-        raise _make_settings_error(f"{name} is {value:g}; it must be {allowed} and at most {max_value:g}.")
+        allowed_text = "at least 0" if allows_zero else "above 0"
+        raise _make_settings_error(f"{name} is {value:g}; it must be {allowed_text} and at most {max_value:g}.")
 
 
 def _make_settings_error(problem_sentence: str) -> DeviceError:

@@ -1,8 +1,8 @@
 """Clock of a session: real time, or virtual time, in which a simulated session of half an hour runs in a second.
 
 `Clock` is the interface. The code of a session takes the clock as an argument, so that the same code runs in real time
-and in virtual time. `study.devices.drive.virtual_drive` listens to a virtual clock and runs the device's ticks when it
-advances.
+and in virtual time. `study.devices.drive.virtual_drive` registers a listener at a virtual clock, and runs the device's
+ticks when the clock advances.
 """
 
 import time
@@ -84,10 +84,10 @@ class VirtualClock:
         the log of a simulated session may be later than real time, and must not go back when the session is resumed."""
         return cls(max(datetime.now(UTC), datetime.fromisoformat(utc)))
 
-    def listen(self, listener: Callable[[float], None]) -> None:
-        """Call `listener(now_s)` after each `sleep` that advances the time."""
+    def add_listener(self, listener: Callable[[float], None]) -> None:
+        """Add a listener: `listener(now_s)` is called after each `sleep` that advances the time."""
         self._listeners.append(listener)
 
-    def forget(self, listener: Callable[[float], None]) -> None:
+    def remove_listener(self, listener: Callable[[float], None]) -> None:
         """Remove a listener. Raises ValueError for an unknown one."""
         self._listeners.remove(listener)

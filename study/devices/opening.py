@@ -163,10 +163,10 @@ def open_telemetry(path: str) -> "TelemetryReader":
 
 def open_lab_onset_line() -> "OnsetLine | None":
     """Open the line for onset pulses that is set in the lab's file; None where none is set. Raises `DeviceError`."""
-    from study.devices.force_dimension.lab import read_lab
+    from study.devices.force_dimension.lab import read_lab_settings
     from study.devices.onset_line import open_onset_line
 
-    settings = read_lab().pulse
+    settings = read_lab_settings().pulse
     return None if settings is None else open_onset_line(settings)
 
 
@@ -216,11 +216,11 @@ def calibrate_device(name: str, patience_s: float) -> None:
 def calibrate_accelerometer(
     port: str, baud: int, await_position: Callable[[str, tuple[float, float, float] | None], None]
 ) -> str:
-    """Calibrate an accelerometer by gravity in six positions (`six_positions.calibrate_on_table`). baud: of the serial
-    port (bit/s). Returns the calibration as a TOML table for the lab's file. Raises `DeviceError`."""
-    from study.devices.accelerometer.six_positions import calibrate_on_table
+    """Calibrate an accelerometer by gravity in six positions (`six_positions.calibrate_in_six_positions`). baud: of the
+    serial port (bit/s). Returns the calibration as a TOML table for the lab's file. Raises `DeviceError`."""
+    from study.devices.accelerometer.six_positions import calibrate_in_six_positions
 
-    return calibrate_on_table(port, baud, await_position)
+    return calibrate_in_six_positions(port, baud, await_position)
 
 
 def save_accelerometer_calibration(table: str) -> Path:

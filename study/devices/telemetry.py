@@ -8,6 +8,9 @@ process is killed.
 
 The first row is a header: format, rate, number of rows written so far. Row k of the loop is in row 1 + k mod size, with
 its own number k and a checksum: a reader recognises by them a row that is being overwritten.
+
+`Ring` is used by `safe`, `opening` and `loop_process.remote_device`, `TelemetryReader` by `opening` and
+`study.workflows.views.stream_signals`.
 """
 
 import contextlib
@@ -121,7 +124,8 @@ class Telemetry:
 
 
 class TelemetryReader:
-    """Reader's side of a ring, from the next row on. Raises `StudyError` for a file that is no ring."""
+    """Reader's side of a ring, from the first row that is written after it was made. Raises `StudyError` for a file
+    that is no ring."""
 
     def __init__(self, path: Path) -> None:
         try:

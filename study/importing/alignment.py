@@ -1,5 +1,5 @@
 """Align the clocks of several loggers to the first: by a stated offset, a trigger, or cross-correlation of one
-motion in both. Called by `build_recording`."""
+motion in both. Called by `build_recording`; `part_signals` uses `Logger`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ class Logger:
 
     def compute_values(self, expression: str) -> Value:
         """Compute the values (n,) of an expression over the arrays. Raises ImportProblemError for another shape, or a
-        length other than that of the stamps."""
+        length other than that of the clock's time stamps."""
         values = self.namespace.compute_value(expression, self.base)
         if values.ndim != 1:
             raise ImportProblemError(
@@ -45,7 +45,7 @@ class Logger:
 
 def align_signals(loggers: tuple[Logger, ...], report_sentence: Callable[[str], None]) -> tuple[Logger, ...]:
     """Align all clocks to that of the first logger: returns the loggers with the offsets (s) of their clocks.
-    `report_sentence` is called with a sentence for each offset. Raises ImportProblemError where a correlation or a
+    report_sentence: called with a sentence for each offset. Raises ImportProblemError where a correlation or a
     trigger gives none."""
     first_logger, *other_loggers = loggers
     return (first_logger, *(_set_clock_offset(first_logger, logger, report_sentence) for logger in other_loggers))
@@ -60,9 +60,9 @@ def _set_clock_offset(first_logger: Logger, logger: Logger, report_sentence: Cal
         offset_s, method = _align_by_trigger(first_logger, logger)
     else:
         offset_s, method = clock.offset_s, "as the map states"
-    offset_text = typeset(f"{offset_s * 1e3:.4g}")
+    offset_ms_text = typeset(f"{offset_s * 1e3:.4g}")
     report_sentence(
-        f"Clock '{clock.name}' is moved by {offset_text} ms to that of '{first_logger.clock.name}', {method}."
+        f"Clock '{clock.name}' is moved by {offset_ms_text} ms to that of '{first_logger.clock.name}', {method}."
     )
     return replace(logger, base=replace(logger.base, offset_s=offset_s))
 

@@ -2,7 +2,8 @@
 
 For each part (one file, or one run in it): arrays are read, the clocks of its loggers aligned, and its channels put
 onto one time grid (`resample_part`). The parts are then concatenated and converted to SI units, and segments are found
-if the map states none. Called by `study.workflows.recording.import_recording` and `diagnose_real`.
+if the map states none. Called by `study.workflows.recording.import_recording` and
+`study.evaluation.real.diagnose_real`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,18 +31,18 @@ from study.importing.part_signals import ChannelKey, PartSignals, resample_part
 from study.importing.time_base import PLACEHOLDER_RATE_HZ, drop_doubled_rows, make_time_base
 
 _MAX_LISTED_PARTS = 3
-"""Most parts that a sentence names. Chosen."""
+"""Largest number of parts that a sentence names. Chosen."""
 
 
 class ImportNotes:
     """Sentences about an import, each reported once: a sentence that holds for all parts is not repeated for each."""
 
     def __init__(self) -> None:
-        self._parts: dict[str, list[str]] = {}
+        self._parts_by_sentence: dict[str, list[str]] = {}
 
     def add(self, part: str, sentence: str) -> None:
         """Add a sentence about a part, by its label; a repeated sentence counts once."""
-        parts = self._parts.setdefault(sentence, [])
+        parts = self._parts_by_sentence.setdefault(sentence, [])
         if part not in parts:  # channels of the same name, with several roles
             parts.append(part)
 
@@ -50,7 +51,7 @@ class ImportNotes:
         parts."""
         return tuple(
             sentence if len(parts) == len(all_parts) else f"{_abbreviate_list(parts)}: {sentence}"
-            for sentence, parts in self._parts.items()
+            for sentence, parts in self._parts_by_sentence.items()
         )
 
 
@@ -77,6 +78,7 @@ class _Part:
 
     signals: PartSignals
     facts: dict[str, Any]
+    """File, prefix, start (s) and clock offsets (s) of the part, and the numbers of the map."""
 
 
 def build_recording(
@@ -119,7 +121,7 @@ class _ProgressCounter:
         self.step_count = step_count
         self.on_progress = on_progress
 
-    def step(self) -> None:
+    def count_step(self) -> None:
         """Count a channel as done, and report the fraction of all."""
         self.done_count += 1
         self.on_progress(min(1.0, self.done_count / self.step_count))
@@ -144,12 +146,13 @@ def _build_part(
         loggers.append(Logger(clock, reduced_namespace, make_time_base(clock, reduced_namespace)))
 
     def report_sentence(sentence: str) -> None:
+        """Add a sentence about this part to the notes."""
         import_notes.add(files.label, sentence)
 
     for note in dict.fromkeys((*(note for arrays in arrays_by_path.values() for note in arrays.notes), *notes)):
         report_sentence(note)
     aligned_loggers = align_signals(tuple(loggers), report_sentence)
-    signals = resample_part(import_map, files.part, aligned_loggers, report_sentence, counter.step)
+    signals = resample_part(import_map, files.part, aligned_loggers, report_sentence, counter.count_step)
     map_numbers = {name: aligned_loggers[0].namespace.compute_number(text) for name, text in import_map.numbers.items()}
     facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **map_numbers}
     offsets = {logger.clock.name: logger.base.offset_s for logger in aligned_loggers[1:]}
@@ -206,7 +209,7 @@ def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Chan
     response = _join_signal("response", import_map, parts, units)
     if command is None or response is None:
         raise ImportProblemError("a recording needs both a command and a response")
-    facts, segments = _collect_facts_and_segments(import_map, parts, units)
+    part_facts, segments = _collect_facts_and_segments(import_map, parts, units)
     return Recording(
         device=import_map.device,
         command=command,
@@ -216,7 +219,7 @@ def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Chan
         condition=_join_signal("condition", import_map, parts, units),
         hold=Hold(import_map.hold),
         segments=segments,
-        meta={**import_map.meta, **_describe_time_origin(import_map), "title": import_map.title, "parts": facts},
+        meta={**import_map.meta, **_describe_time_origin(import_map), "title": import_map.title, "parts": part_facts},
     )
 
 
@@ -281,7 +284,7 @@ def _collect_facts_and_segments(
             "that it is measured, or give the commands in SI units"
         )
     common_factor = factors.pop() if len(factors) == 1 else 1.0
-    facts, segments, start = [], [], 0
+    part_facts, segments, start = [], [], 0
     for part in parts:
         grid = part.signals.grid
         command: FloatArray = np.column_stack(
@@ -291,6 +294,6 @@ def _collect_facts_and_segments(
         for segment in place_segments(import_map.segment, label, command, grid.rate_hz):
             shifted_segment = replace(segment, start=segment.start + start, stop=segment.stop + start)
             segments.append(replace(shifted_segment, amplitude=segment.amplitude * common_factor))
-        facts.append({**part.facts, "start": start, "stop": start + grid.count})
+        part_facts.append({**part.facts, "start": start, "stop": start + grid.count})
         start += grid.count
-    return facts, tuple(segments)
+    return part_facts, tuple(segments)

@@ -7,7 +7,7 @@ A motion that follows ramps or sines, while the force does not, was imposed and 
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from analysis.look.imposed_motion import is_imposed
+from analysis.look.imposed_motion import is_motion_imposed
 from study.importing.arrays.read_arrays import Array
 from study.importing.map_format.import_map import SignalRole
 from study.importing.map_format.signal_words import ParsedName, may_be_imposed_motion
@@ -50,7 +50,7 @@ def swap_imposed_roles(
     if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
         return proposed_roles
     if not all(
-        is_imposed(arrays_by_header[position.header].astype(float), arrays_by_header[force.header].astype(float))
+        is_motion_imposed(arrays_by_header[position.header].astype(float), arrays_by_header[force.header].astype(float))
         for position in positions
         for force in forces
     ):

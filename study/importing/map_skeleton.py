@@ -1,7 +1,7 @@
 """Make an incomplete import map for a file of which only the arrays are known, to be completed by the user.
 
 Clocks, channels and runs are proposed from names, units, shapes and data. Unknown values are left empty or described
-in a comment. Called by `import_recording` and `map_library` where a map is missing.
+in a comment. Called by `study.workflows.recording.import_recording` and `map_library` where a map is missing.
 """
 
 import json
@@ -35,7 +35,7 @@ from study.importing.surplus_arrays import (
 _FORCE_QUANTITIES = ("force", "torque")
 """Quantities of forces: in rotation, torques."""
 _MAX_LISTED_RUNS = 4
-"""Most further runs that a comment of the skeleton names; dots stand for the rest. Chosen."""
+"""Largest number of further runs that a comment of the map names; dots stand for the rest. Chosen."""
 _ROLE_SUFFIX = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
@@ -49,9 +49,9 @@ def make_map_skeleton(arrays: Arrays) -> str:
 
 def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     """Write the lines of the map: head, clocks, channels, parts, segment."""
-    groups = find_runs(all_arrays.by_name, LEAST_SAMPLES)
-    ungrouped_names = _find_ungrouped_runs(all_arrays, groups)
-    arrays = _select_first_run(all_arrays, groups, ungrouped_names)
+    run_groups = find_runs(all_arrays.by_name, LEAST_SAMPLES)
+    ungrouped_names = _find_ungrouped_runs(all_arrays, run_groups)
+    arrays = _select_first_run(all_arrays, run_groups, ungrouped_names)
     surplus_reasons = find_surplus_arrays(arrays)
     all_clocks = [
         name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)
@@ -81,15 +81,15 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
             yield from _write_table(name, array, clock, roles.get(name, ""))
         else:
             yield from _describe_excluded_array(name, array)
-    yield from _write_parts(groups.prefixes)
-    yield from _write_ungrouped_runs(ungrouped_names, groups)
+    yield from _write_parts(run_groups.prefixes)
+    yield from _write_ungrouped_runs(ungrouped_names, run_groups)
     yield ""
     yield "[[segment]]"
     yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
     yield "split = { fit = 0.5, test = 0.5 }"
 
 
-def _find_ungrouped_runs(all_arrays: Arrays, groups: RunGroups) -> list[str]:
+def _find_ungrouped_runs(all_arrays: Arrays, run_groups: RunGroups) -> list[str]:
     """Find the arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not
     count."""
     long_cell_arrays = [
@@ -97,26 +97,30 @@ def _find_ungrouped_runs(all_arrays: Arrays, groups: RunGroups) -> list[str]:
         for name, array in all_arrays.by_name.items()
         if CELL_ENTRY_PREFIX.match(name) and array.size >= LEAST_SAMPLES
     ]
-    return [name for name in long_cell_arrays if not name.startswith(groups.prefixes)] if groups.prefixes else []
+    return (
+        [name for name in long_cell_arrays if not name.startswith(run_groups.prefixes)] if run_groups.prefixes else []
+    )
 
 
-def _select_first_run(all_arrays: Arrays, groups: RunGroups, ungrouped_names: Sequence[str]) -> Arrays:
+def _select_first_run(all_arrays: Arrays, run_groups: RunGroups, ungrouped_names: Sequence[str]) -> Arrays:
     """Select the arrays of the first of several runs and those that belong to no run, except `ungrouped_names`; the
     times of tables [time, value ...] are added as separate arrays."""
-    run_names = [name for name in all_arrays.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
+    run_names = (
+        [name for name in all_arrays.by_name if name.startswith(run_groups.prefixes)] if run_groups.prefixes else []
+    )
     common_arrays = {
         name: array for name, array in all_arrays.by_name.items() if name not in (*run_names, *ungrouped_names)
     }
     first_arrays = {
-        **{name: all_arrays.by_name[full_name] for name, full_name in groups.names.items()},
+        **{name: all_arrays.by_name[full_name] for name, full_name in run_groups.names.items()},
         **common_arrays,
     }
-    times = {
+    times_by_expression = {
         _format_line_expression(name, array, 0): _select_first_line(array)
         for name, array in first_arrays.items()
         if has_time_line(array)
     }
-    return Arrays(all_arrays.path, {**first_arrays, **times}, (*all_arrays.clocks, *times))
+    return Arrays(all_arrays.path, {**first_arrays, **times_by_expression}, (*all_arrays.clocks, *times_by_expression))
 
 
 def _match_clock(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
@@ -178,9 +182,13 @@ def _strip_value_suffix(name: str) -> str:
     return name
 
 
-def _format_line_expression(name: str, array: Array, number: int) -> str:
-    """Format the expression for a row or column of a table: the line of this number, from 0, along its longer side."""
-    return f"{quote_name(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote_name(name)}[:, {number}]"
+def _format_line_expression(name: str, array: Array, line_index: int) -> str:
+    """Format the expression for a row or column of a table: the line with this index, from 0, along its longer side."""
+    return (
+        f"{quote_name(name)}[{line_index}]"
+        if array.shape[0] < array.shape[1]
+        else f"{quote_name(name)}[:, {line_index}]"
+    )
 
 
 def _select_first_line(array: Array) -> Array:
@@ -188,10 +196,12 @@ def _select_first_line(array: Array) -> Array:
     return array[0] if array.shape[0] < array.shape[1] else array[:, 0]
 
 
-def _propose_array_roles(arrays: Arrays, excluded: list[str]) -> dict[str, str]:
-    """Propose roles by the name of the array, where names, units and data determine them. excluded: arrays that are not
-    channels."""
-    channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in excluded]
+def _propose_array_roles(arrays: Arrays, excluded_names: list[str]) -> dict[str, str]:
+    """Propose roles by the name of the array, where names, units and data determine them. excluded_names: arrays that
+    are not channels."""
+    channels = [
+        name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in excluded_names
+    ]
     columns = [replace(parse_signal_name(_strip_value_suffix(name)), header=name) for name in channels]
     return dict(zip(channels, swap_imposed_roles(columns, arrays.by_name, propose_roles(columns)), strict=True))
 
@@ -205,15 +215,15 @@ def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
         yield f"prefix = {json.dumps(prefix)}"
 
 
-def _write_ungrouped_runs(ungrouped_names: Sequence[str], groups: RunGroups) -> Iterator[str]:
-    """Write comments on runs in cells of another length, and on how to add them where their names identify the
+def _write_ungrouped_runs(ungrouped_names: Sequence[str], run_groups: RunGroups) -> Iterator[str]:
+    """Write comments on runs in cells of another length, and on how to add the last of them whose names identify the
     arrays."""
     if ungrouped_names:
         names_text = ", ".join(ungrouped_names[:_MAX_LISTED_RUNS]) + (
             " ..." if ungrouped_names[_MAX_LISTED_RUNS:] else ""
         )
         yield f"\n# Also in the file, in cells of another length: {names_text}"
-    name_by_stem = {_ROLE_SUFFIX.sub("", name): name for name in groups.names if name.isidentifier()}
+    name_by_stem = {_ROLE_SUFFIX.sub("", name): name for name in run_groups.names if name.isidentifier()}
     definitions_by_run: dict[str, list[str]] = {}
     for prefix, slash, name in (full_name.partition("/") for full_name in ungrouped_names):
         if (stem := _ROLE_SUFFIX.sub("", name)) in name_by_stem:
@@ -252,11 +262,11 @@ def _write_table(name: str, array: Array, clock: str, role: str) -> Iterator[str
     """Write a channel per line of a table; a table [time, value] gives one channel, with the name and role of the
     table."""
     has_time = has_time_line(array)
-    for number in range(int(has_time), min(array.shape)):
+    for line_index in range(int(has_time), min(array.shape)):
         is_single = has_time and min(array.shape) == 2
-        channel_name = name if is_single else f"{name}{number + (not has_time)}"
+        channel_name = name if is_single else f"{name}{line_index + (not has_time)}"
         yield from _write_channel(
-            (channel_name, _format_line_expression(name, array, number), name),
+            (channel_name, _format_line_expression(name, array, line_index), name),
             _describe_shape(array.shape),
             clock if has_time else "",
             role if is_single else "",

@@ -87,7 +87,7 @@ def resample_part(
 
 def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> Value:
     """Compute the samples (n,) of a channel on its clock; a single number is repeated. Raises ImportProblemError for
-    another shape or length, and for an array with infinite values."""
+    another shape or length, and for infinite values."""
     label = f"channel '{channel.name}'"
     try:
         values = logger.namespace.compute_value(channel.value, logger.base)
@@ -98,13 +98,13 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
             f"{label}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
         )
     count = _count_samples(logger, import_map)
+    if np.isinf(values).any():
+        raise ImportProblemError(f"{label}: {channel.value} holds infinite values; a missing sample is NaN")
     if values.ndim == 0:
         return np.full(count or 1, float(values))
     if count and len(values) != count:
         clock_text = f"clock '{logger.clock.name}'"
         raise ImportProblemError(f"{label}: {channel.value} has {len(values)} samples, but {clock_text} has {count}")
-    if np.isinf(values).any():
-        raise ImportProblemError(f"{label}: {channel.value} holds infinite values; a missing sample is NaN")
     return values
 
 
@@ -205,7 +205,7 @@ def _compute_channel(
     channel_name: str, expression: str, columns: Mapping[str, FloatArray], grid: Grid, file_namespace: Namespace
 ) -> FloatArray:
     """Evaluate the expression of a computed channel on the grid (grid.count,); a single number is repeated. columns:
-    the channels by name. Raises ImportProblemError for another shape, and for an array with infinite values."""
+    the channels by name. Raises ImportProblemError for another shape, and for infinite values."""
     arrays = {**file_namespace.arrays, "clock_s": grid.compute_times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(
@@ -213,6 +213,8 @@ def _compute_channel(
         ).compute_value(expression, _GridClock(grid))
     except ImportProblemError as error:
         raise ImportProblemError(f"computed channel '{channel_name}': {error}") from error
+    if np.isinf(value).any():
+        raise ImportProblemError(f"computed channel '{channel_name}': {expression} holds infinite values")
     if value.ndim == 0:
         return np.full(grid.count, float(value))
     if value.shape != (grid.count,):
@@ -220,6 +222,4 @@ def _compute_channel(
             f"computed channel '{channel_name}': {expression} has the shape {value.shape}, but the recording has "
             f"{grid.count} samples"
         )
-    if np.isinf(value).any():
-        raise ImportProblemError(f"computed channel '{channel_name}': {expression} holds infinite values")
     return value

@@ -57,8 +57,8 @@ class TimeBase:
         return self.rate_hz or 1 / float(np.median(np.diff(self.times_s(0))))
 
     def times_s(self, count: int) -> Value:
-        """Compute the times (count,) by the clock of the logger (s). With stamps, `count` is ignored: there are as many
-        times as stamps."""
+        """Compute the times (count,) by the clock of the logger (s); the method is one of
+        `expressions.functions.Clock`. With stamps, `count` is ignored: there are as many times as stamps."""
         if self.stamps_s is None:
             return np.arange(count) / self.rate_hz
         if self.sample_index is not None:
@@ -115,7 +115,8 @@ class TimeBase:
 
 def make_time_base(clock: ClockMap, namespace: Namespace) -> TimeBase:
     """Make the time base of a clock of the map, without its offset to other clocks. namespace: the arrays of the file.
-    Raises ImportProblemError where the rate is not positive or the stamps are unusable."""
+    With a rate, a step of more than 1.5 sample periods is a gap, unless the map states `gap_s` (chosen). Raises
+    ImportProblemError where the rate is not positive or the stamps are unusable."""
     if clock.time:
         return _make_base_from_stamps(clock, namespace)
     rate_hz = PLACEHOLDER_RATE_HZ if clock.unknown else clock.rate_hz or namespace.compute_number(clock.rate)
@@ -150,7 +151,7 @@ def _make_base_from_stamps(clock: ClockMap, namespace: Namespace) -> TimeBase:
             "imported together"
         )
     gap_s = clock.gap_s or _GAP_STEPS * float(np.median(np.diff(stamps_s)))
-    # On a uniform grid, one skipped row is a gap.
+    # On a uniform grid, one skipped row (a step of two periods) is a gap.
     if sample_index is not None and not clock.gap_s:
         gap_s = min(gap_s, 1.5 / rate_hz)
     return TimeBase(clock.name, rate_hz, stamps_s, sample_index, gap_s)
@@ -165,7 +166,8 @@ def _format_stamps_expression(array_name: str, namespace: Namespace) -> str:
 def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) -> str:
     """Find the problem with the stamps (n,) and the key of the map that corrects it, as a clause after the name of the
     stamps; empty if they are finite and increase without a jump of an hour. time_expression: expression of the stamps;
-    unit_s: their unit (s)."""
+    unit_s: their unit (s). Tolerances (chosen): two median steps for the limit of a counter, a minute for an hour back,
+    ten median steps for an hour ahead, which is looked for only in stamps with median steps below 3.6 s."""
     if not np.isfinite(stamps_s).all():
         return f"is no number at sample {int(np.argmax(~np.isfinite(stamps_s)))}; time is never missing"
     steps_s = np.diff(stamps_s)
@@ -196,8 +198,8 @@ def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) ->
         )
     hour_steps = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
     if len(hour_steps) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:
-        is_jump_text = f"diff({time_expression}) > {steps_s[hour_steps[0]] / 2 / unit_s:.4g}"
-        remedy = f"{time_expression} - {_HOUR_S / unit_s:g} * cumsum({is_jump_text})"
+        jump_condition_text = f"diff({time_expression}) > {steps_s[hour_steps[0]] / 2 / unit_s:.4g}"
+        remedy = f"{time_expression} - {_HOUR_S / unit_s:g} * cumsum({jump_condition_text})"
         return (
             f"jumps ahead by an hour at sample {hour_steps[0] + 1}, as a clock that is set to summer time; the map's "
             f'[[clock]] mends it: time = "{remedy}"'

@@ -14,10 +14,10 @@ IntArray = npt.NDArray[np.int64]
 """Array of 64-bit integers."""
 
 GRID_TOLERANCE = 0.02
-"""Tolerance for uniform stamps: largest deviation from the grid, as a fraction of a step. Set by hand."""
+"""Tolerance for uniform stamps: largest deviation from the grid, as a fraction of a step. Chosen."""
 MAX_SKIPPED_SHARE = 0.02
-"""Largest fraction of rows that a uniform logger skips; if more steps are long, stamps were rounded instead. Set
-by hand."""
+"""Largest fraction of rows that a uniform logger skips; if more steps are long, stamps were rounded instead.
+Chosen."""
 _MAX_DECIMALS = 6
 """Largest number of decimals of a time stamp that are looked for, in the unit of the file: a microsecond where that is
 the second. Chosen."""
@@ -29,8 +29,8 @@ _ROUNDED_DIGITS = (4, 5, 6)
 
 
 def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
-    """Fit the rate (Hz) and the sample index of each stamp (n,); 0 and None for stamps that are not uniform. The stamps
-    must increase.
+    """Fit the rate (Hz) and the sample index of each stamp (n,); 0 and None for stamps that are not uniform. There must
+    be two stamps or more, and they must increase.
 
     Two estimates are tried: the mean rate, which is right where no row is missing, and the rate of the median step,
     which is right where some are. Each is first rounded to a few digits (1000 for 1000.0003). unit_s: unit of the last
@@ -68,11 +68,9 @@ def _estimate_rounded_rate(elapsed_s: Value, unit_s: float) -> float:
         return 0.0
     sample_index = np.arange(len(elapsed_s))
     mean_hz = (len(elapsed_s) - 1) / float(elapsed_s[-1])
-    smallest_spread = float(np.ptp(elapsed_s * mean_hz - sample_index)) + GRID_TOLERANCE
+    max_spread = float(np.ptp(elapsed_s * mean_hz - sample_index)) + GRID_TOLERANCE
     for rate_hz in (*(float(f"{mean_hz:.{digits}g}") for digits in range(1, max(_ROUNDED_DIGITS) + 1)), mean_hz):
-        if np.ptp(elapsed_s * rate_hz - sample_index) <= min(
-            unit_s * rate_hz * (1 + _BINARY_TOLERANCE), smallest_spread
-        ):
+        if np.ptp(elapsed_s * rate_hz - sample_index) <= min(unit_s * rate_hz * (1 + _BINARY_TOLERANCE), max_spread):
             return rate_hz
     median_hz = 1 / float(np.sort(decimal_steps)[len(decimal_steps) // 2] * unit_s)
     deviation, unit_samples = elapsed_s * median_hz - sample_index, unit_s * median_hz * (1 + _BINARY_TOLERANCE)

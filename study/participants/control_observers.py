@@ -1,5 +1,6 @@
 """Simulated participants whose answers do not depend on the felt stimulus: controls that an analysis must recognise as
-such, and a participant with scripted answers. `observer_catalogue` makes them."""
+such, and a participant with scripted answers. `observer_catalogue` makes them, with the names that `--observer`
+takes."""
 
 from dataclasses import dataclass
 
@@ -59,5 +60,5 @@ class ScriptedObserver:
         """Answer by the character of the script at run + trial, modulo its length. The repetition of a void trial gets
         the same answer."""
         _, time_draw = draw_uniform(felt, seed, 2)
-        is_right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
-        return Reply(felt.direction_shown if is_right else 3 - felt.direction_shown, draw_response_time_s(time_draw))
+        is_correct = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
+        return Reply(felt.direction_shown if is_correct else 3 - felt.direction_shown, draw_response_time_s(time_draw))

@@ -1,4 +1,5 @@
-"""Simulated participant without a sense of direction, who uses the difference in strength between the directions.
+"""Simulated participant without a sense of direction, who uses the difference in strength between the directions. Made
+by `observer_catalogue`.
 
 A device rarely delivers both directions equally strongly. A participant who remembers the average strength at this
 level can answer 1 for a stronger and 2 for a weaker vibration. The level changes rarely, so the memory is assumed
@@ -36,28 +37,28 @@ class IntensityCue:
     """Standard deviation of one judgement of strength (dB). An assumption: of the size of the difference limen of
     vibration."""
     detection_n: float = 0.1
-    """Threshold of detection, and level at which the noise has grown by the square root of two (N)."""
+    """Threshold of detection, and level at which the noise is `noise_db` times the square root of two (N)."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection_curve = WeibullCurve(self.detection_n, DETECTION_SLOPE)
-        compute_d_prime_at = detection_curve.compute_d_prime if felt.phase is Phase.DETECTION else self.compute_d_prime
+        compute_sensitivity = detection_curve.compute_d_prime if felt.phase is Phase.DETECTION else self.compute_d_prime
         probability_of_1 = NormalDist().cdf(
-            sign * compute_d_prime_at(felt.level_n) / 2 + self._compute_rove_deviation(felt)
+            sign * compute_sensitivity(felt.level_n) / 2 + self._compute_rove_deviation(felt)
         )
         return Reply(1 if choice_draw < probability_of_1 else 2, draw_response_time_s(time_draw))
 
     def _compute_rove_deviation(self, felt: PerceivedStimulus) -> float:
-        """Compute the change of the felt strength by roving, in standard deviations; 0 without roving and in detection
-        trials."""
+        """Compute the change of the felt strength by roving (dB) over its standard deviation (dB); 0 without roving and
+        in detection trials."""
         if felt.nominal_n is None or felt.phase is Phase.DETECTION:
             return 0.0
         return 20.0 * math.log10(felt.level_n / felt.nominal_n) / self._compute_noise_db(felt.level_n)
 
     def _compute_noise_db(self, level_n: float) -> float:
-        """Compute the standard deviation of the felt strength at this level, which is above 0 (dB)."""
+        """Compute the standard deviation (dB) of the felt strength at this level (N), which must be above 0."""
         return self.noise_db * math.hypot(1.0, self.detection_n / level_n)
 
     def compute_d_prime(self, level_n: float) -> float:

@@ -1,7 +1,7 @@
 """Interface of simulated participants: the perceived stimulus, the reply to it, and the protocol `Observer`.
 
-All other modules of this package implement or build an `Observer`; `study.workflows.session.simulated_participant`
-calls `reply`.
+The participants of this package implement `Observer`, and `observer_catalogue` makes them by name.
+`study.workflows.session.simulated_display` calls `reply`.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Catalogue of the simulated participants by the names that `--observer` takes.
 
-Called by `study.workflows.session.simulated_participant` and `rehearse_study`.
+Called by `simulated_participant` and `rehearse_study` of `study.workflows.session`.
 """
 
 import re

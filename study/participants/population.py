@@ -55,8 +55,8 @@ def make_member(kind: str, number: int, seed: int) -> DirectionFeeler | Delivere
         case "repeating":
             return UnsureRepeater(name, feeler)
         case "criterion_drift":
-            drift = CRITERION_DRIFT_SD * float(np.random.default_rng([seed, number, 1]).standard_normal())
-            return replace(feeler, name=name, criterion_per_100_trials=drift)
+            criterion_drift = CRITERION_DRIFT_SD * float(np.random.default_rng([seed, number, 1]).standard_normal())
+            return replace(feeler, name=name, criterion_per_100_trials=criterion_drift)
     raise ValueError(f"a population is made of {', '.join(MEMBER_KINDS)}, not of {kind}")
 
 
@@ -64,8 +64,8 @@ def draw_person(number: int, seed: int) -> DirectionFeeler:
     """Draw participant `number` (from 1) of the population of this seed. The name contains both numbers, so that the
     participant can be recreated from a log."""
     random = np.random.default_rng([seed, number])
-    person_db = random.normal(0.0, PERSON_SD_DB)
-    offsets_db = person_db + random.normal(0.0, FREQUENCY_SD_DB, len(TYPICAL_THRESHOLDS_N))
+    person_offset_db = random.normal(0.0, PERSON_SD_DB)
+    offsets_db = person_offset_db + random.normal(0.0, FREQUENCY_SD_DB, len(TYPICAL_THRESHOLDS_N))
     return DirectionFeeler(
         name=f"person_{number}_seed_{seed}",
         thresholds_n=tuple(

@@ -33,8 +33,9 @@ class UnsureRepeater:
     """Largest number of presentations of one trial; after the last, the answer is final. Chosen."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """Answer from all looks so far, and decide whether to ask for another. A lapse is a random answer
+        """Answer from all looks so far, and decide whether to ask for another one. A lapse is a random answer
         without asking again; its probability is twice `lapse`, because half of such answers are right."""
+        # The first of the four numbers is the evidence of this look (`_compute_evidence`).
         time_draw, lapse_draw, answer_draw = draw_uniform(felt, seed, 4)[1:]
         evidence = self._compute_evidence(felt, seed)
         answer = 1 if evidence > 0.0 else 2

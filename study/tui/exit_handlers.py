@@ -17,7 +17,8 @@ from textual.app import App
 from study.errors import ExitCode
 
 TERMINAL_POLL_INTERVAL_S = 0.5
-"""Interval at which the application checks whether its terminal is still open (s). Chosen."""
+"""Interval (s) at which the application checks whether its terminal is still open. Chosen: the longest time for which a
+closed terminal stays unnoticed."""
 FORCED_EXIT_DELAY_S = 10.0
 """Time (s) after `on_exit` at which the process exits without cleaning up, because writing to a closed terminal may
 block for ever. Chosen longer than the engine process takes to end."""

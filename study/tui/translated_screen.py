@@ -38,9 +38,9 @@ class TranslatedScreen(Screen[Reply]):
         """Translate the description and the displayed name of the key of a binding; without such a name, it stays
         empty."""
         binding, key_display = active_binding.binding, active_binding.binding.key_display
-        translated = replace(
+        translated_binding = replace(
             binding,
             description=self.words.translate_key(binding.description),
             key_display=key_display and self.words.translate_key(key_display),
         )
-        return active_binding._replace(binding=translated)
+        return active_binding._replace(binding=translated_binding)

@@ -1,5 +1,5 @@
-"""Texts for the participant in the language of the protocol (`Words`). Called by the line mode (`study.tui.line_mode`)
-and the screens (`study.tui.screens`).
+"""Texts for the participant in the language of the protocol (`Words`). Called by the line mode (`study.tui.line_mode`),
+the screens (`study.tui.screens`) and the widget `form_question`.
 
 Heading and progress of a trial, outline of a sitting, void trials, exclusion, forms. The progress is stated in runs and
 counts, which do not reveal levels.

@@ -31,8 +31,8 @@ TOKEN_BYTES = 32
 
 
 class ScreenServer(Server):
-    """Starts `command` for the page, at most once at a time. Closing the page ends it, as closing a terminal would.
-    host, port: address to listen on; print_line: prints a line for the user."""
+    """Server that starts `command` for the page, at most once at a time; closing the page ends it, as closing a
+    terminal would. host, port: address to listen on. print_line: prints a line for the user."""
 
     def __init__(self, command: Sequence[str], host: str, port: int, print_line: Callable[[str], None]) -> None:
         super().__init__(
@@ -46,7 +46,7 @@ class ScreenServer(Server):
         self._print_line = print_line
         self._allowed_origins = list_origins(host, port)
         self._token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._headers = self._make_security_headers()
+        self._security_headers = self._make_security_headers()
         self._window_lock = asyncio.Lock()
         self._downloads_in_progress: set[str] = set()
 
@@ -62,6 +62,8 @@ class ScreenServer(Server):
         )
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
+        """Run the application for the page that opens this connection, until either ends. Raises HTTPForbidden for a
+        page of another origin, and HTTPConflict where another window is still open after `RELOAD_TIMEOUT_S`."""
         # A browser states the page that opens a WebSocket; other pages must not drive the device.
         if request.headers.get("Origin") not in self._allowed_origins:
             raise web.HTTPForbidden(text="Only the page of this server may drive the device.")
@@ -76,8 +78,8 @@ class ScreenServer(Server):
             self._window_lock.release()
 
     async def handle_download(self, request: web.Request) -> web.StreamResponse:
-        """Send a file to the first request only: two requests would each receive a part of its pieces. Raises
-        HTTPConflict for another method than GET, and while the file is being sent."""
+        """Send a file to the first request only: two requests would each receive a part of it. Raises HTTPConflict for
+        another method than GET, and while the file is being sent."""
         key = request.match_info["key"]
         if request.method != "GET" or key in self._downloads_in_progress:
             raise web.HTTPConflict(text="This report is sent once, and to one window.")
@@ -90,7 +92,7 @@ class ScreenServer(Server):
     async def _make_app(self) -> web.Application:
         """Make the web application: page, WebSocket and resources below the path /TOKEN, downloads below /download."""
         app = web.Application(middlewares=[self._require_token])
-        app.on_response_prepare.append(self._add_headers)
+        app.on_response_prepare.append(self._add_security_headers)
         app.router.add_get("/download/{key}", self.handle_download, allow_head=False)
         app.add_subapp(f"/{self._token}", await super()._make_app())
         return app
@@ -99,10 +101,11 @@ class ScreenServer(Server):
     async def _require_token(
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
-        """Refuse every request without the token in the same way (404), so that existing and unknown addresses cannot
-        be distinguished. The comparison takes constant time."""
+        """Middleware that refuses every request without the token in the same way (HTTPNotFound), so that existing and
+        unknown addresses cannot be distinguished. Exempt are downloads that are offered. The comparison takes constant
+        time."""
         first_path_part = request.path.split("/")[1]
-        if first_path_part == "download" and await self._is_offered(request.path.rpartition("/")[2]):
+        if first_path_part == "download" and await self._is_offered_download(request.path.rpartition("/")[2]):
             return await handler(request)
         if not hmac.compare_digest(first_path_part.encode("utf-8", "replace"), self._token.encode()):
             raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
@@ -110,7 +113,7 @@ class ScreenServer(Server):
             raise web.HTTPFound(f"/{self._token}/")
         return await handler(request)
 
-    async def _is_offered(self, key: str) -> bool:
+    async def _is_offered_download(self, key: str) -> bool:
         """Whether a download is offered under this key, which is random, known to this server's page only, and used
         once. It needs no token, because the page's script requests it at /download/KEY, outside the path of the
         token."""
@@ -120,13 +123,13 @@ class ScreenServer(Server):
             return False
         return True
 
-    async def _add_headers(self, request: web.Request, response: web.StreamResponse) -> None:
+    async def _add_security_headers(self, request: web.Request, response: web.StreamResponse) -> None:
         """Add the security headers to a response before it is sent."""
-        response.headers.update(self._headers)
+        response.headers.update(self._security_headers)
 
     def _make_security_headers(self) -> dict[str, str]:
-        """Make the security headers of each answer. The page's inline scripts are allowed by their hashes; nothing is
-        loaded from other servers, fonts included."""
+        """Make the security headers of each response. The inline scripts of the page are allowed by their hashes;
+        nothing is loaded from other servers, fonts included."""
         page_html = (self.templates_path / "app_index.html").read_text("utf-8")
         script_hashes = " ".join(f"'sha256-{_hash_script(script)}'" for script in _find_inline_scripts(page_html))
         allowed_origins = " ".join(

@@ -35,8 +35,8 @@ INSTALL_COMMAND = "pip install 'hapteq[cluster]'"
 @contextmanager
 def open_cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Executor]:
     """Open an executor on the workers of the scheduler at `address`, such as tcp://10.0.0.5:8786. A task whose worker
-    dies is repeated by another. one_thread: refuse workers with several threads, for tasks that draw or measure
-    processor time.
+    dies is repeated by another. one_thread: refuse workers with several threads, for tasks that draw figures or
+    measure processor time.
 
     Raises StudyError where no scheduler answers, it has no workers, or a worker has another version; later, where the
     scheduler is lost, a task repeatedly kills its workers, or for `WORKER_TIMEOUT_S` there is no worker or the
@@ -66,18 +66,18 @@ def open_cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[
     # A recording is sent to its worker as a value; distributed warns against such large arguments.
     with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 GB"}):
         _require_workers(client, address, one_thread)
-        causes: list[StudyError] = []
+        loss_errors: list[StudyError] = []
         try:
-            with _open_executor(client) as executor, _watch_workers(client, executor, address, causes):
+            with _open_executor(client) as executor, _watch_workers(client, executor, address, loss_errors):
                 yield executor
         except (KilledWorker, ClosedClientError, CommClosedError, CancelledError) as error:
-            raise causes[0] if causes else _make_lost_work_error(error) from error
+            raise loss_errors[0] if loss_errors else _make_lost_work_error(error) from error
         except (RuntimeError, TypeError, ValueError) as error:
             # A future that was lost with its scheduler has no result, on which distributed's executor fails; an
             # executor that `_watch_workers` cancelled refuses further tasks. Both are errors of the cluster.
-            if client.status == "running" and not causes:
+            if client.status == "running" and not loss_errors:
                 raise
-            raise causes[0] if causes else _make_lost_work_error(error) from error
+            raise loss_errors[0] if loss_errors else _make_lost_work_error(error) from error
 
 
 @contextmanager
@@ -100,11 +100,13 @@ def _cancel_tasks(executor: Executor) -> None:
 
 
 @contextmanager
-def _watch_workers(client: "Client", executor: Executor, address: str, causes: list[StudyError]) -> Iterator[None]:
-    """While the context lasts: cancel all tasks, and append the cause to `causes`, if for `WORKER_TIMEOUT_S` the
+def _watch_workers(client: "Client", executor: Executor, address: str, loss_errors: list[StudyError]) -> Iterator[None]:
+    """While the context lasts: cancel all tasks, and append the cause to `loss_errors`, if for `WORKER_TIMEOUT_S` the
     scheduler has no worker or does not answer."""
     stop_event = threading.Event()
-    watcher = threading.Thread(target=partial(_await_loss, client, executor, address, causes, stop_event), daemon=True)
+    watcher = threading.Thread(
+        target=partial(_watch_until_loss, client, executor, address, loss_errors, stop_event), daemon=True
+    )
     watcher.start()
     try:
         yield
@@ -114,18 +116,18 @@ def _watch_workers(client: "Client", executor: Executor, address: str, causes: l
         watcher.join(POLL_INTERVAL_S)
 
 
-def _await_loss(
-    client: "Client", executor: Executor, address: str, causes: list[StudyError], stop_event: threading.Event
+def _watch_until_loss(
+    client: "Client", executor: Executor, address: str, loss_errors: list[StudyError], stop_event: threading.Event
 ) -> None:
-    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or they were lost for `WORKER_TIMEOUT_S`;
-    then append the cause to `causes` and cancel all tasks. Runs in the thread of `_watch_workers`."""
+    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or there was none for `WORKER_TIMEOUT_S`;
+    then append the cause to `loss_errors` and cancel all tasks. Runs in the thread of `_watch_workers`."""
     last_seen_s = time.monotonic()
     while not stop_event.wait(POLL_INTERVAL_S):
         workers, error = _count_workers(client)
         if workers:
             last_seen_s = time.monotonic()
         elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not stop_event.is_set():
-            causes.append(
+            loss_errors.append(
                 _make_no_workers_error(address) if error is None else _make_silent_scheduler_error(address, error)
             )
             _cancel_tasks(executor)
@@ -201,19 +203,19 @@ def _request_worker_setup(client: "Client") -> _WorkerSetup:
     return _WorkerSetup(versions, tuple(worker["nthreads"] for worker in workers))
 
 
-def _request_setup_in_time(client: "Client", address: str) -> _WorkerSetup:
+def _request_setup_with_timeout(client: "Client", address: str) -> _WorkerSetup:
     """Call `_request_worker_setup` with the time limit `WORKER_TIMEOUT_S`: distributed waits without a limit for a
     scheduler or a worker that does not answer. Raises StudyError."""
     setup_future = Future[_WorkerSetup]()
 
-    def store_answer() -> None:
+    def store_setup() -> None:
         """Store the setup of the workers, or the exception, in the future."""
         try:
             setup_future.set_result(_request_worker_setup(client))
         except BaseException as error:  # noqa: BLE001 — raised where the result is waited for
             setup_future.set_exception(error)
 
-    threading.Thread(target=store_answer, daemon=True).start()
+    threading.Thread(target=store_setup, daemon=True).start()
     try:
         return setup_future.result(timeout=WORKER_TIMEOUT_S)
     except TimeoutError as error:
@@ -233,7 +235,7 @@ def _request_setup_in_time(client: "Client", address: str) -> _WorkerSetup:
 
 def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
     """Raise StudyError unless there are workers, with this version of hapteq, and with one thread each if needed."""
-    worker_setup = _request_setup_in_time(client, address)
+    worker_setup = _request_setup_with_timeout(client, address)
     versions = worker_setup.versions
     if not versions or not worker_setup.threads:  # workers may have left between the two requests
         raise _make_unusable_cluster_error(

@@ -42,7 +42,7 @@ _unforkable: set[CodeType | type] = set()
 _inherited_processor_s = [0.0]
 """Processor time (s) that the parent processes had used when this process was forked."""
 _serial_context: list[bool] = []
-"""Not empty within a task or `without_forking`, where no further processes are started."""
+"""Not empty within a task or `disable_forking`, where no further processes are started."""
 
 
 def measure_processor_s() -> float:
@@ -82,7 +82,7 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 
 @contextmanager
-def without_forking() -> Iterator[None]:
+def disable_forking() -> Iterator[None]:
     """Disable forking within this context, for processes that already share the processors with others. The results are
     the same."""
     _serial_context.append(True)
@@ -113,7 +113,7 @@ class _SharedTasks:
         try:
             while len(children) < worker_count and self._fork_worker(children):
                 pass
-            with without_forking():
+            with disable_forking():
                 results_by_task = self._run_tasks(guarded=False)
             while children:
                 results_by_task.update(_receive_results(children[0][1], self._known_effects))

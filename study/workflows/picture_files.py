@@ -1,7 +1,8 @@
 """Write the figures of a report as files: SVG for editing, PNG for slides.
 
 Figures are drawn in parallel processes (`forked_map`). The same data give the same files: neither format contains a
-date or the version of Matplotlib. Called by the workflows and evaluations that write a report.
+date or the version of Matplotlib. Called by the workflows and evaluations that write a report, such as
+`write_diagnosis` and `analyze_data`.
 """
 
 import io
@@ -43,12 +44,12 @@ class DrawnPicture:
 
 def draw_picture(picture: Picture) -> DrawnPicture:
     """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG. Meant for a worker process."""
-    svg, png = _render_files(picture)
+    svg, png = _render_svg_and_png(picture)
     picture.rendered_svg[:] = [svg]
     return DrawnPicture(remove_figure(picture), png)
 
 
-def _render_files(picture: Picture) -> tuple[str, bytes]:
+def _render_svg_and_png(picture: Picture) -> tuple[str, bytes]:
     """Render the text of the SVG file and the content of the PNG file, which is empty unless `Picture.bitmap` is
     set."""
     return render_picture_svg(picture), _render_png(picture) if picture.bitmap else b""

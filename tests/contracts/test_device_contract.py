@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from equalizer.signals.joining import join
+from equalizer.signals.joining import join_recordings
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
 from study.devices.force_dimension.device_models import MODELS
@@ -53,7 +53,7 @@ def recorded(rigs, tmp_path_factory):
             commands = rigs.force(np.tile(stimulus.loop.samples, (loops, 1)))
             played.append(device.play(commands).recording)
     path = tmp_path_factory.mktemp("recorded") / "played.h5"
-    write_recording(path, join(played, {}))
+    write_recording(path, join_recordings(played, {}))
     return path
 
 

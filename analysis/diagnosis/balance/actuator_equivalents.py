@@ -1,13 +1,14 @@
 """Withdraws the name of a law of motion where a law of the actuator explains the data equally well. Used by `balances`.
 
-With the velocity v, acceleration a and command u of an axis, the force balance is
-m a + d v + F_c sgn v + c v |v| = g(u). It does not identify its laws uniquely in three cases:
+With the velocity v, acceleration a and command u of an axis, the force balance is m a + d v + F_c sgn v + c v |v| =
+g(u). It does not identify its laws uniquely in three cases:
 
 - v never changes its sign: dry friction F_c sgn v is then a constant and holds the axis at rest below u = F_c, as the
   dead band g(u) = u - F_c does; a quadratic drag c v |v| found together with it may be a nonlinearity of g.
 - m a is negligible: v is then a function of u alone, so that drag that grows with v is equivalent to a gain that falls
   with u, and a dead band is equivalent to dry friction.
-- The axis rests while its dead band passes no force: dry friction may hold it instead; both are named, as a class.
+- The axis rests while its dead band passes no force: dry friction may hold it instead. The dead band keeps its name,
+  and dry friction is listed as its equivalent.
 """
 
 from dataclasses import replace
@@ -31,19 +32,19 @@ NO_REVERSAL_REASON = "the motion never changes direction"
 
 def withdraw_ambiguous_names(balance: Balance) -> Balance:
     """Withdraw the names of laws of a driven axis that its actuator explains equally well. Where laws of the command
-    were named and none of them keeps its name, all laws lose theirs: they were fitted to the force behind such a
-    law."""
+    (those that are no column of the regression) were named and none of them keeps its name, all laws lose theirs: they
+    were fitted to the force that such a law delivers."""
     judged_laws = tuple(_withdraw_ambiguous_name(judged_law, balance) for judged_law in balance.laws)
-    command_laws = [judged_law.law.effect for judged_law in balance.named if not judged_law.has_column]
-    if command_laws and not any(judged_law.named and not judged_law.has_column for judged_law in judged_laws):
-        reason = f"it was found together with {command_laws[0]}, which these data do not confirm"
+    command_law_names = [judged_law.law.effect for judged_law in balance.named if not judged_law.has_column]
+    if command_law_names and not any(judged_law.named and not judged_law.has_column for judged_law in judged_laws):
+        reason = f"it was found together with {command_law_names[0]}, which these data do not confirm"
         judged_laws = tuple(replace(judged_law, objection=judged_law.objection or reason) for judged_law in judged_laws)
     return replace(balance, laws=judged_laws)
 
 
 def _withdraw_ambiguous_name(judged_law: JudgedLaw, balance: Balance) -> JudgedLaw:
     """Withdraw the law's name, or add its equivalent, by the three cases of the module's docstring; unchanged where
-    none applies, and for a law without a name."""
+    none applies, for a law without a name, and in the first two cases for one that depends on no channel."""
     regression, effect = balance.search.regression, judged_law.law.effect
     if (
         judged_law.named

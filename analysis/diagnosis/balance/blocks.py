@@ -3,7 +3,8 @@
 X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force. A
 block keeps the Gram matrix X'X and the cross products X'y only. Sums of these over blocks give the fit to any subset of
 blocks and columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
-y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part` and `first_model.joint_fit`.
+y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part`, `judged_law` and
+`first_model.joint_fit`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from equalizer.signals.signal import FloatArray
 
 RIDGE = 1e-10
 """Ridge, relative to the mean diagonal element of X'X. It keeps the equations solvable where two columns of a block are
-equal, or a column holds rounding errors alone. By hand."""
+equal, or a column holds rounding errors alone. Chosen by hand."""
 
 
 Prior = tuple[FloatArray, FloatArray] | None
@@ -114,18 +115,20 @@ def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float
     )
 
 
-def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> FloatArray:
-    """Solve for weights (..., c) with those of the `fixed` (c,) columns at zero; see `solve_normal_equations`."""
-    free = np.flatnonzero(~fixed)
+def solve_without_columns(gram: FloatArray, cross: FloatArray, is_excluded: Mask) -> FloatArray:
+    """Solve for weights (..., c), zero for the columns in `is_excluded` (c,); otherwise as `solve_normal_equations`."""
+    free_columns = np.flatnonzero(~is_excluded)
     weights = np.zeros_like(cross)
-    weights[..., free] = solve_normal_equations((gram[..., free[:, None], free], cross[..., free]), RIDGE)
+    weights[..., free_columns] = solve_normal_equations(
+        (gram[..., free_columns[:, None], free_columns], cross[..., free_columns]), RIDGE
+    )
     return weights
 
 
 def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, is_unpenalised: Mask) -> FloatArray:
     """Solve for weights (..., c) by ridge regression (Hoerl and Kennard, Technometrics 12:55, 1970). products: Gram
     matrices (..., c, c) and cross products (..., c). ridge: relative to the mean diagonal element; columns that are
-    unpenalised (c,) have `RIDGE` instead."""
+    unpenalised (c,) have `RIDGE` instead. Raises LinAlgError where a system is singular nevertheless."""
     gram, cross = products
     mean_diagonal = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
     return np.asarray(
@@ -136,7 +139,7 @@ def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, is_unpena
 
 
 def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
-    """The normal equations with the prior added: its precision to the first diagonal elements of X'X, its precision
+    """Add the prior to the normal equations: its precision to the first diagonal elements of X'X, its precision
     times mean to the first elements of X'y. products: (..., c, c) and (..., c)."""
     if prior is None:
         return products

@@ -13,10 +13,9 @@ weights w, the force that resists the motion is (sources: the file of each name 
     drifting_damping             w tau v
     viscoelastic_relaxation      w T / (1 + T s) v                                      (Maxwell: spring and damper)
 
-Letters as in `law`: n are nonlinear parameters of a law (width, v_s, z_max or T), w its weights. The grids of n are
-chosen by hand. The laws are made by `laws`; the widths are used by `condition_laws`, too, and `LEAST_WIDTH_SHARE` by
-modules of `contrast` and `first_model`.
-"""
+Letters as in `law`: n are nonlinear parameters of a law (width, v_s, z_max or T), w its weights. The grids and bounds
+of n are chosen by hand. Called by `laws`; `condition_laws` uses `compute_friction_widths`, and `free_laws` and modules
+of `contrast` and `first_model` use `LEAST_WIDTH_SHARE`."""
 
 from collections.abc import Iterator
 
@@ -40,7 +39,7 @@ from equalizer.signals.signal import FloatArray
 
 LEAST_WIDTH_SHARE = REST_SPEED_SHARE
 """Least width of tanh(v / width), relative to the rms speed: the speed below which an axis may count as resting in a
-simulation. Larger widths are tried where the width is fitted."""
+simulation. Where the width is fitted, larger ones are tried as well."""
 
 
 def compute_friction_widths(scales: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
@@ -66,32 +65,26 @@ def make_friction_laws(channel: int, scales: Scales) -> Iterator[Law]:
         )  # fmt: skip
     for stribeck_speed in scales.speed * np.geomspace(0.03, 1.5, 7):
         yield Law(
-            "stribeck_friction",
-            channel,
-            (float(stribeck_speed),),
-            _make_stribeck_columns(channel, least_width),
-            _read_stribeck_values,
-            bounds=speed_bounds,
-        )
+            "stribeck_friction", channel, (float(stribeck_speed),),
+            _make_stribeck_columns(channel, least_width), _convert_stribeck, bounds=speed_bounds,
+        )  # fmt: skip
     presliding_lengths = np.geomspace(0.003, 0.5, 7) if scales.turns else scales.travel * np.geomspace(0.001, 0.3, 9)
     for length in presliding_lengths:
         yield Law(
             "presliding_hysteresis", channel, (float(length),),
             lambda motion, n: compute_bristle_deflection(motion.position[:, channel], n[0])[:, None],
-            _read_presliding_values, bounds=((0.1 * presliding_lengths[0], presliding_lengths[-1]),),
+            _convert_presliding, bounds=((0.1 * presliding_lengths[0], presliding_lengths[-1]),),
         )  # fmt: skip
-    yield Law(
-        "asymmetric_friction", channel, (), _make_asymmetric_columns(channel, least_width), _read_asymmetric_values
-    )
+    yield Law("asymmetric_friction", channel, (), _make_asymmetric_columns(channel, least_width), _convert_asymmetric)
     if np.isfinite(scales.band_hz):
-        yield Law("drifting_friction", channel, (), _make_drifting_columns(channel, least_width), _read_drifting_values)
+        yield Law("drifting_friction", channel, (), _make_drifting_columns(channel, least_width), _convert_drifting)
     if not scales.turns:
         yield Law(
             "position_dependent_friction",
             channel,
             (),
             _make_parabolic_columns(channel, least_width),
-            _read_parabolic_values,
+            _convert_parabolic,
         )
 
 
@@ -106,7 +99,7 @@ def _make_stribeck_columns(channel: int, width: float) -> Columns:
     return compute_columns
 
 
-def _read_stribeck_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+def _convert_stribeck(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to the levels at high and zero speed and the Stribeck velocity; None unless both weights are
     positive."""
     if w[0] <= 0 or w[1] <= 0:
@@ -114,7 +107,7 @@ def _read_stribeck_values(w: FloatArray, n: NonlinearParameters, mass: float) ->
     return {"coulomb": float(w[0]), "static": float(w[0] + w[1]), "speed": n[0]}
 
 
-def _read_presliding_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+def _convert_presliding(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert the weight to level and presliding stiffness w / z_max; None where the level is not positive."""
     return {"level": float(w[0]), "stiffness": float(w[0] / n[0])} if w[0] > 0 else None
 
@@ -129,7 +122,7 @@ def _make_asymmetric_columns(channel: int, width: float) -> Columns:
     )
 
 
-def _read_asymmetric_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+def _convert_asymmetric(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to one level per direction; None unless both levels are positive."""
     return {"level_positive": float(w[0]), "level_negative": float(w[1])} if w.min() > 0 else None
 
@@ -144,7 +137,7 @@ def _make_drifting_columns(channel: int, width: float) -> Columns:
     return compute_columns
 
 
-def _read_drifting_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+def _convert_drifting(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to level and change; None where the friction would be negative somewhere in the part, and drive
     the motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
@@ -160,7 +153,7 @@ def _make_parabolic_columns(channel: int, width: float) -> Columns:
     return compute_columns
 
 
-def _read_parabolic_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+def _convert_parabolic(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to level, and slope and curvature relative to it; None where the friction would not be positive
     at q = 0. At other positions the effect limits a negative parabola to zero."""
     if w[0] <= 0:

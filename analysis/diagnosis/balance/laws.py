@@ -5,10 +5,9 @@ amplifier lag. Friction and damping are in `friction_laws`; `law` states the bal
 
 The force of a law is phi(q, v, a; n)' w: linear in the weights w, with columns phi from the measured motion for given
 nonlinear parameters n. The grids of n span the travel and the band of the recording, so that the search needs no
-starting values. Columns are in SI units and have the sign of a force that resists the motion, as the balance's terms of
-mass, damping and stiffness do. Letters in the code: weights w and nonlinear parameters n, as here; s = i omega is
-Laplace's variable. Called by `structures` and `contrast.force_base`.
-"""
+starting values; grids and bounds are chosen by hand. Columns are in SI units and have the sign of a force that resists
+the motion, as the balance's terms of mass, damping and stiffness do. Letters in the code: weights w and nonlinear
+parameters n, as here; s = i omega is Laplace's variable. Called by `structures` and `contrast.force_base`."""
 
 from collections.abc import Iterator, Sequence
 
@@ -43,11 +42,12 @@ MOST_SPECTRUM_SAMPLES = 6000
 MOST_PITCHES = 4
 """Largest number of pitches that are kept: those of the strongest spectral lines."""
 STOP_DISTANCES = (0.02, 0.05, 0.1, 0.2)
-"""Tried positions of an end stop: distances from either end of the travel, relative to the travel. By hand."""
+"""Tried positions of an end stop: distances from either end of the travel, relative to the travel. Chosen by hand."""
 HALF_GAPS = tuple(np.geomspace(0.01, 0.3, 6).tolist())
-"""Tried half gaps of a backlash, relative to the travel. By hand."""
+"""Tried half gaps of a backlash, relative to the travel. Chosen by hand."""
 MODE_DAMPING_RATIOS, MODE_FREQUENCIES = (0.02, 0.1, 0.4), tuple(np.geomspace(0.02, 1.2, 12).tolist())
-"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band. By hand."""
+"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band. Chosen by
+hand."""
 
 
 def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
@@ -79,7 +79,7 @@ def _compute_longest_pitch(scales: Scales) -> float:
 def make_cogging_law(channel: int, pitch: float, scales: Scales) -> Law:
     """Make the law of cogging, a force periodic in the position: a sine and a cosine column. pitch: period (m or
     rad)."""
-    longest = _compute_longest_pitch(scales)
+    longest_pitch = _compute_longest_pitch(scales)
     return Law(
         "cogging", channel, (pitch,),
         lambda motion, n: np.hstack(
@@ -91,8 +91,8 @@ def make_cogging_law(channel: int, pitch: float, scales: Scales) -> Law:
         # Both weights change sign: the catalogue's force drives the motion, that of the balance resists it.
         lambda w, n, mass: {
             "amplitude": float(np.hypot(*w)), "pitch": n[0], "phase": float(np.arctan2(-w[1], -w[0])),
-        } if n[0] <= longest else None,
-        bounds=((0.9 * pitch, min(1.1 * pitch, longest)),),
+        } if n[0] <= longest_pitch else None,
+        bounds=((0.9 * pitch, min(1.1 * pitch, longest_pitch)),),
     )  # fmt: skip
 
 
@@ -112,23 +112,25 @@ def find_likely_pitches(
             for motion, motion_residual in zip(motions, residuals, strict=True)
         ]
     )
-    longest = _compute_longest_pitch(scales)
+    longest_pitch = _compute_longest_pitch(scales)
     # At the rms speed, shorter pitches give frequencies above the end of the band.
-    shortest = scales.speed / scales.band_hz
-    if shortest >= longest or not len(residual):
+    shortest_pitch = scales.speed / scales.band_hz
+    if shortest_pitch >= longest_pitch or not len(residual):
         return []
     wavenumber_spacing = 1 / (2 * np.pi) if scales.turns else WAVENUMBER_SPACING / scales.travel
-    wavenumbers = 1 / longest + wavenumber_spacing * np.arange(MOST_WAVENUMBERS)
-    wavenumbers = wavenumbers[wavenumbers * shortest < 1]
+    wavenumbers = 1 / longest_pitch + wavenumber_spacing * np.arange(MOST_WAVENUMBERS)
+    wavenumbers = wavenumbers[wavenumbers * shortest_pitch < 1]
     stride = max(len(q) // MOST_SPECTRUM_SAMPLES, 1)
-    power = np.array(
+    line_amplitudes = np.array(
         [
             abs(np.mean(residual[::stride] * np.exp(-2j * np.pi * wavenumber * q[::stride])))
             for wavenumber in wavenumbers
         ]
     )
-    peaks = [k for k in range(len(power)) if power[k] == power[max(k - 2, 0) : k + 3].max()]
-    return [float(1 / wavenumbers[k]) for k in sorted(peaks, key=lambda k: -power[k])[:MOST_PITCHES]]
+    peak_indices = [
+        k for k in range(len(line_amplitudes)) if line_amplitudes[k] == line_amplitudes[max(k - 2, 0) : k + 3].max()
+    ]
+    return [float(1 / wavenumbers[k]) for k in sorted(peak_indices, key=lambda k: -line_amplitudes[k])[:MOST_PITCHES]]
 
 
 def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
@@ -149,11 +151,14 @@ def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
     yield Law(
         "asymmetric_stiffness", channel, (), lambda motion, _: motion.position[:, [channel]] ** 2, name_weights("k2")
     )
-    for share in STOP_DISTANCES:
-        for end, side in ((scales.high - share * scales.travel, 1.0), (scales.low + share * scales.travel, -1.0)):
+    for distance_share in STOP_DISTANCES:
+        for stop_position, side in (
+            (scales.high - distance_share * scales.travel, 1.0),
+            (scales.low + distance_share * scales.travel, -1.0),
+        ):
             yield Law(
-                "end_stop", channel, (float(end),),
-                _make_stop_columns(channel, side), _make_stop_reader(side), bounds=((scales.low, scales.high),),
+                "end_stop", channel, (float(stop_position),),
+                _make_stop_columns(channel, side), _make_stop_converter(side), bounds=((scales.low, scales.high),),
             )  # fmt: skip
     for half_gap in scales.travel * np.array(HALF_GAPS):
         # Added to the balance's own spring term k x, it gives k (x - clip(x)): a spring that acts beyond the gap only.
@@ -165,15 +170,15 @@ def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
         )  # fmt: skip
 
 
-def _make_stop_reader(side: float) -> WeightConverter:
-    """Make the function that converts weights to the parameters of an end stop towards `side` (+1 or -1). They include
-    `side` only where the sign of the position does not imply it. None for a stiffness that is not positive."""
+def _make_stop_converter(side: float) -> WeightConverter:
+    """Make the function that converts the weight to the parameters of an end stop towards `side` (+1 or -1). They
+    include `side` only where the sign of the position does not imply it. None for a stiffness that is not positive."""
 
-    def read_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+    def convert_weight(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
         side_parameter = {} if side * n[0] > 0 else {"side": side}
         return {"position": n[0], "stiffness": float(w[0]), "opposite": 0.0, **side_parameter} if w[0] > 0 else None
 
-    return read_values
+    return convert_weight
 
 
 def _make_stop_columns(channel: int, side: float) -> Columns:
@@ -193,11 +198,11 @@ def make_dynamic_laws(channel: int, scales: Scales) -> Iterator[Law]:
             + 0.5 * motion.velocity[:, [channel]] ** 2,
             lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5} if mass > 0 else None,
         )  # fmt: skip
-    for ratio in MODE_DAMPING_RATIOS:
-        for f in scales.band_hz * np.array(MODE_FREQUENCIES):
+    for damping_ratio in MODE_DAMPING_RATIOS:
+        for frequency_hz in scales.band_hz * np.array(MODE_FREQUENCIES):
             yield Law(
-                "extra_mode", channel, (float(f), ratio),
-                lambda motion, n: _compute_mode_force(motion, channel, n), _read_mode_values,
+                "extra_mode", channel, (float(frequency_hz), damping_ratio),
+                lambda motion, n: _compute_mode_force(motion, channel, n), _convert_mode_weight,
                 linear=True, bounds=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
             )  # fmt: skip
     # With a first-order lag, the command is (1 + T s) times the delivered force. Only T s M a is no base term.
@@ -219,6 +224,6 @@ def _compute_mode_force(motion: Motion, channel: int, n: NonlinearParameters) ->
     )
 
 
-def _read_mode_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
-    """Convert weights to frequency (Hz), mass (kg or kg m²) and damping ratio; None where the mass is not positive."""
+def _convert_mode_weight(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
+    """Return frequency (Hz), mass (the weight; kg or kg m²) and damping ratio; None where the mass is not positive."""
     return {"frequency": n[0], "mass": float(w[0]), "damping_ratio": n[1]} if w[0] > 0 else None

@@ -1,10 +1,9 @@
 """The linear part of a force balance: the motion that a force drives, the delay between them, dynamics of higher order.
 
 A lag, a delay, a mode or a relaxation is not missing physics but part of a linear first model. If the balance lacks it,
-nonlinear laws are hidden, or others imitate it. Therefore the search for laws is repeated with the linear terms that it
-found as part of the base, up to `LINEAR_PART_ROUNDS` searches. Called by `balances`, `actuator` and
-`compare_free_laws`.
-"""
+nonlinear laws are not found, or wrong ones are fitted in its place. Therefore the search for laws is repeated with the
+linear terms that it found as part of the base, up to `LINEAR_PART_ROUNDS` searches. Called by `balances`, `actuator`
+and `compare_free_laws`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -29,10 +28,11 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 TRIAL_DELAY_PERIODS = 2.0 ** np.arange(-5, 2)
-"""Delays that are tried in ascending order, in periods of the upper end of the band: from 1/32 to two. By hand."""
+"""Delays that are tried in ascending order, in periods of the upper end of the band: from 1/32 to two. Chosen by
+hand."""
 DELAY_HALVINGS = 4
 """Number of halvings of the step around the best delay: the last step is 1/16 of the delay at the first minimum.
-By hand."""
+Chosen by hand."""
 DELAY_LIKE_LAWS = ("amplifier_lag", "transport_delay")
 """Linear laws that are equivalent to a delay."""
 
@@ -78,8 +78,8 @@ def find_driven_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
 
 
 def _compute_errors_without_channel(motions: Sequence[Motion], axis: int, channel_count: int) -> list[float]:
-    """Compute, per channel, the cross-validated error over the power of the force about its mean, without the
-    acceleration of that channel."""
+    """Compute, per channel, the cross-validated squared error without that channel's acceleration, over the power of
+    the force about its mean."""
     regression = build_regression(motions, axis, (), turns=False)
     all_columns = regression.select_columns(())
     signal_power = max(sum(block.centred_power for block in regression.fit), 1e-300)
@@ -90,38 +90,39 @@ def _compute_errors_without_channel(motions: Sequence[Motion], axis: int, channe
 
 
 def _extend_base(search: StructureSearch, base_terms: BaseTerms) -> BaseTerms:
-    """Extend the base by a delay and, where the simplest structure has a linear law, with as many linear laws as
-    cross-validation supports. The delay is estimated before or after these laws; the smaller error decides."""
-    regression, simplest = search.regression, choose_simplest_structure(search).laws
-    nonlinear = [k for k in simplest if not regression.laws[k].linear]
-    delay_s = 0.0 if base_terms.delay_s else _find_delay_s(keep_laws(regression, nonlinear))
-    if not delay_s and len(nonlinear) == len(simplest):
+    """Extend the base by a delay and, where the simplest structure has a linear law or a delay is found, by as many
+    linear laws as cross-validation supports. The delay is estimated before or after these laws; the smaller error
+    decides."""
+    regression, simplest_laws = search.regression, choose_simplest_structure(search).laws
+    nonlinear_laws = [k for k in simplest_laws if not regression.laws[k].linear]
+    delay_s = 0.0 if base_terms.delay_s else _find_delay_s(keep_laws(regression, nonlinear_laws))
+    if not delay_s and len(nonlinear_laws) == len(simplest_laws):
         return base_terms
-    delay_first, delay_first_error = _complete_base(regression, base_terms, nonlinear, delay_s)
+    base_with_delay_first, delay_first_error = _complete_base(regression, base_terms, nonlinear_laws, delay_s)
     if not delay_s:
-        return delay_first
-    laws_first, laws_first_error = _complete_base(regression, base_terms, nonlinear, 0.0)
-    return delay_first if delay_first_error < laws_first_error else laws_first
+        return base_with_delay_first
+    base_with_laws_first, laws_first_error = _complete_base(regression, base_terms, nonlinear_laws, 0.0)
+    return base_with_delay_first if delay_first_error < laws_first_error else base_with_laws_first
 
 
 def _complete_base(
-    regression: Regression, base_terms: BaseTerms, nonlinear: Sequence[int], delay_s: float
+    regression: Regression, base_terms: BaseTerms, nonlinear_laws: Sequence[int], delay_s: float
 ) -> tuple[BaseTerms, float]:
     """Extend the base by this delay and the linear laws that are significant with it, up to `MOST_LINEAR_LAWS`; returns
     it with its cross-validated error without a later delay. Where there is no delay yet, one is estimated after these
-    laws. nonlinear: indices of the chosen laws that are not linear."""
+    laws. nonlinear_laws: indices of the chosen laws that are not linear."""
     base_laws = tuple(law for law in base_terms.laws if not (delay_s and law.effect in DELAY_LIKE_LAWS))
     linear_laws = [law for law in regression.laws if law.linear and not (delay_s and law.effect in DELAY_LIKE_LAWS)]
     motions = [_delay_forces(motion, delay_s) for motion in regression.motions]
-    laws = [*(regression.laws[k] for k in nonlinear), *linear_laws]
+    laws = [*(regression.laws[k] for k in nonlinear_laws), *linear_laws]
     extended_regression = build_regression(
         motions, regression.axis, laws, is_freely_turning(regression), replace(base_terms, laws=base_laws)
     )
     chosen_structure = Structure(
-        tuple(range(len(nonlinear))),
-        extended_regression.cross_validate(extended_regression.select_columns(range(len(nonlinear)))),
+        tuple(range(len(nonlinear_laws))),
+        extended_regression.cross_validate(extended_regression.select_columns(range(len(nonlinear_laws)))),
     )
-    while len(base_laws) + len(chosen_structure.laws) - len(nonlinear) < MOST_LINEAR_LAWS:
+    while len(base_laws) + len(chosen_structure.laws) - len(nonlinear_laws) < MOST_LINEAR_LAWS:
         improved_fit = _add_linear_law(extended_regression, chosen_structure)
         if improved_fit is None:
             break
@@ -211,17 +212,17 @@ def _find_nearest_minimum(
 
 def _replace_forces(regression: Regression, motions: Sequence[Motion]) -> Regression:
     """Replace the forces of a regression; columns and scales stay. motions: those of the regression with new forces."""
-    targets = [motion.decimate(motion.force[:, [regression.axis]])[:, 0] for motion in motions]
+    forces = [motion.decimate(motion.force[:, [regression.axis]])[:, 0] for motion in motions]
     fit_masks, test_masks = (
         [motion.mask_valid_samples(mask) for motion, mask in zip(motions, masks, strict=True)]
         for masks in ([motion.fit for motion in motions], [motion.test for motion in motions])
     )
-    mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit_masks, strict=True)]).mean())
-    scale_and_mean = regression.scale, mean
+    mean_force = float(np.concatenate([force[mask] for force, mask in zip(forces, fit_masks, strict=True)]).mean())
+    scale_and_mean = regression.scale, mean_force
     return replace(
-        regression, motions=tuple(motions), force=tuple(targets),
-        fit=build_blocks(regression.columns, targets, fit_masks, scale_and_mean),
-        test=build_blocks(regression.columns, targets, test_masks, scale_and_mean),
+        regression, motions=tuple(motions), force=tuple(forces),
+        fit=build_blocks(regression.columns, forces, fit_masks, scale_and_mean),
+        test=build_blocks(regression.columns, forces, test_masks, scale_and_mean),
     )  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def list_fitting_measures(
 
 
 def choose_forces_of_balance(
-    recordings: Sequence[Recording], fitting: FittingMeasure, balances: Sequence[Balance]
+    recordings: Sequence[Recording], fitting_measure: FittingMeasure, balances: Sequence[Balance]
 ) -> FittingMeasure:
     """Choose the measure with the linear parameters of the balances if it predicts the forces better; else `fitting`
     unchanged, also where these parameters make no model.
@@ -78,25 +78,25 @@ def choose_forces_of_balance(
     to fit and to choose by (`_predicts_better`). A model fitted to spectra in closed loop may need modes that are
     unnecessary where the motion of a second body is measured.
     """
-    fitted_measure = fitting.chosen.measure
+    fitted_measure = fitting_measure.chosen.measure
     has_named_law, first_recording = any(balance.named for balance in balances), recordings[0]
     if not balances or has_named_law or is_quasi_static(first_recording) or is_free_motion(first_recording):
-        return fitting
+        return fitting_measure
     if not isinstance(fitted_measure, PredictedForce):
-        return fitting
+        return fitting_measure
     try:
-        reduced_recordings, balance_model = _build_model_of_balances(recordings, balances, fitting.model.name)
+        reduced_recordings, balance_model = _build_model_of_balances(recordings, balances, fitting_measure.model.name)
         if balance_model is None:
-            return fitting
+            return fitting_measure
         balance_choice = _predict_about_mean(reduced_recordings, balance_model, fitted_measure.band_hz)
     except (MechanicalModelError, np.linalg.LinAlgError):
-        return fitting
+        return fitting_measure
     balance_measure = balance_choice.measure
     if not isinstance(balance_measure, PredictedForce) or not _predicts_better(
-        (balance_model, balance_measure), (fitting.model, fitted_measure)
+        (balance_model, balance_measure), (fitting_measure.model, fitted_measure)
     ):
-        return fitting
-    remarks = tuple(remark for remark in fitting.chosen.remarks if remark != CONSTANT_ADDED)
+        return fitting_measure
+    remarks = tuple(remark for remark in fitting_measure.chosen.remarks if remark != CONSTANT_ADDED)
     balance_choice = replace(balance_choice, remarks=(*remarks, BALANCE_PREDICTS_BETTER))
     return FittingMeasure(balance_model, balance_choice, is_reduced=is_reduction_needed(balances))
 
@@ -113,10 +113,10 @@ def _build_model_of_balances(
 def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> MeasureChoice:
     """Make the measure by force with a constant command that makes the mean error zero, because the regression of the
     balance has a constant, too. band_hz: upper end of the band in Hz."""
-    chosen = make_force_measure(recordings, model, band_hz)
-    if not isinstance(chosen.measure, PredictedForce):
-        return chosen
-    return make_force_measure(shift_to_mean_force(recordings, model, chosen.measure), model, band_hz)
+    choice = make_force_measure(recordings, model, band_hz)
+    if not isinstance(choice.measure, PredictedForce):
+        return choice
+    return make_force_measure(shift_to_mean_force(recordings, model, choice.measure), model, band_hz)
 
 
 ModelWithMeasure = tuple[MechanicalModel, PredictedForce]

@@ -37,7 +37,7 @@ def estimate_held_out_gain(
 ) -> HeldOutGain | None:
     """Estimate the gain of `candidate` over `baseline`, both fitted with this measure. None where fewer than
     `LEAST_HELD_OUT_STRETCHES` stretches are held out, or where a held-out residual is not finite."""
-    powers_without, powers_with = (_compute_stretch_powers(measure, fit) for fit in (baseline, candidate))
+    powers_without, powers_with = (_compute_stretch_powers(measure, fitted) for fitted in (baseline, candidate))
     if len(powers_without) < LEAST_HELD_OUT_STRETCHES or not (
         np.isfinite(powers_without).all() and np.isfinite(powers_with).all()
     ):

@@ -1,9 +1,11 @@
 """Withdraws the names of effects of a search whose model was fitted to the same recordings.
 
 The parameters of such a model have absorbed part of a missing law, and a wrong law may imitate the remainder. Therefore
-an effect must remove at least `FURTHER_LAW_SHARE` of the held-out error power, as the laws of a force balance
-must (`require_enough_gain`); effects of actuator and sensor become candidates, unless the signal itself shows them
-(`withdraw_doubtful_names`). Called by `search_by_simulation` and `diagnose`."""
+an effect must remove at least `FURTHER_LAW_SHARE` of the held-out error power, as the laws of a force balance must
+(`require_enough_gain`); effects of actuator and sensor become candidates, unless the signal itself shows them
+(`withdraw_doubtful_names`). Called by `search_by_simulation` and `diagnose`; `confirm_laws`, `laws_for_simulation` and
+`result.candidates` use the names of constant effects.
+"""
 
 from dataclasses import replace
 
@@ -51,8 +53,8 @@ def require_enough_gain(result: SearchResult, noise_is_measured: bool) -> Search
 
 
 def _removes_enough(context: SearchContext, explanation: Explanation) -> bool:
-    """Whether the last effect removes at least `FURTHER_LAW_SHARE` of the held-out error power that remains with
-    the effects before it. True where nothing is held out: both errors are then infinite."""
+    """Whether the last effect removes at least `FURTHER_LAW_SHARE` of the held-out error power that remains with the
+    effects before it. True where nothing is held out: both errors are then infinite."""
     previous_step = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
     # `held_out_error` is a logarithm of rms errors, and thus half of the logarithm of the error power.
     return not explanation.after.held_out_error > previous_step.held_out_error + np.log(1 - FURTHER_LAW_SHARE) / 2
@@ -60,9 +62,10 @@ def _removes_enough(context: SearchContext, explanation: Explanation) -> bool:
 
 def withdraw_doubtful_names(result: SearchResult) -> SearchResult:
     """Make named effects candidates unless the signal itself shows them: the model was fitted to these recordings, so
-    that a law of the motion that the catalogue lacks may look like a nonlinear or late sensor. An effect that the
-    signal shows is a candidate, too, where the model without effects fails `predicts_motion`. A candidate is reported
-    with the gain of all effects up to it if that is positive on the held-out samples, and else removed."""
+    that a law of the motion that the catalogue lacks may have the same effect as a nonlinear or delayed sensor. An
+    effect that the signal shows is a candidate, too, where the model without effects fails `predicts_motion`. A
+    candidate is reported with the gain of all effects up to it if that is positive on the held-out samples, and else
+    removed."""
     explanation, context, candidates = result.found, result.context, []
     doubtful_indices = [
         step_index for step_index, step in enumerate(explanation.steps) if step.newest not in EFFECTS_VISIBLE_IN_SIGNAL
@@ -71,7 +74,7 @@ def withdraw_doubtful_names(result: SearchResult) -> SearchResult:
         doubtful_indices = list(range(len(explanation.steps)))
     if not doubtful_indices:
         return result
-    for step_index in reversed(doubtful_indices):  # the last first: the numbers of those before it stay
+    for step_index in reversed(doubtful_indices):  # from the last on, so that the remaining indices stay valid
         step = explanation.steps[step_index]
         gain = estimate_held_out_gain(context.full_measure, explanation.plain, context.with_test_score(step))
         if gain is not None and gain.gain > 0:

@@ -21,7 +21,8 @@ from equalizer.signals.signal import FloatArray
 def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tuple[list[Base], tuple[Motion, ...]]]:
     """Build force balances, one per axis, where all explain the clean set to within `MISFIT_SHARE`; then
     autoregressive models, one per response. Each list comes with the motions of both sets, which are empty where no
-    motion was measured. clean: at least one part; faulty: may be empty."""
+    motion was measured. No force balance without a time axis (infinite band), or where a fit fails. clean: at least one
+    part; faulty: may be empty."""
     recording = clean[0].recording
     is_rotational = recording.is_rotational
     motions: tuple[Motion, ...] = ()
@@ -41,15 +42,18 @@ def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[t
     if force_bases:
         yield force_bases, motions
     fewest_known_samples = min(sum(len(part.known) for part in part_set) for part_set in (clean, faulty) if part_set)
-    step = max(min(choose_decimation_step((*clean, *faulty)), fewest_known_samples // (2 * LEAST_ROWS)), 1)
+    decimation_step = max(min(choose_decimation_step((*clean, *faulty)), fewest_known_samples // (2 * LEAST_ROWS)), 1)
     response_count = len(recording.response.channels)
     yield (
-        [AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, step, response_count) for channel in range(response_count)],
+        [
+            AutoregressiveBase(channel, AUTOREGRESSIVE_ORDER, decimation_step, response_count)
+            for channel in range(response_count)
+        ],
         motions,
     )
 
 
-def have_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
+def has_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
     """Whether the rms of each detrended response differs between the two sets by at most a factor `MOST_MOTION_RATIO`.
     Neither set is empty."""
     response_rms = np.array(
@@ -62,12 +66,12 @@ def have_similar_motion(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bo
 
 
 def _compute_detrended_mean_squares(part: Part) -> FloatArray:
-    """Compute (p,): mean squares of the responses about their least-squares lines."""
-    times = np.arange(len(part.response)) - (len(part.response) - 1) / 2
+    """Compute (p,): mean squares of the p responses about their least-squares lines."""
+    shifts = np.arange(len(part.response)) - (len(part.response) - 1) / 2
     centred = part.response - part.response.mean(axis=0)
     return np.asarray(
         np.mean(
-            (centred - times[:, None] * (times @ centred / max(float(times @ times), 1.0))) ** 2,
+            (centred - shifts[:, None] * (shifts @ centred / max(float(shifts @ shifts), 1.0))) ** 2,
             axis=0,
         )
     )
@@ -79,10 +83,11 @@ def compute_unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
     return compute_unexplained_share_of_rows(base, base.build_rows(parts), base.mask_valid_samples(parts))
 
 
-def compute_unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
+def compute_unexplained_share_of_rows(base: Base, rows_by_part: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
     """Compute the same as `compute_unexplained_share` from the rows (n, 1 + columns) of each part and the masks (n,) of
-    valid rows."""
-    rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
+    valid rows. Columns are scaled to an rms of 1; directions with singular values below 1e-10 of the largest, which are
+    rounding, are left out."""
+    rows = np.vstack([part_rows[mask] for part_rows, mask in zip(rows_by_part, masks, strict=True)])
     signal = base.reconstruct_response(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]
     column_rms = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
     signal_std = float(np.std(signal))

@@ -1,11 +1,11 @@
 """Choose which fault to name after a comparison with clean recordings: a fault, a class of faults, or none.
 
-Of the faults that pass all tests of `_find_objection`, the one with the smallest error is the best, or a special case
-of it that these data cannot distinguish from it. Its class contains the rivals whose error is not significantly larger
+Of the faults that pass all tests of `_find_flaw`, the one with the smallest error is the best, or a special case of it
+that these data cannot distinguish from it. Its class contains the rivals whose error is not significantly larger
 (bootstrap over blocks; a rival that contains the best as a special case only where it is significantly better), and
-those that failed a test but fit about as well (`_find_inconclusive`). No fault is named where the class is too
-large, a fault that failed a test has a clearly smaller error, the best explains too small a share of the difference, or
-its axis is ambiguous. Errors and gains are those of `rank_faults`. Called by `compare_with_reference`.
+those that failed a test but fit about as well (`_find_inconclusive`). No fault is named where the class is too large, a
+fault that failed a test has a clearly smaller error, the best explains too small a share of the difference, or its axis
+is ambiguous. Errors and gains are those of `rank_faults`. Called by `compare_with_reference`.
 """
 
 from collections.abc import Sequence
@@ -63,23 +63,25 @@ class Decision:
 
 def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     """Choose the fault or class to name, and list the other candidates. response_count: number of response channels."""
-    tested = [(fault, _find_objection(fault, comparison.has_difference_without(fault))) for fault in comparison.faults]
-    accepted = [fault for fault, flaw in tested if flaw == ""]
+    tested = [(fault, _find_flaw(fault, comparison.has_difference_without(fault))) for fault in comparison.faults]
+    accepted_faults = [fault for fault, flaw in tested if flaw == ""]
     unnamed = tuple((fault, flaw) for fault, flaw in tested if fault.gain > 0 and flaw)
-    if not accepted:
+    if not accepted_faults:
         return Decision(None, (), 0.0, unnamed)
-    best = _choose_simplest(accepted, comparison)
-    rivals = [fault for fault in accepted if fault is not best]
+    best = _choose_simplest(accepted_faults, comparison)
+    rivals = [fault for fault in accepted_faults if fault is not best]
     distinct_rivals = [rival for rival in rivals if not _is_wider(rival, best)]
-    inseparable = [rival for rival in distinct_rivals if _is_inseparable(best, rival, comparison)]
+    inseparable_faults = [rival for rival in distinct_rivals if _is_inseparable(best, rival, comparison)]
     failed = [fault for fault, flaw in tested if flaw and fault.gain >= LEAST_FAULT_GAIN and not _is_wider(fault, best)]
-    inseparable += [fault for fault in rivals if _is_wider(fault, best) and _is_significantly_better(fault, best)]
+    inseparable_faults += [
+        fault for fault in rivals if _is_wider(fault, best) and _is_significantly_better(fault, best)
+    ]
     members = (
-        *inseparable,
-        *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
+        *inseparable_faults,
+        *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable_faults), 0)],
     )
     better_faults = [
-        fault for fault in failed if fault.gain_low > 0 and _sum_gap(fault, best) < -_find_least_gap(best, comparison)
+        fault for fault in failed if fault.gain_low > 0 and _sum_gap(fault, best) < -_compute_margin(best, comparison)
     ]
     aliases = ALIASES.get(best.fault.effect, ()) if response_count == 1 or best.fault.effect == "force_offset" else ()
     equivalents = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in members), *aliases))
@@ -89,10 +91,8 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     if better_faults:
         reason = f"{get_noun(better_faults[0].fault.effect)} explains more, but is not significant itself"
     elif best.share < LEAST_FAULT_SHARE:
-        reason = (
-            f"it explains {100 * best.share:.0f} % of the difference between these recordings: the main cause is "
-            "another"
-        )
+        reason = (f"it explains {100 * best.share:.0f} % of the difference between these recordings: "
+                  "the main cause is another")  # fmt: skip
     elif len(equivalents) >= LARGEST_FAULT_CLASS:
         reason = "these data cannot distinguish it from " + ", ".join(equivalents)
     elif other_axes:
@@ -107,20 +107,20 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
 def _find_inconclusive(
     failed_faults: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison
 ) -> list[JudgedFault]:
-    """Find the candidates of other effects that failed a test of `_find_objection`, whose gain has a lower bound above
-    0, and whose error differs too little from that of the best to exclude them."""
+    """Find the candidates of other effects that failed a test of `_find_flaw`, whose gain has a lower bound above 0,
+    and whose error differs too little from that of the best to exclude them."""
     return [
         judged_fault
         for judged_fault in failed_faults
         if judged_fault.fault.effect != best.fault.effect
         and judged_fault.gain_low > 0
-        and abs(_sum_gap(judged_fault, best)) <= _find_least_gap(best, comparison)
+        and abs(_sum_gap(judged_fault, best)) <= _compute_margin(best, comparison)
     ]
 
 
 def _is_wider(candidate: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `candidate` is the wider fault: it contains `best` as a special case at the same axis, so that it cannot
-    fit worse."""
+    """Whether `candidate` is the more general fault: it contains `best` as a special case at the same axis, so that it
+    cannot fit worse."""
     return best.fault.effect in candidate.fault.simpler and best.fault.axis == candidate.fault.axis
 
 
@@ -134,10 +134,10 @@ def _choose_simplest(accepted_faults: Sequence[JudgedFault], comparison: Compari
     return best
 
 
-def _find_objection(fault: JudgedFault, sets_differ: bool) -> str:
-    """Find the reason not to name a fault; empty if it passes all tests. sets_differ: whether the clean and the faulty
-    set differ by more than stretches of a single set do. If not, the gain must be steady: its lower bound at least
-    `FAULT_INTERVAL_RATIO` of it, and the fault constant during a recording."""
+def _find_flaw(fault: JudgedFault, sets_differ: bool) -> str:
+    """Find the flaw of a fault, the reason not to name it; empty if it passes all tests. sets_differ: whether the clean
+    and the faulty set differ by more than stretches of a single set do. If not, the gain must be steady: its lower
+    bound at least `FAULT_INTERVAL_RATIO` of it, and the fault constant during a recording."""
     if fault.gain < LEAST_FAULT_GAIN or fault.gain_low <= 0:
         return "its gain is not larger than its variation between stretches of the recordings"
     is_steady = fault.gain_low >= FAULT_INTERVAL_RATIO * fault.gain and not fault.fault.varies
@@ -163,20 +163,20 @@ def _compute_distance_from_no_fault(fault: JudgedFault, name: str) -> float:
 
 
 def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Comparison) -> bool:
-    """Whether the error of `rival` exceeds that of the best by at most `_find_least_gap`, or not
-    significantly (bootstrap over blocks)."""
+    """Whether the error of `rival` exceeds that of the best by at most `_compute_margin`, or not significantly
+    (bootstrap over blocks)."""
     excess_errors = rival.block_squares - best.block_squares
     draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(
-        excess_errors.sum() <= _find_least_gap(best, comparison)
+        excess_errors.sum() <= _compute_margin(best, comparison)
         or np.quantile(excess_errors[draws].sum(axis=1), BOOTSTRAP_LEVEL) <= 0
     )
 
 
-def _is_significantly_better(refinement: JudgedFault, best: JudgedFault) -> bool:
+def _is_significantly_better(generalisation: JudgedFault, best: JudgedFault) -> bool:
     """Whether a fault that contains the best as a special case has a significantly smaller error (bootstrap over
     blocks)."""
-    error_reduction = best.block_squares - refinement.block_squares
+    error_reduction = best.block_squares - generalisation.block_squares
     return bool(
         np.quantile(error_reduction[draw_bootstrap_blocks(len(error_reduction))].sum(axis=1), BOOTSTRAP_LEVEL) > 0
     )
@@ -187,8 +187,8 @@ def _sum_gap(rival: JudgedFault, best: JudgedFault) -> float:
     return float((rival.block_squares - best.block_squares).sum())
 
 
-def _find_least_gap(best: JudgedFault, comparison: Comparison) -> float:
-    """Find the difference between the error sums of a rival and the best above which they are distinguished: the
+def _compute_margin(best: JudgedFault, comparison: Comparison) -> float:
+    """Compute the difference between the error sums of a rival and the best above which they are distinguished: the
     smaller of `FAULT_RIVAL_GAIN_MARGIN` of the reduction by the best and `FAULT_RIVAL_ERROR_MARGIN` of its remaining
     error."""
     remaining_error = float(best.block_squares.sum())

@@ -35,8 +35,9 @@ class Variant:
     parameters_of: ParametersOf
     """Parameters of the fault from its sizes."""
     lower_bound: float = -np.inf
+    """Least value of each size."""
     upper_bound: float = np.inf
-    """Lower and upper bound of each size: a narrow range about 1 where undoing is not linear in the size."""
+    """Largest value of each size. Both bounds make a narrow range about 1 where undoing is not linear in the size."""
     error_factor: float = 1.0
     """Factor on the errors with the fault undone: 1 / |g'| of the map g that undoes it (see `compared_base`). Without
     it, a gain that reduces every reading, and so every error, would fit best."""

@@ -67,11 +67,11 @@ def fit_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
     for fault in faults:
         if not time_left():
             break
-        fits = [
+        fitted_variants = [
             fit for variant in fault.variants if (fit := _fit_variant(unchanged_pairs, compared_bases, fault, variant))
         ]
-        if fits:
-            best_variants.append(_choose_best_variant(fits, unchanged_pairs, compared_bases))
+        if fitted_variants:
+            best_variants.append(_choose_best_variant(fitted_variants, unchanged_pairs, compared_bases))
     else:
         is_complete = True
     return FaultFits(unchanged_pairs, sorted(best_variants, key=_get_error), is_complete)
@@ -101,15 +101,15 @@ def _get_error(fitted_variant: FittedVariant) -> float:
 
 
 def _choose_best_variant(
-    fits: Sequence[FittedVariant], unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase]
+    fitted_variants: Sequence[FittedVariant], unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase]
 ) -> FittedVariant:
     """Choose the variant with the smallest error, after linearisation about its size. Of a fault that is valid at size
     1 only (`Variant.one_size`), several are compared at size 1: at another size, a wrong variant may have the
     smallest error."""
-    best_at_any_size = min(fits, key=_get_error)
+    best_at_any_size = min(fitted_variants, key=_get_error)
     if not best_at_any_size.variant.one_size:
         return _iterate_linearisation(best_at_any_size, unchanged_pairs, compared_bases)
-    best_at_size_1 = sorted(fits, key=lambda fit: _get_error(_fit_allowed_size(fit)))[:RELINEARISED_VARIANTS]
+    best_at_size_1 = sorted(fitted_variants, key=lambda fit: _get_error(_fit_allowed_size(fit)))[:RELINEARISED_VARIANTS]
     return min(
         (_iterate_linearisation(fit, unchanged_pairs, compared_bases) for fit in (best_at_any_size, *best_at_size_1)),
         key=_get_error,

@@ -27,7 +27,7 @@ class ForceBase:
     axis: int
     """Index of the driven axis in the command."""
     laws: tuple[Law, ...]
-    """Nonlinear laws beside mass, damping, stiffness and constant; may be empty."""
+    """Nonlinear laws in addition to mass, damping, stiffness and constant; may be empty."""
     band_hz: float
     """Upper end of the band (Hz) to which force and columns are filtered."""
     is_free_rotation: bool
@@ -43,14 +43,14 @@ class ForceBase:
         """Build the rows of each part, (kept samples, 1 + columns): the force (N or N m) first. reusable_rows: rows of
         parts with the same motion, whose columns are reused, so that only the force is filtered again."""
         if reusable_rows is not None:
-            commands = (
+            filtered_forces = (
                 filter_band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz)
                 for part in parts
             )
             step = round(parts[0].rate_hz / self.rate_hz)
             return tuple(
                 np.hstack([force_column[::step], previous_rows[:, 1:]])
-                for force_column, previous_rows in zip(commands, reusable_rows, strict=True)
+                for force_column, previous_rows in zip(filtered_forces, reusable_rows, strict=True)
             )
         motions = compute_motions([part.to_observed() for part in parts], self.band_hz)
         force_columns = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
@@ -98,16 +98,16 @@ def build_force_base(motions: Sequence[Motion], axis: int, is_rotational: bool) 
 def _select_laws(regression: Regression) -> tuple[int, ...]:
     """Select laws (indices) by forward selection: add the best law while it lowers the cross-validated squared error by
     at least the share `BASE_LAW_GAIN`, up to `MOST_BASE_LAWS` laws."""
-    selected: tuple[int, ...] = ()
-    error = float(regression.cross_validate(regression.select_columns(selected)).sum())
-    while len(selected) < MOST_BASE_LAWS:
+    selected_laws: tuple[int, ...] = ()
+    error = float(regression.cross_validate(regression.select_columns(selected_laws)).sum())
+    while len(selected_laws) < MOST_BASE_LAWS:
         trial_errors = [
-            (float(regression.cross_validate(regression.select_columns((*selected, law_index))).sum()), law_index)
+            (float(regression.cross_validate(regression.select_columns((*selected_laws, law_index))).sum()), law_index)
             for law_index in range(len(regression.laws))
-            if law_index not in selected
+            if law_index not in selected_laws
         ]
         if not trial_errors or min(trial_errors)[0] > (1 - BASE_LAW_GAIN) * error:
             break
         error, best_law = min(trial_errors)
-        selected = (*selected, best_law)
-    return selected
+        selected_laws = (*selected_laws, best_law)
+    return selected_laws

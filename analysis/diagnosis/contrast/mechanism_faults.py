@@ -3,7 +3,7 @@
 
 With q the position from the middle of the travel, v the velocity, a the acceleration and sigma = tanh(v / width):
 
-    added_mass             m a               hardening_stiffness    k3 q^3
+    added_mass             M a               hardening_stiffness    k3 q^3
     viscous_damping        d v               coulomb_friction       F sigma
     quadratic_damping      c v |v|           asymmetric_friction    F+ max(sigma, 0) + F- min(sigma, 0)
     added_stiffness        k q               presliding_hysteresis  F z (Dahl's law, `compute_bristle_deflection`)
@@ -23,10 +23,10 @@ from analysis.diagnosis.contrast.recording_part import Part
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 
-Shape = Callable[[Motion], FloatArray]
+ForceShape = Callable[[Motion], FloatArray]
 """Maps a part's motion to the force (n,) of a fault of size 1."""
 MotionLookup = Callable[[Part], Motion]
-"""Maps a part to its measured motion."""
+"""Maps a part to its measured motion. In the functions below, m is a motion and s the sizes of a variant."""
 WIDTH_FACTORS = (1.0, 3.0, 8.0, 20.0)
 """Tried widths of the smoothed sign of dry friction, relative to the narrowest. Chosen by hand."""
 PRESLIDING_SHARES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
@@ -61,20 +61,20 @@ class _Axis:
         return Fault(effect, "mechanism", self.name, self.index, tuple(variants), simpler)
 
     def make_proportional_fault(
-        self, effect: str, shape: Shape, parameter_name: str, lower_bound: float = 0.0
+        self, effect: str, force_shape: ForceShape, parameter_name: str, lower_bound: float = 0.0
     ) -> Fault:
-        """Make a fault whose force is a single parameter times `shape`. parameter_name, lower_bound: of the
+        """Make a fault whose force is a single parameter times `force_shape`. parameter_name, lower_bound: of the
         parameter."""
         return self.make_fault(
-            effect, [Variant((self.subtract(shape),), scale_parameter(parameter_name), lower_bound=lower_bound)]
+            effect, [Variant((self.make_undo(force_shape),), scale_parameter(parameter_name), lower_bound=lower_bound)]
         )
 
-    def subtract(self, shape: Shape) -> Undo:
-        """Make the function that subtracts the force `shape` from the command of this axis."""
+    def make_undo(self, force_shape: ForceShape) -> Undo:
+        """Make the function that subtracts `force_shape` from the command of this axis."""
 
         def undo(part: Part) -> Part:
             command = part.command.copy()
-            command[:, self.index] -= shape(self.get_motion(part))
+            command[:, self.index] -= force_shape(self.get_motion(part))
             return replace(part, command=command)
 
         return undo
@@ -83,8 +83,8 @@ class _Axis:
         """Compute the position (n,) from the middle of the travel, m or rad."""
         return np.asarray(motion.position[:, self.channel] - self.middle)
 
-    def select_velocity(self, motion: Motion) -> FloatArray:
-        """Select the velocity (n,) along the channel of this axis, m/s or rad/s."""
+    def get_velocity(self, motion: Motion) -> FloatArray:
+        """Return the velocity (n,) along the channel of this axis, m/s or rad/s."""
         return motion.velocity[:, self.channel]
 
 
@@ -92,9 +92,8 @@ def make_mechanism_faults(
     axis_index: int, name: str, motions: Sequence[Motion], get_motion: MotionLookup, is_rotational: bool
 ) -> Iterator[Fault]:
     """Make all faults of the mechanism along an axis; its motion is the channel of the same index, or the last channel
-    where there are fewer channels than axes. motions: of all compared parts, whose range the grids span.
-    get_motion: maps a part to its motion. is_rotational: whether the axis turns; pitches of cogging are then at most a
-    turn."""
+    where there are fewer channels than axes. motions: of all compared parts, whose range the grids span. get_motion:
+    maps a part to its motion. is_rotational: whether the axis turns; pitches of cogging are then at most a turn."""
     channel = min(axis_index, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
@@ -104,9 +103,9 @@ def make_mechanism_faults(
     least_width = max(LEAST_WIDTH_SHARE * float(np.sqrt(np.mean(velocity**2))), 1e-300)
     axis = _Axis(axis_index, name, get_motion, channel, lower_end + 0.5 * travel, travel, least_width)
     yield axis.make_proportional_fault("added_mass", lambda m: m.acceleration[:, channel], "mass")
-    yield axis.make_proportional_fault("viscous_damping", axis.select_velocity, "damping")
+    yield axis.make_proportional_fault("viscous_damping", axis.get_velocity, "damping")
     yield axis.make_proportional_fault(
-        "quadratic_damping", lambda m: axis.select_velocity(m) * np.abs(axis.select_velocity(m)), "coefficient"
+        "quadratic_damping", lambda m: axis.get_velocity(m) * np.abs(axis.get_velocity(m)), "coefficient"
     )
     yield axis.make_proportional_fault("added_stiffness", axis.compute_position, "stiffness", lower_bound=-np.inf)
     yield axis.make_proportional_fault(
@@ -136,7 +135,7 @@ def make_mechanism_faults(
 def _make_coulomb_variant(axis: _Axis, speed_width: float) -> Variant:
     """Make Coulomb friction with a sign smoothed over `speed_width` (m/s or rad/s)."""
     return Variant(
-        (axis.subtract(lambda m: smooth_sign(axis.select_velocity(m), speed_width)),),
+        (axis.make_undo(lambda m: smooth_sign(axis.get_velocity(m), speed_width)),),
         scale_parameter("level"),
         lower_bound=0.0,
     )
@@ -145,8 +144,8 @@ def _make_coulomb_variant(axis: _Axis, speed_width: float) -> Variant:
 def _make_asymmetric_variant(axis: _Axis, speed_width: float) -> Variant:
     """Make Coulomb friction with one level per direction; speed_width: as in `_make_coulomb_variant`."""
     undo = (
-        axis.subtract(lambda m: np.maximum(smooth_sign(axis.select_velocity(m), speed_width), 0.0)),
-        axis.subtract(lambda m: np.minimum(smooth_sign(axis.select_velocity(m), speed_width), 0.0)),
+        axis.make_undo(lambda m: np.maximum(smooth_sign(axis.get_velocity(m), speed_width), 0.0)),
+        axis.make_undo(lambda m: np.minimum(smooth_sign(axis.get_velocity(m), speed_width), 0.0)),
     )
     return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, lower_bound=0.0)
 
@@ -155,7 +154,7 @@ def _make_presliding_variant(axis: _Axis, distance: float) -> Variant:
     """Make Dahl's friction with the presliding distance `distance` (m or rad)."""
     parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / distance}  # noqa: E731
     return Variant(
-        (axis.subtract(lambda m: compute_bristle_deflection(m.position[:, axis.channel], distance)),),
+        (axis.make_undo(lambda m: compute_bristle_deflection(m.position[:, axis.channel], distance)),),
         parameters_of,
         lower_bound=0.0,
     )
@@ -164,8 +163,8 @@ def _make_presliding_variant(axis: _Axis, distance: float) -> Variant:
 def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
     """Make cogging with the period `pitch` (m or rad); its two sizes are those of a sine and a cosine."""
     undo = (
-        axis.subtract(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
-        axis.subtract(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
+        axis.make_undo(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
+        axis.make_undo(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
     )
     # Opposite signs: the force in the catalogue acts on the moving mass, and the command must balance it.
     return Variant(undo, lambda s: {
@@ -174,9 +173,9 @@ def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
 
 
 def _make_stop_variants(axis: _Axis, stop_distance: float) -> Iterator[Variant]:
-    """Make end stops at both ends of the travel, and at each end alone. stop_distance: distance from its
-    middle, m or rad."""
-    two_sided = axis.subtract(
+    """Make end stops at both ends of the travel, and at each end alone. stop_distance: distance from its middle, m or
+    rad."""
+    two_sided = axis.make_undo(
         lambda m: np.sign(axis.compute_position(m)) * np.maximum(np.abs(axis.compute_position(m)) - stop_distance, 0.0)
     )
     yield Variant((two_sided,), _make_stop_parameters(axis.middle + stop_distance, 1.0), lower_bound=0.0)
@@ -186,7 +185,7 @@ def _make_stop_variants(axis: _Axis, stop_distance: float) -> Iterator[Variant]:
 
 def _make_stop_variant(axis: _Axis, direction: float, stop_distance: float) -> Variant:
     """Make an end stop at one end of the travel. direction: 1 (upper end) or -1 (lower end)."""
-    undo = axis.subtract(lambda m: direction * np.maximum(direction * axis.compute_position(m) - stop_distance, 0.0))
+    undo = axis.make_undo(lambda m: direction * np.maximum(direction * axis.compute_position(m) - stop_distance, 0.0))
     return Variant((undo,), _make_stop_parameters(axis.middle + direction * stop_distance, direction), lower_bound=0.0)
 
 

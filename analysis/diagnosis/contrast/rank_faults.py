@@ -25,7 +25,7 @@ from analysis.diagnosis.contrast.bases import (
     build_bases,
     compute_unexplained_share,
     compute_unexplained_share_of_rows,
-    have_similar_motion,
+    has_similar_motion,
 )
 from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, undo_fault_in_rows
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
@@ -70,7 +70,7 @@ def rank_faults(
     autoregressive models. excluded: names of effects that are not tested. None where there is too little data, no base
     fits, or one set moves far less than the other."""
     sides = split_into_parts(clean), split_into_parts(recordings)
-    if not all(sides) or not have_similar_motion(*sides):
+    if not all(sides) or not has_similar_motion(*sides):
         return None
     for bases, motions in build_bases(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):

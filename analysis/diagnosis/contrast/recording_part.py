@@ -20,7 +20,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """One part of a recording without long gaps; missing samples are interpolated, and False in `known`."""
+    """One part of a recording without long gaps; missing samples are interpolated."""
 
     recording: Recording
     """The part as recorded, for its sample rate, hold and channel names."""
@@ -31,7 +31,8 @@ class Part:
     position: FloatArray | None
     """(n, d): measured positions, in SI units; None where none were measured."""
     known: Mask
-    """(n,): samples at which all channels of response and position were recorded, not interpolated."""
+    """(n,): samples at which all channels of response and position were recorded, not interpolated; interpolated
+    commands do not count."""
     start: int
     """Index of the part's first sample in its file, because a drift and a clock error continue between the parts."""
     file_length: int

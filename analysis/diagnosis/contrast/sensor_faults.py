@@ -7,8 +7,8 @@
     clock_drift    y(t / (1 + rate error))   sensor_misalignment     y + R y, R skew-symmetric (three axes)
     sensor_lag     (y(t) - k y(t - Dt)) / (1 - k), k = exp(-Dt / T)
 
-T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `compute_drift_shape`. The grids of
-tried values are chosen by hand. Called by `rank_faults`.
+T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `compute_drift_shape`. Grids of
+tried values and limits are chosen by hand; a lag is tried from Dt / 10 on. Called by `rank_faults`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -55,15 +55,14 @@ NONLINEARITY_SHARES = (0.02, 0.06, 0.15, 0.3)
 BACKLASH_SHARES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Gaps of a backlash before the sensor that are tried, relative to the standard deviation of the channel."""
 CLOCK_DELAYS = (*np.geomspace(0.004, 0.2, GRID_SIZE // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
-"""Delays of a clock at the end of the file that are tried, in periods of the median frequency: first a logarithmic
-grid, then steps of less than half a period."""
+"""Tried delays of a clock at the end of the file, in periods of the median frequency; steps below half a period."""
 UNIT_DEPENDENT_FAULTS = ("sensor_offset", "sensor_drift")
 """Faults that channels can share only if they have the same unit."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Channel:
-    """The response channels with a fault, and the magnitude of their readings in the channel's unit."""
+class _Channels:
+    """The response channels with a fault, and the magnitude of their readings in the channels' unit."""
 
     indices: tuple[int, ...]
     """Indices of the channels: a single one, or all."""
@@ -92,9 +91,9 @@ class _Channel:
 
 
 def make_sensor_faults(index: int, name: str, parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
-    """Make all faults of channel `index`. parts: all compared ones, whose range the grids span; lags: likely delays."""
+    """Make all faults of channel `index`. parts: all compared, whose range the grids span; lags: likely delays."""
     readings = np.concatenate([part.response[:, index] for part in parts])
-    channel = _Channel((index,), name, float(np.std(readings)) or 1.0, float(np.abs(readings).max(initial=0.0)) or 1.0)
+    channel = _Channels((index,), name, float(np.std(readings)) or 1.0, float(np.abs(readings).max(initial=0.0)) or 1.0)
     longest_part = max(parts, key=lambda part: len(part.response))
     yield from _make_common_faults(channel, parts, longest_part.response[:, index], lags)
     shares = [sign * share for share in NONLINEARITY_SHARES for sign in (1.0, -1.0)]
@@ -112,7 +111,7 @@ def make_shared_faults(parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
     channel_std = np.std(readings, axis=0)
     largest_channel = int(np.argmax(channel_std))
     peak = float(np.abs(readings).max(initial=0.0)) or 1.0
-    channel = _Channel(tuple(range(readings.shape[1])), "", float(channel_std[largest_channel]) or 1.0, peak)
+    channel = _Channels(tuple(range(readings.shape[1])), "", float(channel_std[largest_channel]) or 1.0, peak)
     longest_part = max(parts, key=lambda part: len(part.response))
     has_one_unit = len(set(longest_part.recording.response.units)) == 1
     for fault in _make_common_faults(channel, parts, longest_part.response[:, largest_channel], lags):
@@ -120,25 +119,26 @@ def make_shared_faults(parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
             yield fault
 
 
-def _make_common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, lags: Lags) -> Iterator[Fault]:
+def _make_common_faults(channel: _Channels, parts: Sequence[Part], samples: FloatArray, lags: Lags) -> Iterator[Fault]:
     """Make the faults that one channel or all together may have. samples: (n,), readings of the longest part."""
-    longest = max(parts, key=lambda part: len(part.response))
-    delays_s = choose_trial_delays_s(samples, longest.rate_hz)
+    longest_part = max(parts, key=lambda part: len(part.response))
+    delays_s = choose_trial_delays_s(samples, longest_part.rate_hz)
     yield channel.make_fault("sensor_gain", [_make_gain(channel, gain) for gain in TRIAL_GAINS])
     offsets = [sign * share * channel.std for share in OFFSET_SHARES for sign in (1.0, -1.0)]
     yield channel.make_fault("sensor_offset", [_make_offset(channel, offset) for offset in offsets])
     drifts = [_make_drift(channel, offset, earlier) for offset in offsets for earlier in EARLIER_DRIFT_SHARES]
     yield replace(channel.make_fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
     yield channel.make_fault("logger_offset", [
-        *(_make_logger_offset(channel, time_s, longest.rate_hz) for time_s in delays_s),
-        *(fix_size(_make_logger_offset(channel, time_s, longest.rate_hz), lags.step_s) for time_s in lags.delays_s),
+        *(_make_logger_offset(channel, time_s, longest_part.rate_hz) for time_s in delays_s), *(
+            fix_size(_make_logger_offset(channel, time_s, longest_part.rate_hz), lags.step_s)
+            for time_s in lags.delays_s),
     ])  # fmt: skip
-    lag_times_s = [time_s for time_s in delays_s if time_s * longest.rate_hz >= 0.1 * lags.lag_samples]
+    lag_times_s = [time_s for time_s in delays_s if time_s * longest_part.rate_hz >= 0.1 * lags.lag_samples]
     yield channel.make_fault(
-        "sensor_lag", [_make_lag(channel, time_s, longest.rate_hz, lags.lag_samples) for time_s in lag_times_s]
+        "sensor_lag", [_make_lag(channel, time_s, longest_part.rate_hz, lags.lag_samples) for time_s in lag_times_s]
     )
-    period_samples = longest.rate_hz / compute_median_frequency_hz(samples, longest.rate_hz)
-    rates = [sign * delay * period_samples / longest.file_length for delay in CLOCK_DELAYS for sign in (1.0, -1.0)]
+    period_samples = longest_part.rate_hz / compute_median_frequency_hz(samples, longest_part.rate_hz)
+    rates = [sign * delay * period_samples / longest_part.file_length for delay in CLOCK_DELAYS for sign in (1.0, -1.0)]
     clock_origins = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [
         _make_skew(channel, rate, from_file_start, parts)
@@ -153,7 +153,7 @@ def _make_common_faults(channel: _Channel, parts: Sequence[Part], samples: Float
     yield replace(channel.make_fault("clock_drift", clocks), varies=True)
 
 
-def _make_backlash(channel: _Channel, gap: float) -> Variant:
+def _make_backlash(channel: _Channels, gap: float) -> Variant:
     """Make a backlash before the sensor. gap: its full width, in the channel's unit."""
     return Variant((channel.make_undo(lambda y, rate: _undo_play(y, gap)),), scale_parameter("gap", gap), *WIDE_RANGE)
 
@@ -163,18 +163,18 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     reverses at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead
     changes with the square of time."""
     direction = np.sign(compute_bristle_deflection(y, REVERSAL_SHARE * gap))
-    lead = 0.5 * direction
+    relative_lead = 0.5 * direction
     reversals = np.flatnonzero(direction[1:] * direction[:-1] < 0) + 1
     for start, reversal in pairwise([0, *reversals.tolist()]):
         excursion = direction[reversal - 1] * y[start:reversal]
         extreme = start + int(np.argmax(excursion))
         end = extreme + int(np.flatnonzero(excursion[extreme - start :] > excursion.max() - REVERSAL_SHARE * gap)[-1])
         crossed_share = (np.arange(extreme, reversal) - extreme) / max(end - extreme, 1)
-        lead[extreme:reversal] = direction[reversal - 1] * (0.5 - np.minimum(crossed_share, 1.0) ** 2)
-    return np.asarray(y + gap * lead)
+        relative_lead[extreme:reversal] = direction[reversal - 1] * (0.5 - np.minimum(crossed_share, 1.0) ** 2)
+    return np.asarray(y + gap * relative_lead)
 
 
-def _make_cross_axis_fault(channel: _Channel, other_channel: int) -> Fault:
+def _make_cross_axis_fault(channel: _Channels, other_channel: int) -> Fault:
     """Make cross-axis sensitivity: the reading of this channel contains that of another one, times the size."""
     (channel_index,) = channel.indices
 
@@ -186,7 +186,7 @@ def _make_cross_axis_fault(channel: _Channel, other_channel: int) -> Fault:
     return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), scale_parameter("from_next"))])
 
 
-def _make_gain(channel: _Channel, gain: float) -> Variant:
+def _make_gain(channel: _Channels, gain: float) -> Variant:
     """Make a wrong gain, linearised about `gain`; its size is 1 there, and 0 at gain 1."""
     undo = channel.make_undo(lambda y, rate: y / gain)
     compute_gain: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
@@ -194,12 +194,12 @@ def _make_gain(channel: _Channel, gain: float) -> Variant:
     return Variant((undo,), lambda s: {"gain": compute_gain(float(s[0]))}, *SIZE_RANGE, gain, at_size=at_size)
 
 
-def _make_offset(channel: _Channel, shift: float) -> Variant:
+def _make_offset(channel: _Channels, shift: float) -> Variant:
     """Make a constant offset, in the channel's unit."""
     return Variant((channel.make_undo(lambda y, rate: y - shift),), scale_parameter("offset", shift), *WIDE_RANGE)
 
 
-def _make_drift(channel: _Channel, total: float, earlier_share: float) -> Variant:
+def _make_drift(channel: _Channels, total: float, earlier_share: float) -> Variant:
     """Make an offset that grows linearly to `total`. earlier_share: share of it before the file began."""
 
     def undo(part: Part) -> Part:
@@ -210,7 +210,7 @@ def _make_drift(channel: _Channel, total: float, earlier_share: float) -> Varian
     return Variant((undo,), scale_parameter("total", total), *WIDE_RANGE)
 
 
-def _make_logger_offset(channel: _Channel, delay_s: float, rate_hz: float) -> Variant:
+def _make_logger_offset(channel: _Channels, delay_s: float, rate_hz: float) -> Variant:
     """Make a delay: readings recorded `delay_s` late. rate_hz: of the longest part, for `compute_noise_gain`."""
 
     def undo(part: Part) -> Part:
@@ -226,7 +226,7 @@ def _make_logger_offset(channel: _Channel, delay_s: float, rate_hz: float) -> Va
     )  # fmt: skip
 
 
-def _make_lag(channel: _Channel, time_s: float, rate_hz: float, row_samples: int) -> Variant:
+def _make_lag(channel: _Channels, time_s: float, rate_hz: float, row_samples: int) -> Variant:
     """Make a low pass of first order, y += (1 - decay) (x - y) per `row_samples`, inverted exactly. An autoregression
     predicts a row from earlier rows alone, so that samples between rows are not used here either. The low pass reduces
     one-step prediction errors by the geometric mean of its gain, 1 - decay (Kolmogorov's formula)."""
@@ -239,7 +239,7 @@ def _make_lag(channel: _Channel, time_s: float, rate_hz: float, row_samples: int
     return Variant((undo,), parameters_of, *SIZE_RANGE, 1 - decay, at_size=at_size)
 
 
-def _make_power_law(channel: _Channel, share: float, power: int, parameter_name: str) -> Variant:
+def _make_power_law(channel: _Channels, share: float, power: int, parameter_name: str) -> Variant:
     """Make an additional term of power 2 or 3. share: its value at the largest reading, relative to that reading."""
     peak = channel.peak
     curve: Curve = lambda y: _invert_power_law(y / peak, share, power) * peak  # noqa: E731
@@ -251,7 +251,8 @@ def _make_power_law(channel: _Channel, share: float, power: int, parameter_name:
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
-    """Solve y = x + share x^power for x (n,), by 20 Newton steps, clipped to -3 to 3. y: readings over the largest."""
+    """Solve y = x + share x^power for x (n,) by 20 Newton steps, with the slope at least 0.1, so that steps stay short
+    near a turning point; clipped to -3 to 3. y: readings over the largest."""
     x = y.copy()
     for _ in range(20):
         slope = 1 + power * share * x ** (power - 1)
@@ -259,7 +260,7 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _make_skew(channel: _Channel, rate_error: float, from_file_start: bool, parts: Sequence[Part]) -> Variant:
+def _make_skew(channel: _Channels, rate_error: float, from_file_start: bool, parts: Sequence[Part]) -> Variant:
     """Make clock skew: readings taken at t (1 + rate_error), resampled to t. from_file_start: whether t counts from
     the beginning of the file, else of each part."""
 
@@ -285,8 +286,7 @@ ROTATION_GENERATORS = (
     ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
 )
-"""Generators of rotations about the three axes: undoing a rotation by a small angle s (rad) adds s x generator x
-readings."""
+"""Generators of rotations about three axes: undoing one by a small angle s (rad) adds s x generator x readings."""
 
 
 def make_misalignment_fault() -> Fault:

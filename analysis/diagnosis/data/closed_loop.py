@@ -21,12 +21,13 @@ hand."""
 def is_in_closed_loop(recording: Recording) -> bool:
     """Whether the recording was made under feedback: by the difference of command and recorded excitation, else by
     whether the responses up to each sample help to predict the command that is written just after (Granger 1969).
-    Without excitation, False for other holds than zero-order: a command may then depend on the sample after it. With an
-    excitation, False where command or excitation has missing samples."""
+    Without excitation, False for other holds than zero-order: a command may then depend on the sample after it. Missing
+    samples are left out."""
     command = recording.command.samples
     if recording.excitation is not None:
         feedback = command - recording.excitation.samples
-        return bool(_compute_rms(feedback) > FED_BACK_SHARE * _compute_rms(command))
+        is_complete = np.isfinite(feedback).all(axis=1)
+        return bool(_compute_rms(feedback[is_complete]) > FED_BACK_SHARE * _compute_rms(command[is_complete]))
     if recording.hold is not Hold.ZERO_ORDER:
         # The command written just before a sample may already depend on the sample after it.
         return False

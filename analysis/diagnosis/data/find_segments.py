@@ -32,8 +32,8 @@ SINE_SHARE = 0.98
 EXACT_TOLERANCE = 1e-6
 """Largest difference of a command between periods, relative to its peak: rounding of numbers stored with six digits."""
 ROUNDED_TOLERANCE = 1e-3
-"""Largest rms difference between periods due to rounding, relative to the standard deviation of the
-command. Chosen by hand."""
+"""Largest rms difference between periods due to rounding, relative to the standard deviation of the command. Chosen by
+hand."""
 MOST_SEARCHED_SAMPLES = 2**19
 """Largest number of samples in which a period is searched for; limits the computing time of the correlation."""
 LARGEST_SAMPLE = 1e100
@@ -105,10 +105,10 @@ def find_period(command: FloatArray) -> int:
         or len(searched_samples) < 2 * SHORTEST_PERIOD
     ):
         return 0
-    scaled = (searched_samples[:, channel_std > 0] - searched_samples[:, channel_std > 0].mean(axis=0)) / channel_std[
-        channel_std > 0
-    ]
-    correlation = _compute_autocorrelation(scaled)[: len(searched_samples) // 2 + 1]
+    scaled_samples = (
+        searched_samples[:, channel_std > 0] - searched_samples[:, channel_std > 0].mean(axis=0)
+    ) / channel_std[channel_std > 0]
+    correlation = _compute_autocorrelation(scaled_samples)[: len(searched_samples) // 2 + 1]
     dip_lags = np.flatnonzero(correlation < DIP_CORRELATION)
     if not len(dip_lags):
         return 0
@@ -116,8 +116,8 @@ def find_period(command: FloatArray) -> int:
     if not len(high_lags) or high_lags[0] < SHORTEST_PERIOD:
         return 0
     # The maximum of the first run of consecutive lags that are high enough.
-    last_high = high_lags[0] + int(np.argmax(np.diff(np.append(high_lags, high_lags[-1] + 2)) > 1))
-    return int(high_lags[0] + np.argmax(correlation[high_lags[0] : last_high + 1]))
+    last_high_lag = high_lags[0] + int(np.argmax(np.diff(np.append(high_lags, high_lags[-1] + 2)) > 1))
+    return int(high_lags[0] + np.argmax(correlation[high_lags[0] : last_high_lag + 1]))
 
 
 def _compute_autocorrelation(samples: FloatArray) -> FloatArray:

@@ -22,10 +22,10 @@ class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
 
 
 def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
-    """Convert the commands to forces, and an excitation with as many channels too. Returns the recording and a sentence
-    about it. constants: a single value for all commands or a value for each, in N or N m per unit of the command.
-    Raises NoForceConstant where the motion has no SI unit, a command is a force already, or the constants are of a
-    wrong number, zero or not finite."""
+    """Convert the commands to forces, and also an excitation with as many channels. Returns the recording and a
+    sentence about it. constants: a single value for all commands or a value for each, in N or N m per unit of the
+    command. Raises NoForceConstant where the motion has no SI unit, a command is a force already, or the constants are
+    of a wrong number, zero or not finite."""
     command, length_unit = (
         recording.command,
         determine_unit_system(recording.command.units, recording.response.units).length,

@@ -30,8 +30,9 @@ class Observed:
     one with a missing reading."""
 
     recording: Recording
+    """As recorded, for its sample rate, hold, conditions and names."""
     command: FloatArray
-    """(n, m): command of each input."""
+    """(n, m): command of each input, in SI units."""
     measured: FloatArray
     """(n, c): channels of the response, then of the position, as measured; NaN = missing."""
     fit: Mask
@@ -42,8 +43,8 @@ class Observed:
     """(n,): held-out samples, used only in the end."""
 
     def release_test_samples(self, mask: Mask) -> "Observed":
-        """Release the held-out samples within `mask` (n,) for fitting, in a copy: of each stretch, two
-        thirds become fit samples, the last third validation samples."""
+        """Release the held-out samples within `mask` (n,) for fitting, in a copy: of each stretch, two thirds become
+        fit samples, the last third validation samples."""
         mask = mask & self.test
         fit, choose = self.fit.copy(), self.choose.copy()
         for start, stop in find_runs(mask):
@@ -74,7 +75,8 @@ class Observed:
         ]
 
     def mask_test_below(self, level: float) -> Mask:
-        """Make the mask (n,) of the held-out samples in segments whose commands are below `level` in magnitude."""
+        """Make the mask (n,) of the held-out samples in segments whose commands are all below `level` (the command's
+        unit) in magnitude."""
         mask = np.zeros(len(self.test), dtype=np.bool_)
         for segment, largest_command in self.list_test_levels():
             mask[segment.start : segment.stop] = largest_command < level
@@ -90,14 +92,14 @@ class Observed:
         used_length = (
             int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
         )
-        no_test = np.zeros(used_length, dtype=np.bool_)
+        empty_mask = np.zeros(used_length, dtype=np.bool_)
         return Observed(
             self.recording,
             self.command[:used_length],
             self.measured[:used_length],
             self.fit[:used_length],
             self.choose[:used_length],
-            no_test,
+            empty_mask,
         )
 
 
@@ -155,22 +157,23 @@ def _find_end_of_motion(samples: FloatArray) -> int:
 
 
 def split_samples(
-    segments: tuple[Segment, ...], length: int, test_elsewhere: bool = False, spans: Sequence[Span] = ()
+    segments: tuple[Segment, ...], length: int, has_external_test: bool = False, spans: Sequence[Span] = ()
 ) -> tuple[Mask, Mask, Mask]:
-    """Split samples into fit, validation and test: three masks (length,). test_elsewhere: whether another recording is
-    held out for the test. spans: the recording's parts; empty = one part.
+    """Split samples into fit, validation and test: three masks (length,). has_external_test: whether another recording
+    is held out for the test. spans: the recording's parts, used without segments; empty = one part.
 
-    Segments marked as test are held out. Without such marks, the last quarter of each segment is held out, in whole
-    periods, so that every level is tested; where all segments have the same level, the last quarter of the time. Of the
-    other segments, those of the middle level are the validation set where there are three or more levels: laws differ
-    in how they grow with the level, whereas further periods of a fitted level differ by noise only. Otherwise the last
-    quarter of the remaining time is the validation set.
+    Segments marked as test are held out; of the others, those marked as fit are fitted, or all without such marks.
+    Segments of rest and samples outside segments belong to no set, unless no segment remains to fit; nothing is fitted
+    where all driven segments are marked as test. Without test marks and external test, the last share `TEST_SHARE` of
+    each segment is held out, in whole periods, so that every level is tested; where all segments have the same level,
+    that share of the time. Of the fitted segments, those of the middle level are the validation set where there are at
+    least `LEVELS_TO_HOLD_ONE_BACK` levels: laws differ in how they grow with the level, whereas further periods of a
+    fitted level differ by noise only. Otherwise it is the last share `CHOOSE_SHARE` of the remaining time.
 
-    Without segments, the last quarter of each part's motion is held out; the rest period after it, which may show a
-    force but no motion, is fitted.
-    """
+    Without segments, the last share `TEST_SHARE` of each part's motion is held out; the rest period after it, which may
+    show a force but no motion, is fitted."""
     if not segments:
-        return _split_without_segments(spans or (Span(0, length, length),), length, test_elsewhere)
+        return _split_without_segments(spans or (Span(0, length, length),), length, has_external_test)
     driven_segments = [segment for segment in segments if segment.kind != "rest"]
     test = _mask_segments([segment for segment in driven_segments if segment.role == "test"], length)
     fitted_segments = [segment for segment in driven_segments if segment.role == "fit"] or [
@@ -179,7 +182,7 @@ def split_samples(
     fit = _mask_segments(fitted_segments, length) if fitted_segments else ~test
     if driven_segments and all(segment.role == "test" for segment in driven_segments):
         fit[:] = False
-    elif not test.any() and not test_elsewhere:
+    elif not test.any() and not has_external_test:
         test = _mask_segment_ends(fitted_segments, length)
         fit &= ~test
     choose = _mask_middle_level(fitted_segments, length) & fit
@@ -189,13 +192,13 @@ def split_samples(
     return fit & ~choose, choose, test
 
 
-def _split_without_segments(spans: Sequence[Span], length: int, test_elsewhere: bool) -> tuple[Mask, Mask, Mask]:
+def _split_without_segments(spans: Sequence[Span], length: int, has_external_test: bool) -> tuple[Mask, Mask, Mask]:
     """Split samples by shares of each part's motion: masks (length,) of the fit, validation and test samples.
-    test_elsewhere: whether nothing is held out."""
+    has_external_test: whether nothing is held out here."""
     fit, choose, test = (np.zeros(length, dtype=np.bool_) for _ in range(3))
     for span in spans:
         test_start = (
-            span.stop if test_elsewhere else span.start + int((1 - TEST_SHARE) * (span.end_of_motion - span.start))
+            span.stop if has_external_test else span.start + int((1 - TEST_SHARE) * (span.end_of_motion - span.start))
         )
         choose_start = span.start + int((1 - CHOOSE_SHARE) * (test_start - span.start))
         fit[span.start : span.stop], choose[choose_start:test_start] = True, True
@@ -220,8 +223,8 @@ def _mask_segments(segments: list[Segment], length: int) -> Mask:
 
 
 def _mask_segment_ends(segments: list[Segment], length: int) -> Mask:
-    """Make the mask (length,) of the last quarter of each segment, rounded to whole periods but at least one period; of
-    the last quarter of the time where there is one level or none."""
+    """Make the mask (length,) of the last share `TEST_SHARE` of each segment, rounded to whole periods but at least one
+    period; of that share of the time where there are fewer than `LEVELS_TO_STRATIFY` levels."""
     mask = np.zeros(length, dtype=np.bool_)
     if len(_list_levels(segments)) < LEVELS_TO_STRATIFY:
         indices = np.flatnonzero(_mask_segments(segments, length)) if segments else np.arange(length)

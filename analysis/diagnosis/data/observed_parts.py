@@ -77,15 +77,15 @@ def find_parts(recording: Recording) -> tuple[tuple[int, int], ...]:
     """Find begin and end (exclusive) of each part with at least `LEAST_SAMPLES`, as sample indices; the whole recording
     where `meta` (key "parts") states no such part within it."""
     stated_parts = recording.meta.get("parts")
-    parts = [
-        (int(stretch["start"]), int(stretch["stop"]))
-        for stretch in (
+    stated_ranges = [
+        (int(stated_part["start"]), int(stated_part["stop"]))
+        for stated_part in (
             stated_parts if isinstance(stated_parts, Sequence) and not isinstance(stated_parts, str) else ()
         )
-        if isinstance(stretch, dict) and "start" in stretch and "stop" in stretch
+        if isinstance(stated_part, dict) and "start" in stated_part and "stop" in stated_part
     ]
-    parts_within = [(start, stop) for start, stop in parts if start >= 0 and stop <= len(recording)]
-    return tuple(stretch for stretch in parts_within if stretch[1] - stretch[0] >= LEAST_SAMPLES) or (
+    ranges_within = [(start, stop) for start, stop in stated_ranges if start >= 0 and stop <= len(recording)]
+    return tuple(stated_part for stated_part in ranges_within if stated_part[1] - stated_part[0] >= LEAST_SAMPLES) or (
         (0, len(recording)),
     )
 
@@ -130,8 +130,10 @@ def name_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[s
     """Name the parts in the order of `observe_parts`: the recording's name ("recording 2" where `names` is too short),
     with the part's number where there are several."""
     part_names: list[str] = []
-    for number, recording in enumerate(recordings):
-        name = names[number] if number < len(names) else f"recording {number + 1}"
-        count = len(find_parts(recording))
-        part_names += [name] if count == 1 else [f"{name}, part {part + 1}" for part in range(count)]
+    for recording_index, recording in enumerate(recordings):
+        name = names[recording_index] if recording_index < len(names) else f"recording {recording_index + 1}"
+        part_count = len(find_parts(recording))
+        part_names += (
+            [name] if part_count == 1 else [f"{name}, part {part_index + 1}" for part_index in range(part_count)]
+        )
     return tuple(part_names)

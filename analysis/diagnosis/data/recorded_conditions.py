@@ -3,7 +3,7 @@
 Three properties may differ between recordings of one device: a mass or inertia that it carried (keys of `meta`),
 recorded conditions such as a temperature, on which effects depend, and the sign of commands. Called for every recording
 by the simulations of `errors`, `forces.predicted_force` and `confirm.balance_with_model`; `input_checks` checks the
-payload.
+payload, and modules of `first_model`, `next_experiment` and `result` use single functions.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,11 @@ from equalizer.plant.linear_simulation import compute_driven_axes, compute_growt
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
+ADDED_MASS_KEY, ADDED_INERTIA_KEY = "added_mass_kg", "added_inertia_kg_m2"
 """Keys of a recording's `meta`: mass (kg) or inertia (kg m^2) that the device carried along every driven axis, in
 addition to the model's."""
-
-
-REVERSED_CHANNELS = "turned commands"
-"""Key of a recording's `meta`: channels of its commands that were reversed."""
+REVERSED_CHANNELS_KEY = "turned commands"
+"""Key of a recording's `meta`: names of the command channels whose sign was reversed."""
 
 
 def add_payload(model: MechanicalModel, recording: Recording) -> MechanicalModel:
@@ -71,7 +69,7 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
     masses."""
     if is_free_motion(recording):
         return replace(model, mass=np.eye(len(model.mass)))
-    channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED_CHANNELS)
+    channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED_CHANNELS_KEY)
     if not isinstance(reversed_channels, Sequence) or not set(reversed_channels) & set(channels):
         return model
     signs = [-1.0 if channel in reversed_channels else 1.0 for channel in channels]
@@ -84,7 +82,7 @@ def find_payload_problems(
     """Find errors in the stated payloads (masses and inertias), as sentences without a full stop; empty where there are
     none."""
     key = _choose_payload_key(model)
-    bad_key = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
+    bad_key = ADDED_MASS_KEY if key == ADDED_INERTIA_KEY else ADDED_INERTIA_KEY
     problems = [
         f"{name} says {bad_key}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
         for recording, name in zip(recordings, names, strict=True)
@@ -100,12 +98,12 @@ def find_payload_problems(
 
 def has_payload(recordings: Sequence[Recording]) -> bool:
     """Whether any recording states a carried mass or inertia."""
-    return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
+    return any(key in recording.meta for recording in recordings for key in (ADDED_MASS_KEY, ADDED_INERTIA_KEY))
 
 
 def _choose_payload_key(model: MechanicalModel) -> str:
     """Choose the key of `meta` that states the payload: a mass for a linear device, an inertia for a rotational one."""
-    return ADDED_INERTIA if model.rotational else ADDED_MASS
+    return ADDED_INERTIA_KEY if model.rotational else ADDED_MASS_KEY
 
 
 def _is_valid_payload(value: object) -> bool:

@@ -32,9 +32,10 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 _MOST_SHUFFLES = 3
-"""Largest number of shuffles of the blocks in the negative control; chosen: each costs as much as a screening."""
+"""Largest number of shuffles of the blocks in the negative control. Chosen by hand: each takes as long as a
+screening."""
 _MOST_RIVALS = 2
-"""Largest number of rivals, sums that lack a variable of the best sum; chosen."""
+"""Largest number of rivals, sums that lack a variable of the best sum. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,7 +159,9 @@ def _fit_best_shapes(
     term_order: Sequence[int],
     time_left: TimeBudget,
 ) -> tuple[Sum, ...]:
-    """Fit the best-ranked shapes, each together with the terms in `selected`; sorted by cross-validated error."""
+    """Fit the shapes of the best-ranked `LAW_STARTS_REFINED` families, each shape together with the selected terms and
+    from its best-ranked start; sorted by cross-validated error. Sums that cannot be fitted, and those for which no time
+    is left, are left out."""
     term_by_shape: dict[str, Term] = {}
     refined_families: set[str] = set()
     for term_index in term_order:

@@ -1,10 +1,9 @@
 """Forward selection of discovered laws, up to `LAW_MOST_ROUNDS`.
 
-In each round, sums of terms are screened on the axes and readings with the largest excess error, the best sums are
-fitted by output error, and the best fit is added. Finally exponents are rounded where that fits as well
+In each round, sums of terms are screened on the axes and readings with the largest error above the noise, the best sums
+are fitted by output error, and the best fit is added. Finally exponents are rounded where that fits as well
 (`snap_exponents`). Steps and equations: see the theory of operation in the package's docstring
-(`analysis/diagnosis/discovery`). Called by `add_laws`.
-"""
+(`analysis/diagnosis/discovery`). Called by `add_laws`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -62,11 +61,11 @@ class Round:
         and that chance removes."""
         best_sum = self.sums[0]
         excess_error = max(best_sum.base_error - 1.0, 1e-300)
-        removed, removed_by_chance = (
+        removed_error, error_removed_by_chance = (
             best_sum.base_error - best_sum.cross_validated_error,
             self.chance_share * best_sum.base_error,
         )
-        return min(removed / excess_error, 1.0), min(removed_by_chance / excess_error, 1.0)
+        return min(removed_error / excess_error, 1.0), min(error_removed_by_chance / excess_error, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +101,7 @@ def discover_laws(
     law_steps: list[FittedCandidate] = []
     target_error = EXPLAINED_ERROR if single_term else NOISE_ALONE
     while len(rounds) < max_laws and time_left() and current.score.worst_channel > target_error:
-        progress("looking for a law outside the catalogue", 0.6 + 0.1 * len(rounds))
+        progress("looking for a law outside the catalogue", 0.6 + 0.1 * len(rounds))  # shares chosen by hand
         next_round = _find_next_law(context, current.fitted, time_left, single_term)
         if next_round is None or not is_worthwhile(current, next_round.fitted_candidates[0]):
             break
@@ -111,8 +110,8 @@ def discover_laws(
         current = next_round.fitted_candidates[0]
         rounds.append(next_round)
         law_steps.append(current)
-        may_act_elsewhere = next_round.sums[0].partner is None and depends_on_another_axis(next_round.sums[0])
-        if single_term and current.score.worst_channel > target_error and not may_act_elsewhere:
+        may_act_on_other_axis = next_round.sums[0].partner is None and depends_on_another_axis(next_round.sums[0])
+        if single_term and current.score.worst_channel > target_error and not may_act_on_other_axis:
             return None
     if not rounds:
         return None
@@ -142,8 +141,8 @@ def _remove_partner_law(context: SearchContext, pair: FittedCandidate) -> Fitted
 
 
 def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudget, single_term: bool) -> Round | None:
-    """Find the next law: screen sums in the views with the largest excess error, and fit the best. None where none can
-    be fitted or, with single_term, where the best sum leaves too much in the screen (`_may_explain_alone`)."""
+    """Find the next law: screen sums in the views with the largest error above the noise, and fit the best. None where
+    none can be fitted or, with single_term, where the best sum leaves too much in the screen (`_may_explain_alone`)."""
     views = build_views(context.measure, context.tuning, base_fit)
     ranked_by_view = [
         (view, search_best_sums(build_normal_equations(view), list_view_terms(view), time_left))
@@ -186,8 +185,9 @@ def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudg
 
 
 def _find_constant_forces(views: Sequence[View]) -> list[Sum]:
-    """Find the constant forces that remove more than `LAW_WORTH_SHARE` of the excess error of an axis. All axes are
-    tested, because no view's excess error shows a constant, which each regression contains."""
+    """Find the constant forces that remove more than `LAW_WORTH_SHARE` of the error above the noise of an axis, where
+    the error is more than `LAW_NOISE_POWER` times that of the noise. All axes are tested, because no view's error shows
+    a constant, which each regression contains."""
     constants = [fit_constant(view) for view in views if view.acts_on == "force"]
     return [
         constant
@@ -199,7 +199,8 @@ def _find_constant_forces(views: Sequence[View]) -> list[Sum]:
 
 
 def _may_explain_alone(best_sum: Sum) -> bool:
-    """Whether a sum is a single term that leaves at most `LAW_ALONE_REMAINDER` of the excess error in the screen."""
+    """Whether a sum is a single term that leaves at most `LAW_ALONE_REMAINDER` of the error above the noise in the
+    screen."""
     leaves_little = best_sum.cross_validated_error - 1 <= LAW_ALONE_REMAINDER * (best_sum.base_error - 1)
     return leaves_little and len(best_sum.terms) == 1
 
@@ -215,19 +216,21 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 
 
 def _select_views_to_search(views: Sequence[View]) -> list[View]:
-    """Select the views in which laws are searched, at most two of axes and two of readings, by falling excess error:
-    above `LAW_NOISE_POWER`, and at least `LAW_AXES_SHARE` of the largest of its kind."""
-    selected: list[View] = []
+    """Select the views in which laws are searched, at most two of axes and two of readings, by falling error over
+    the noise: above `LAW_NOISE_POWER`, and at least `LAW_AXES_SHARE` of the largest of its kind."""
+    selected_views: list[View] = []
     for acts_on in ("force", "response"):
-        excess_by_output = [(_compute_excess_error(view), view.output) for view in views if view.acts_on == acts_on]
-        largest_excess = max((excess for excess, _ in excess_by_output), default=0.0)
-        significant = [(excess, output) for excess, output in excess_by_output if excess > LAW_NOISE_POWER]
-        selected += [
-            views[output]
-            for excess, output in sorted(significant, reverse=True)[:2]
-            if excess >= LAW_AXES_SHARE * largest_excess
+        error_by_output = [(_compute_relative_error(view), view.output) for view in views if view.acts_on == acts_on]
+        largest_error = max((relative_error for relative_error, _ in error_by_output), default=0.0)
+        significant_errors = [
+            (relative_error, output) for relative_error, output in error_by_output if relative_error > LAW_NOISE_POWER
         ]
-    return selected
+        selected_views += [
+            views[output]
+            for relative_error, output in sorted(significant_errors, reverse=True)[:2]
+            if relative_error >= LAW_AXES_SHARE * largest_error
+        ]
+    return selected_views
 
 
 def _cancels_command(view: View, term_sum: Sum) -> bool:
@@ -245,7 +248,7 @@ def _cancels_command(view: View, term_sum: Sum) -> bool:
     return cancelled > LAW_COMMAND_SHARE * command_power
 
 
-def _compute_excess_error(view: View) -> float:
+def _compute_relative_error(view: View) -> float:
     """Compute the held-out squares of the re-tuned model in a view over those of noise alone; 1 = noise."""
     model_equations = build_normal_equations(view)
     base_squares = cross_validate_terms(model_equations, view.residual[None, :]).base_squares

@@ -1,8 +1,8 @@
 """Fits sums of terms as laws by output error, and puts the simplest of those that fit about equally well first.
 
 Screening uses a linearised residual (`fit_sum`); here, each sum is simulated with the model, and all parameters are
-fitted together by Gauss-Newton steps (`errors.output_error`). Called by `discover`; `run_within_time` by `validation`,
-too.
+fitted together by Gauss-Newton steps (`errors.output_error`). Called by `discover`; `validation` uses
+`run_within_time`.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,7 +48,7 @@ def fit_sums(
     """Fit sums by output error, added to the hypothesis of `base`. The best sum, and then simpler sums that are
     inseparable from it, are fitted to convergence and returned first, the others for a few steps. When the time ends,
     returns those begun by then; empty where none can be fitted."""
-    fit_few_steps = _prepare_first_fits(context, base)
+    fit_few_steps = _make_first_fitter(context, base)
     first_fits = [
         (run_within_time(partial(fit_few_steps, starting_fit), starting_fit), term_sum)
         for term_sum in sums
@@ -86,9 +86,9 @@ def fit_sums(
     return (*refined, *(fit_and_sum for fit_and_sum in other_candidates if fit_and_sum not in simpler_laws))
 
 
-def _prepare_first_fits(context: SearchContext, base: Fitted) -> Callable[[Fitted], Fitted]:
-    """Make the function that fits a start for `FIRST_FIT_ROUNDS` steps. Where the drive repeats and the law does not
-    depend on time, it fits to one period of each segment with longer simulation steps (`short_recordings`), which
+def _make_first_fitter(context: SearchContext, base: Fitted) -> Callable[[Fitted], Fitted]:
+    """Make the function that fits a starting fit for `FIRST_FIT_ROUNDS` steps. Where the drive repeats and the law does
+    not depend on time, it fits to one period of each segment with longer simulation steps (`short_recordings`), which
     suffices for a ranking, and returns the fit or the start, whichever has the lower cost on all samples."""
     tuning, shortened = context.tuning, shorten_recordings(context, base)
     compute_sensitivity_to_model = cache(
@@ -150,22 +150,24 @@ def put_simplest_first(
     context: SearchContext, fits_and_sums: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
     """Sort the candidates by rising error and move the preferred one to the front: among those inseparable from the
-    best, the one with the fewest parameters; if it is a force linear in another axis's motion, among equally
-    simple ones that with the smallest change of the model's own coupled parameters. At least one."""
-    ranked = sorted(fits_and_sums, key=lambda fit_and_sum: fit_and_sum[0].score.mean_log_error)
-    inseparable = [fit_and_sum for fit_and_sum in ranked if are_inseparable(ranked[0][0], fit_and_sum[0])]
-    preferred = min(inseparable, key=_count_parameters)
-    if is_coupling(preferred[1]):
-        equally_simple = [
+    best, the one with the fewest parameters; if it is a force linear in another axis's motion, among equally simple
+    ones that with the smallest change of the model's own coupled parameters. At least one."""
+    ranked_fits = sorted(fits_and_sums, key=lambda fit_and_sum: fit_and_sum[0].score.mean_log_error)
+    inseparable_fits = [
+        fit_and_sum for fit_and_sum in ranked_fits if are_inseparable(ranked_fits[0][0], fit_and_sum[0])
+    ]
+    preferred_fit = min(inseparable_fits, key=_count_parameters)
+    if is_coupling(preferred_fit[1]):
+        equally_simple_fits = [
             fit_and_sum
-            for fit_and_sum in inseparable
-            if is_coupling(fit_and_sum[1]) and _count_parameters(fit_and_sum) == _count_parameters(preferred)
+            for fit_and_sum in inseparable_fits
+            if is_coupling(fit_and_sum[1]) and _count_parameters(fit_and_sum) == _count_parameters(preferred_fit)
         ]
-        preferred = min(
-            equally_simple,
+        preferred_fit = min(
+            equally_simple_fits,
             key=lambda fit_and_sum: sum_squared_coupling_deviations(context.tuning, fit_and_sum[0].fitted),
         )
-    return [preferred, *(fit_and_sum for fit_and_sum in ranked if fit_and_sum is not preferred)]
+    return [preferred_fit, *(fit_and_sum for fit_and_sum in ranked_fits if fit_and_sum is not preferred_fit)]
 
 
 def _count_parameters(fit_and_sum: tuple[FittedCandidate, Sum]) -> int:

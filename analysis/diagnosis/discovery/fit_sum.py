@@ -27,12 +27,12 @@ from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 _DIFFERENCE_STEP, _FREQUENCY_DIFFERENCE_STEP = 1e-3, 1e-5
-"""Steps of the finite differences, absolute or relative (`_shift_parameter`); chosen. The factor of time, a frequency,
-has the smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
+"""Steps of the finite differences, absolute or relative (`_shift_parameter`); chosen by hand. The factor of time, a
+frequency, has the smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
 _MOST_GAUSS_NEWTON_STEPS = 8
-"""Largest number of Gauss-Newton steps; chosen."""
+"""Largest number of Gauss-Newton steps; chosen by hand."""
 _LEAST_DECREASE = 1e-3
-"""Relative decrease of the cost below which a step is the last; chosen."""
+"""Relative decrease of the cost below which a step is the last; chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,20 +82,20 @@ def fit_sum(model_equations: NormalEquations, terms: Sequence[Term]) -> Sum | No
     equations of the model's own parameters and the constant. None where a term is not finite at its starting
     parameters."""
     view = model_equations.view
-    evaluated = _EvaluatedTerms(tuple(terms), *_compute_term_columns(view, terms))
-    if evaluated.columns is None:
+    evaluated_terms = _EvaluatedTerms(tuple(terms), *_compute_term_columns(view, terms))
+    if evaluated_terms.columns is None:
         return None
-    solution = _solve_columns(model_equations, evaluated.columns)
+    solution = _solve_columns(model_equations, evaluated_terms.columns)
     for _ in range(_MOST_GAUSS_NEWTON_STEPS if any(term.numbers for term in terms) else 0):
-        next_step = _take_gauss_newton_step(model_equations, evaluated, solution)
+        next_step = _take_gauss_newton_step(model_equations, evaluated_terms, solution)
         if next_step is None:
             break
         decrease = 1 - next_step[1].cost / solution.cost
-        evaluated, solution = next_step
+        evaluated_terms, solution = next_step
         if decrease < _LEAST_DECREASE:
             break
-    assert evaluated.columns is not None
-    return _score_sum(model_equations, evaluated.terms, evaluated.columns, solution)
+    assert evaluated_terms.columns is not None
+    return _score_sum(model_equations, evaluated_terms.terms, evaluated_terms.columns, solution)
 
 
 def fit_constant(view: View) -> Sum | None:
@@ -139,7 +139,11 @@ def _compute_term_columns(view: View, terms: Sequence[Term]) -> tuple[tuple[Floa
     """Compute the second field of `_EvaluatedTerms`, as a tuple of length one: the columns of all terms; None where one
     is not finite."""
     columns = [compute_term_column(view, term) for term in terms]
-    return (None if any(column is None for column in columns) else tuple(c for c in columns if c is not None),)
+    return (
+        None
+        if any(column is None for column in columns)
+        else tuple(finite_column for finite_column in columns if finite_column is not None),
+    )
 
 
 def _solve_columns(model_equations: NormalEquations, columns: Sequence[FloatArray]) -> Solution:

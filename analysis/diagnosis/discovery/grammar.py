@@ -22,7 +22,8 @@ Columns = Mapping[str, FloatArray]
 and commands fx, … of the axes, readings ax, … of the response channels, time t."""
 AXES = "xyz"
 """Letters of the first three axes in the names of signals; further axes are not searched."""
-_SIGNAL = re.compile(rf"\b(?:(?:v|f|a|dv)?[{AXES}]|t)\b")
+_SIGNAL_PATTERN = re.compile(rf"\b(?:(?:v|f|a|dv)?[{AXES}]|t)\b")
+"""Pattern of a signal's name in a formula."""
 CONSTANT = "1"
 """Shape of a constant force."""
 
@@ -49,7 +50,7 @@ class Term:
     @property
     def variables(self) -> frozenset[str]:
         """Signals in the formula, by the names of `Columns`."""
-        return frozenset(_SIGNAL.findall(self.shape))
+        return frozenset(_SIGNAL_PATTERN.findall(self.shape))
 
 
 def format_odd_power(signal_name: str, parameter_index: int) -> str:
@@ -63,11 +64,9 @@ def format_even_power(signal_name: str, parameter_index: int) -> str:
 
 
 POWER_BOUNDS = (0.15, 6.0)
-"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop. By hand."""
-
-
+"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop. Chosen by hand."""
 STATIC_EXCESS_BOUNDS = (0.02, 20.0)
-"""Bounds of the excess of static over sliding friction, relative to the latter. By hand."""
+"""Bounds of the excess of static over sliding friction, relative to the latter. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,12 +109,12 @@ def measure_axes(columns: Columns, axis_count: int) -> tuple[Axis, ...]:
 
 def list_terms(axes: Sequence[Axis], axis_index: int, duration_s: float, rate_hz: float) -> tuple[Term, ...]:
     """List all terms of a force along one axis, except the periodic ones (`periodic_terms`). axes: from `measure_axes`.
-    axis_index: the force's axis. duration_s, rate_hz: length and sample rate of the recording."""
+    axis_index: the force's axis. duration_s, rate_hz: duration (s) and sample rate (Hz) of the recording."""
     own_axis, other_axes = axes[axis_index], [axis for index, axis in enumerate(axes) if index != axis_index]
     terms = (
         *_generate_power_terms(own_axis), *_generate_product_terms(own_axis), *_generate_hinge_terms(own_axis),
         *_generate_saturation_terms(own_axis), *_generate_pole_terms(own_axis),
-        *_generate_memory_terms(own_axis, other_axes, duration_s, rate_hz),
+        *_generate_memory_terms(own_axis, duration_s, rate_hz),
         *_generate_cross_axis_terms(own_axis, other_axes), *_generate_drift_terms(own_axis),
         *_generate_inertia_terms(own_axis, other_axes),
     )  # fmt: skip
@@ -136,11 +135,14 @@ def _generate_power_terms(axis: Axis) -> Iterator[Term]:
 def _generate_product_terms(axis: Axis) -> Iterator[Term]:
     """Generate products of powers of position and velocity, of a power of position with dry friction, and of a power of
     position or velocity with the command or its magnitude."""
-    for (x_power, v_power), x_exponent, v_exponent in product(
+    for (format_x_power, format_v_power), x_exponent, v_exponent in product(
         product((format_odd_power, format_even_power), (format_odd_power, format_even_power)), (1.0, 2.0), (1.0, 2.0)
     ):
         yield Term(
-            f"{x_power(axis.x, 0)}*{v_power(axis.v, 1)}", (x_exponent, v_exponent), (POWER_BOUNDS, POWER_BOUNDS), (0, 1)
+            f"{format_x_power(axis.x, 0)}*{format_v_power(axis.v, 1)}",
+            (x_exponent, v_exponent),
+            (POWER_BOUNDS, POWER_BOUNDS),
+            (0, 1),
         )
     for format_power, exponent in product((format_odd_power, format_even_power), (1.0, 2.0)):
         yield Term(f"{format_power(axis.x, 0)}*sign({axis.v})", (exponent,), (POWER_BOUNDS,), (0,))
@@ -201,9 +203,11 @@ def _generate_saturation_terms(axis: Axis) -> Iterator[Term]:
 def generate_soft_limit_terms(signal_name: str, largest: float) -> Iterator[Term]:
     """Generate soft limits of a command or a reading, minus the signal itself, so that small signals are unchanged: no
     parameter of the model could compensate for a gain. largest: magnitude of the signal, in its unit."""
-    for limit, share in product(("tanh({0}/p0)*p0", "atan({0}/p0)*p0", "{0}/(1 + abs({0})/p0)"), (0.2, 0.5, 1.0, 2.0)):
+    for limit_text, share in product(
+        ("tanh({0}/p0)*p0", "atan({0}/p0)*p0", "{0}/(1 + abs({0})/p0)"), (0.2, 0.5, 1.0, 2.0)
+    ):
         yield Term(
-            f"({limit.format(signal_name)} - {signal_name})", (share * largest,), ((1e-2 * largest, 20 * largest),)
+            f"({limit_text.format(signal_name)} - {signal_name})", (share * largest,), ((1e-2 * largest, 20 * largest),)
         )
 
 
@@ -219,18 +223,20 @@ def _generate_pole_terms(axis: Axis) -> Iterator[Term]:
             yield Term(shape, (share * axis.largest_position, float(power)), (pole_bounds, POWER_BOUNDS), (1,))
 
 
-def _generate_memory_terms(axis: Axis, other_axes: Sequence[Axis], duration_s: float, rate_hz: float) -> Iterator[Term]:
+def _generate_memory_terms(axis: Axis, duration_s: float, rate_hz: float) -> Iterator[Term]:
     """Generate terms with memory: first-order lags, drift of gains with a lagged square (heating), play, delays and the
     integral of the position."""
-    shortest_s, longest_s = 1 / rate_hz, duration_s
-    for time_constant_s in np.geomspace(2 * shortest_s, max(min(8.0, duration_s / 4), 4 * shortest_s), 8).tolist():
-        bounds = ((shortest_s, longest_s),)
+    sample_period_s, longest_s = 1 / rate_hz, duration_s
+    for time_constant_s in np.geomspace(
+        2 * sample_period_s, max(min(8.0, duration_s / 4), 4 * sample_period_s), 8
+    ).tolist():
+        bounds = ((sample_period_s, longest_s),)
         for signal_name in (axis.x, axis.v, axis.f):
             yield Term(f"lag({signal_name}, p0)", (time_constant_s,), bounds)
     for time_constant_s in np.geomspace(0.1, max(duration_s / 3, 0.2), 5).tolist():
         for signal_name, squared_signal in ((axis.f, axis.f), (axis.x, axis.x), (axis.v, axis.v)):
             yield Term(
-                f"{signal_name}*lag({squared_signal}**2, p0)", (time_constant_s,), ((shortest_s, 10 * longest_s),)
+                f"{signal_name}*lag({squared_signal}**2, p0)", (time_constant_s,), ((sample_period_s, 10 * longest_s),)
             )
     for share in (0.03, 0.1, 0.2, 0.4, 0.7):
         yield Term(
@@ -238,9 +244,9 @@ def _generate_memory_terms(axis: Axis, other_axes: Sequence[Axis], duration_s: f
             (share * axis.largest_position,),
             ((1e-3 * axis.largest_position, axis.largest_position),),
         )
-    for delay_s in (2 * shortest_s, 5 * shortest_s, 0.01, 0.03):
+    for delay_s in (2 * sample_period_s, 5 * sample_period_s, 0.01, 0.03):
         for signal_name in (axis.x, axis.f):
-            yield Term(f"delay({signal_name}, p0)", (delay_s,), ((0.5 * shortest_s, 0.2),))
+            yield Term(f"delay({signal_name}, p0)", (delay_s,), ((0.5 * sample_period_s, 0.2),))
     yield Term(f"integral({axis.x})")
 
 
@@ -271,15 +277,15 @@ def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> It
 
 
 def _generate_inertia_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Iterator[Term]:
-    """Generate inertia that changes with the position q as m(q) = m0 + c q or m0 + c q², by Lagrange's equation
-    m(q) dv/dt + m'(q) v²/2 = F; that of the own axis may depend on another axis's position, whose speed then enters,
-    and that of another axis on the own position."""
+    """Generate inertia that changes with the position q as m(q) = m0 + c q or m0 + c q², by Lagrange's equation m(q)
+    dv/dt + m'(q) v²/2 = F; that of the own axis may depend on another axis's position, whose speed then enters, and
+    that of another axis on the own position."""
     x, v = own_axis.x, own_axis.v
     for shape in (f"({x}*d{v} + {v}**2/2)", f"({x}**2*d{v} + {x}*{v}**2)", f"{x}*d{v}"):
         yield Term(shape)
     for other_axis in other_axes:
-        y, w = other_axis.x, other_axis.v
-        for shape in (f"({y}*d{v} + {w}*{v})", f"({y}**2*d{v} + 2*{y}*{w}*{v})", f"{x}*d{w}", f"{y}*d{w}"):
+        x2, v2 = other_axis.x, other_axis.v
+        for shape in (f"({x2}*d{v} + {v2}*{v})", f"({x2}**2*d{v} + 2*{x2}*{v2}*{v})", f"{x}*d{v2}", f"{x2}*d{v2}"):
             yield Term(shape)
 
 

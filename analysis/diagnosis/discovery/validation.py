@@ -1,10 +1,10 @@
 """Checks that a discovered law must pass before it is named; each check that fails gives a sentence.
 
-Among so many formulas, some fit any data. A law is named only where held-out stretches of another kind than the fitted
-ones confirm it (extrapolation), where its parameters agree between stretches (stability), where the same search in a
-time-shuffled force finds clearly less (negative control), where no law of other variables fits as well, no exponent is
-beyond the grammar's bounds, and the model's coupled parameters cannot imitate it. Called by `add_laws`.
-"""
+Of the many formulas that the search tries, some fit any data. A law is named only where held-out stretches of another
+kind than the fitted ones confirm it (extrapolation), where its parameters agree between stretches (stability), where
+the same search in a time-shuffled force finds clearly less (negative control), where no law of other variables fits as
+well, no exponent is beyond the grammar's bounds, and the model's coupled parameters cannot imitate it. Called by
+`add_laws`."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -58,9 +58,9 @@ def find_failed_checks(
 
 def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discovery:
     """Replace the last law by an inseparable law of the same round whose held-out error is significantly smaller, if
-    there is one: formulas that agree on the fitted data may differ on stronger commands. The
-    alternatives are few and fixed beforehand, and the chosen law must still pass all other checks. Ends early with
-    the time of the context's map."""
+    there is one: formulas that agree on the fitted data may differ on stronger commands. The alternatives are few and
+    fixed beforehand, and the chosen law must still pass all other checks. Ends early with the time of the context's
+    map."""
     last_round, best_candidate, law_count = discovery.rounds[-1], discovery.explanation.after, 1
     chosen_sum = last_round.sums[0]
     for candidate, term_sum in zip(last_round.fitted_candidates[1:], last_round.sums[1:], strict=True):
@@ -141,15 +141,15 @@ def is_confirmed_on_held_out(explanation: Explanation) -> bool:
 
 
 def _check_held_out_gain(
-    context: SearchContext, law: FittedCandidate, named_rival: tuple[FittedCandidate, str]
+    context: SearchContext, law_candidate: FittedCandidate, rival_and_name: tuple[FittedCandidate, str]
 ) -> Iterator[str]:
-    """Yield a reason where the gain over a rival (fit and name) on held-out data is unknown or not significant."""
-    gain = estimate_held_out_gain(context.full_measure, named_rival[0], law)
+    """Yield a reason where the gain over a rival on held-out data is unknown or not significant."""
+    gain = estimate_held_out_gain(context.full_measure, rival_and_name[0], law_candidate)
     if gain is None:
         yield "too little data was held out to confirm it"
     elif gain.low <= 0:
         yield (
-            f"its gain on held-out data over {named_rival[1]} is not larger than its variation between stretches of "
+            f"its gain on held-out data over {rival_and_name[1]} is not larger than its variation between stretches of "
             "the recording"
         )
 
@@ -166,21 +166,21 @@ def _check_rival_laws(context: SearchContext, discovery: Discovery, round_index:
     ]
     if not equally_good:
         return
-    law = context.with_test_score(best_candidate)
+    law_candidate = context.with_test_score(best_candidate)
     for candidate, term_sum in equally_good:
         rival = context.with_test_score(candidate)
-        gain = estimate_held_out_gain(context.full_measure, rival, law)
+        gain = estimate_held_out_gain(context.full_measure, rival, law_candidate)
         is_distinguished = gain is not None and gain.low > 0
-        if not is_distinguished and not _are_predictions_equal(discovery.explanation.retuned, law, rival):
+        if not is_distinguished and not _are_predictions_equal(discovery.explanation.retuned, law_candidate, rival):
             names = convert_sum_to_law(term_sum, context.measure.records[0].recording).variables
             yield f"a law of {' and '.join(names)} fits equally well"
 
 
-def _are_predictions_equal(retuned: FittedCandidate, law: FittedCandidate, rival: FittedCandidate) -> bool:
+def _are_predictions_equal(retuned: FittedCandidate, law_candidate: FittedCandidate, rival: FittedCandidate) -> bool:
     """Whether two laws predict the same residuals in all samples, including the held-out ones, within `SAME_LAW_SHARE`
     of the law's contribution: then they are one law in two notations, such as a relaxation of position or of speed."""
     difference_squares = law_squares = 0.0
-    residual_sets = retuned.fitted.residuals, law.fitted.residuals, rival.fitted.residuals
+    residual_sets = retuned.fitted.residuals, law_candidate.fitted.residuals, rival.fitted.residuals
     for base_residual, law_residual, rival_residual in zip(*residual_sets, strict=True):
         difference_squares += float(np.nansum((law_residual - rival_residual) ** 2))
         law_squares += float(np.nansum((law_residual - base_residual) ** 2))
@@ -191,7 +191,7 @@ def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: 
     """Whether the laws have fewer parameters than a rival (rounded exponents count) and are inseparable from it on the
     fitted data, and their held-out error is at most that of the rival, within `NOISE_ACCURACY`: the shorter of two
     equally good descriptions. Both have held-out errors. A tenth of `NOISE_ACCURACY` allows for unconverged fits."""
-    law = discovery.explanation.after
+    law_candidate = discovery.explanation.after
     sums = [
         term_sum
         for round_ in discovery.rounds
@@ -199,10 +199,10 @@ def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: 
         if term_sum is not None
     ]
     parameter_count = sum(1 + len(term.numbers) for term_sum in sums for term in term_sum.terms)
-    if parameter_count >= len(rival.fitted.hypothesis.parameters) or not are_inseparable(rival, law):
+    if parameter_count >= len(rival.fitted.hypothesis.parameters) or not are_inseparable(rival, law_candidate):
         return False
-    rival_gain = estimate_held_out_gain(context.full_measure, law, rival)
-    log_error_change = np.mean(np.log(law.score.test)) - np.mean(np.log(rival.score.test))
+    rival_gain = estimate_held_out_gain(context.full_measure, law_candidate, rival)
+    log_error_change = np.mean(np.log(law_candidate.score.test)) - np.mean(np.log(rival.score.test))
     return (
         rival_gain is not None and rival_gain.low <= 0.1 * NOISE_ACCURACY and bool(log_error_change <= NOISE_ACCURACY)
     )
@@ -217,13 +217,13 @@ def describe_held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     for record in records:
         for segment in record.recording.segments:
             samples = slice(segment.start, segment.stop)
-            description = _describe_segment(segment, record.command[samples])
-            if not description[1]:
+            excitation = _describe_excitation(segment, record.command[samples])
+            if not excitation[1]:
                 continue
             if record.test[samples].any():
-                held_out_segments.append(description)
+                held_out_segments.append(excitation)
             if (record.fit | record.choose)[samples].any():
-                fitted_segments.append(description)
+                fitted_segments.append(excitation)
     if not fitted_segments:
         return ()
     fitted_kinds, fitted_axes = {kind for kind, _, _ in fitted_segments}, {axes for _, axes, _ in fitted_segments}
@@ -233,10 +233,10 @@ def describe_held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
         (any(axes not in fitted_axes and len(axes) > 1 for _, axes, _ in held_out_segments), "axes driven together"),
         (any(kind not in fitted_kinds for kind, _, _ in held_out_segments), "another kind of command"),
     ]
-    return tuple(phrase for is_present, phrase in differences if is_present)
+    return tuple(phrase for is_different, phrase in differences if is_different)
 
 
-def _describe_segment(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
+def _describe_excitation(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
     """Return the kind of excitation, indices of the driven axes, and the largest magnitude of the command (n, m)."""
     driven_axes = np.flatnonzero(np.abs(command).max(axis=0, initial=0.0) > 0)
     return segment.kind, tuple(driven_axes.tolist()), float(np.abs(command).max(initial=0.0))

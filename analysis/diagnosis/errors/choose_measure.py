@@ -79,7 +79,7 @@ def make_measure(
     if compared == "force":
         return make_force_measure(recordings, model, None)
     records, companion_records = (
-        tuple(_leave_out_beginning(record, model) for record in observe_parts(group, model.outputs)) if group else ()
+        tuple(_exclude_transient(record, model) for record in observe_parts(group, model.outputs)) if group else ()
         for group in (recordings, companions)
     )
     floors = tuple(estimate_noise_floor(record.recording) for record in records)
@@ -149,7 +149,7 @@ def _describe_model_effects(model_effects: Sequence[PlacedEffect]) -> tuple[str,
     return (f"The given model contains these effects, which are part of every simulation: {effect_nouns}.",)
 
 
-def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
+def _exclude_transient(record: Observed, model: MechanicalModel) -> Observed:
     """Remove the samples of the initial motion from all three sets, where that motion decays soon
     (`count_samples_to_settle`)."""
     first_settled_sample = count_samples_to_settle(record, model)

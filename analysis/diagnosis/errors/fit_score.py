@@ -1,8 +1,8 @@
 """Scores of a fit: rms error over rms noise per channel, on the samples to fit, to choose and to test by.
 
 `FitScore.mean_log_error` is the criterion by which fits are compared; the functions below compute rms errors and the
-rms of the measured signals that errors are normalised by. Used by the search (`search_context`) and by the tables of
-errors (`error_table`).
+rms of the measured signals that errors are normalised by. Used by the search (`search_context` and others), by the
+confirmation of laws (`held_out_gain`), by the tables of errors (`error_table`) and by `reference`.
 """
 
 from dataclasses import dataclass
@@ -49,12 +49,12 @@ class FitScore:
 def compute_fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
     """Compute the score of residuals, per record (n, c), in units of `measure.unit`; errors are at least
     `measure.least_error`."""
-    noise_units = measure.unit / measure.noise
+    unit_per_noise = measure.unit / measure.noise
     return FitScore(
         *(
             np.maximum(
                 compute_residual_rms(measure.records, residuals, [getattr(record, role) for record in measure.records])
-                * noise_units,
+                * unit_per_noise,
                 measure.least_error,
             )
             for role in ("fit", "choose", "test")

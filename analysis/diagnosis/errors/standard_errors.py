@@ -37,6 +37,7 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
 IndexArray = npt.NDArray[np.int64]
+"""Array of indices."""
 
 STRETCH_S = 0.5
 """Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time. Chosen by
@@ -169,7 +170,7 @@ def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sen
     Scores sum to zero at the minimum, so that few clusters underestimate the variance. The larger of two estimates is
     returned: with all periods of a segment in common clusters, and with separate ones. Directions with less than 1e-12
     of the largest scaled information, undetermined up to rounding, are left out."""
-    t, is_free = len(fitted.deviations), _find_free_parameters(fitted)
+    t, is_free = len(fitted.deviations), _mask_free_parameters(fitted)
     residuals = stack_fit_residuals(measure, fitted.residuals)
     information = _add_calibration_prior(jacobian.gram * np.outer(is_free, is_free), t)
     diagonal_roots = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
@@ -186,7 +187,7 @@ def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sen
 def compute_segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:
     """Compute the jackknife standard errors over segments, (t + parameters,); None for fewer than two segments with
     samples to fit. jacobian, limit 1e-12: as in `compute_standard_errors`."""
-    residuals, is_free = stack_fit_residuals(measure, fitted.residuals), _find_free_parameters(fitted)
+    residuals, is_free = stack_fit_residuals(measure, fitted.residuals), _mask_free_parameters(fitted)
     products, scores = [], []
     for first, stop in _list_segment_ranges(measure):
         segment_columns = jacobian.select_samples(first, stop) * is_free[:, None]
@@ -222,8 +223,8 @@ def _list_segment_ranges(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
         record_start += channel_count * len(fit_samples)
 
 
-def _find_free_parameters(fitted: Fitted) -> Mask:
-    """Determine whether each parameter, (t + parameters,), is away from its bounds; always true for the model's."""
+def _mask_free_parameters(fitted: Fitted) -> Mask:
+    """Make the mask (t + parameters,) of the parameters that are not at a bound; always True for the model's."""
     point, bounds = fitted.hypothesis.point, [parameter.bounds for parameter in fitted.hypothesis.parameters]
     is_interior = [
         not np.isclose(coordinate, limits, rtol=0.0, atol=BOUND_TOLERANCE).any()
@@ -235,31 +236,31 @@ def _find_free_parameters(fitted: Fitted) -> Mask:
 def _sum_scores(measure: ErrorMeasure, jacobian: Sensitivity, residuals: FloatArray, pool_periods: bool) -> FloatArray:
     """Sum the score of each parameter (column times residual) per cluster, (t + parameters, clusters). pool_periods: as
     in `_assign_clusters`."""
-    sums: list[FloatArray] = []
+    scores_by_record: list[FloatArray] = []
     record_start = 0
     for record in measure.records:
         channel_count, clusters = record.measured.shape[1], _assign_clusters(record, pool_periods)[record.fit]
-        by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(jacobian.columns)))
+        scores_by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(jacobian.columns)))
         edges = [0, *(np.flatnonzero(np.diff(clusters)) + 1).tolist(), len(clusters)]
         for start, stop in pairwise(edges):
             if stop > start:
                 sample_range = slice(record_start + channel_count * start, record_start + channel_count * stop)
-                by_cluster[clusters[start]] += (
+                scores_by_cluster[clusters[start]] += (
                     jacobian.select_samples(sample_range.start, sample_range.stop) @ residuals[sample_range]
                 )
         record_start += channel_count * len(clusters)
-        sums.append(by_cluster)
-    return np.concatenate(sums).T
+        scores_by_record.append(scores_by_cluster)
+    return np.concatenate(scores_by_record).T
 
 
 def _assign_clusters(record: Observed, pool_periods: bool) -> IndexArray:
     """Assign each sample of a record the number of its cluster, (n,): a stretch of `STRETCH_S`. pool_periods: whether
     the same stretch of all periods of a segment is one cluster."""
     stretch_samples = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
-    sample_position = np.arange(len(record.fit))
+    folded_index = np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording) if pool_periods else ():
-        segment_samples = slice(periods.segment.start, min(periods.segment.stop, len(sample_position)))
-        sample_position[segment_samples] = (
-            periods.segment.start + (sample_position[segment_samples] - periods.segment.start) % periods.length
+        segment_samples = slice(periods.segment.start, min(periods.segment.stop, len(folded_index)))
+        folded_index[segment_samples] = (
+            periods.segment.start + (folded_index[segment_samples] - periods.segment.start) % periods.length
         )
-    return np.asarray(np.unique(sample_position // stretch_samples, return_inverse=True)[1])
+    return np.asarray(np.unique(folded_index // stretch_samples, return_inverse=True)[1])

@@ -63,9 +63,9 @@ class Tuning:
     """Standard deviations of the calibration by which a parameter may move at most."""
 
     def with_wider_bound(self) -> "Tuning":
-        """Replace the bound by `WIDER_RETUNING_BOUND`, beyond what a calibration allows. For a model that
-        was fitted to a recording of the same device with the missing physics in it: that physics biased the parameters
-        by more than the stated tolerance."""
+        """Replace the bound by `WIDER_RETUNING_BOUND`, beyond what a calibration allows. For a model that was fitted to
+        a recording of the same device with the missing physics in it: that physics biased the parameters by more than
+        the stated tolerance."""
         return replace(self, bound=WIDER_RETUNING_BOUND)
 
     def is_at_bound(self, deviations: FloatArray) -> bool:
@@ -104,7 +104,7 @@ def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuni
     relative_deviation = UNSTATED_TOLERANCE.modes if tolerance.modes is None else tolerance.modes
     assert relative_deviation is not None
     axis_deviations = [
-        _read_stated_deviation(stated_deviation, matrix[:m, :m])
+        _choose_deviation(stated_deviation, matrix[:m, :m])
         for stated_deviation, matrix in (
             (tolerance.mass_kg, modal_model.mass),
             (tolerance.damping_n_s_per_m, modal_model.damping),
@@ -147,7 +147,7 @@ class _CraigBamptonModel:
     """(modes,): natural frequencies with the driven axes held."""
 
 
-def _read_stated_deviation(deviation: float | None, axis_block: FloatArray) -> float:
+def _choose_deviation(deviation: float | None, axis_block: FloatArray) -> float:
     """Choose the standard deviation of the entries of a block (m, m) at the driven axes: as stated, else
     `UNSTATED_SHARE` of the largest diagonal entry; above 0 even where the block is 0."""
     if deviation is not None:
@@ -164,14 +164,14 @@ def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
     # Dual basis of the driven axes, so that a force along one axis moves that axis alone.
     dual_axes = driven_axes @ np.linalg.inv(driven_axes.T @ driven_axes)
     basis = dual_axes
-    frequency = np.zeros(0)
+    frequency_hz = np.zeros(0)
     if interior_basis.shape[1]:
         interior_stiffness, interior_mass = (
             interior_basis.T @ model.stiffness @ interior_basis,
             interior_basis.T @ model.mass @ interior_basis,
         )
         eigenvalues, shapes = eigh((interior_stiffness + interior_stiffness.T) / 2, interior_mass)
-        frequency = np.sqrt(np.maximum(eigenvalues, 0.0)) / (2 * np.pi)
+        frequency_hz = np.sqrt(np.maximum(eigenvalues, 0.0)) / (2 * np.pi)
         # Static deflection of the inner coordinates with the axes, so that axes and modes share no stiffness.
         static_deflection = -np.linalg.lstsq(
             interior_stiffness, interior_basis.T @ model.stiffness @ dual_axes, rcond=None
@@ -182,7 +182,7 @@ def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
     )
     # The remaining stiffness between driven axes and modes is rounding.
     stiffness[:m, m:] = stiffness[m:, :m] = 0.0
-    return _CraigBamptonModel(mass, damping, stiffness, np.linalg.inv(basis), frequency)
+    return _CraigBamptonModel(mass, damping, stiffness, np.linalg.inv(basis), frequency_hz)
 
 
 def _apply_changes(
@@ -194,9 +194,9 @@ def _apply_changes(
     frequency_change, mass_change, damping_change = changes[3 * len(axis_pairs) :].reshape(3, mode_count)
     matrices = [modal_model.mass.copy(), modal_model.damping.copy(), modal_model.stiffness.copy()]
     for matrix, matrix_changes in zip(matrices, axis_changes, strict=True):
-        for (i, j), value in zip(axis_pairs, matrix_changes, strict=True):
-            matrix[i, j] += value
-            matrix[j, i] += value if i != j else 0.0
+        for (i, j), matrix_change in zip(axis_pairs, matrix_changes, strict=True):
+            matrix[i, j] += matrix_change
+            matrix[j, i] += matrix_change if i != j else 0.0
     mass, damping, stiffness = matrices
     for k in range(mode_count):
         mode_row = m + k

@@ -45,7 +45,7 @@ class TriedStructure:
 
     kind: Kind
     error: float | None
-    """Root-mean-square error relative to the signal; None where it was refused."""
+    """Relative error (`StructureFit.error`), cross-validated or held-out; None where it was refused."""
     refusal: str
     """Reason of the refusal; empty where it was fitted."""
 
@@ -86,17 +86,17 @@ def choose_structure(
             "The structure was requested.",
             describe_remaining_error(balanced, fit),
         )
-    fits, trials = _fit_structures(balanced, recordings, on_progress)
-    if not fits:
+    structure_fits, trials = _fit_structures(balanced, recordings, on_progress)
+    if not structure_fits:
         raise StructureRefused("; ".join(f"{trial.kind}: {trial.refusal}" for trial in trials))
     if balanced is None:
-        fits_by_size = sorted(fits, key=lambda fitted: fitted.model.coordinates)
+        fits_by_size = sorted(structure_fits, key=lambda structure_fit: structure_fit.model.coordinates)
         best = (
             fits_by_size[-1] if fits_by_size[-1].error < (1 - MODES_GAIN) * fits_by_size[0].error else fits_by_size[0]
         )
         sentence = f"Structures were compared by the held-out error of a free simulation, because {no_balance_reason}."
         return ChosenStructure(best, trials, sentence, describe_remaining_error(None, best))
-    best = choose_simplest(fits)
+    best = choose_simplest(structure_fits)
     reason = (
         f"{best.kind} is the structure of fewest parameters; no structure with more parameters lowers its "
         f"cross-validated error power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %)."
@@ -107,20 +107,20 @@ def choose_structure(
 
 
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
-    """Describe the model's error in a sentence, and which regressor explains most of it. balanced: None = without
-    one."""
+    """Describe the model's error in a sentence and, where force balances were fitted (`balanced` is not None) to
+    recordings with a time axis, which regressor explains most of its power."""
     error_text = f"{100 * fit.error:.3g} % of the {fit.error_signal}"
     if balanced is None or fit.joint is None or balanced.untimed:
         return f"An error of {error_text} remains."
     motions = balanced.regressions[0].motions
-    remainders = [
-        remainder[motion.mask_valid_samples(motion.fit)]
-        for remainder, motion in zip(fit.joint.residual_forces, motions, strict=True)
+    residual_forces = [
+        residual_force[motion.mask_valid_samples(motion.fit)]
+        for residual_force, motion in zip(fit.joint.residual_forces, motions, strict=True)
     ]
     shares_by_cause = {
         cause: _compute_explained_share(
             [motion.decimate(compute_regressor(motion))[motion.mask_valid_samples(motion.fit)] for motion in motions],
-            remainders,
+            residual_forces,
         )
         for cause, compute_regressor in REMAINDER_REGRESSORS.items()
     }
@@ -130,10 +130,10 @@ def describe_remaining_error(balanced: BalancedRecordings | None, fit: Structure
     return f"An error of {error_text} remains; {100 * explained_share:.0f} % of its power is explained by {cause}."
 
 
-def _compute_explained_share(columns: Sequence[FloatArray], remainders: Sequence[FloatArray]) -> float:
-    """Compute the squared correlation of columns with the residual, the largest over the axes. Arrays (n, axes)
-    each."""
-    x, y = np.vstack(columns), np.vstack(remainders)
+def _compute_explained_share(columns: Sequence[FloatArray], residual_forces: Sequence[FloatArray]) -> float:
+    """Compute the squared correlation of columns with the residual forces, the largest over the axes. Arrays (n, axes),
+    one per motion."""
+    x, y = np.vstack(columns), np.vstack(residual_forces)
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     power_product = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
     return float(((x * y).sum(axis=0) ** 2 / power_product).max())
@@ -148,7 +148,7 @@ def _fit_structures(
         ("mass-spring", "two-mode") if balanced is None else ("massless", "motor", "mass-spring")
     )
     structure_kinds = ("motor", "mass-spring") if balanced is not None and balanced.free else structure_kinds
-    fits, trials = [], []
+    structure_fits, trials = [], []
     for structure_kind in structure_kinds:
         try:
             fit = (
@@ -159,9 +159,9 @@ def _fit_structures(
         except StructureRefused as refusal:
             trials.append(TriedStructure(structure_kind, None, str(refusal)))
             continue
-        fits.append(fit)
+        structure_fits.append(fit)
         trials.append(TriedStructure(structure_kind, fit.error, ""))
-    return fits, tuple(trials)
+    return structure_fits, tuple(trials)
 
 
 def _compare_with_two_modes(
@@ -180,24 +180,24 @@ def _compare_with_two_modes(
         return _append_trial(choice, TriedStructure("two-mode", None, str(refusal)))
     fit_recordings, test_recordings = split_fit_and_test(recordings)
     segment_lines = [
-        single_segment_lines
+        lines
         for recording_part in test_recordings or fit_recordings
-        if (single_segment_lines := compute_segment_lines(*recording_part)) is not None
+        if (lines := compute_segment_lines(*recording_part)) is not None
     ]
     band_edges_hz = [
-        float(select_bound(single_lines.frequency_hz[single_lines.excited]))
-        for single_lines in segment_lines
+        float(select_bound(lines_of_segment.frequency_hz[lines_of_segment.excited]))
+        for lines_of_segment in segment_lines
         for select_bound in (np.min, np.max)
     ]
-    simulation_rms = [
+    simulation_errors = [
         float(compute_simulation_errors(model, segment_lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
         for model in (choice.fit.model, modal_fit.model)
     ]
     comparison = (
-        f"In a free simulation the error of mass-spring is {100 * simulation_rms[0]:.3g} %, that of two-mode "
-        f"{100 * simulation_rms[1]:.3g} %."
+        f"In a free simulation the error of mass-spring is {100 * simulation_errors[0]:.3g} %, that of two-mode "
+        f"{100 * simulation_errors[1]:.3g} %."
     )
-    if simulation_rms[1] < (1 - MODES_GAIN) * simulation_rms[0]:
+    if simulation_errors[1] < (1 - MODES_GAIN) * simulation_errors[0]:
         trials = (*choice.tried, TriedStructure("two-mode", modal_fit.error, ""))
         return ChosenStructure(modal_fit, trials, comparison, describe_remaining_error(None, modal_fit))
     return _append_trial(

@@ -1,6 +1,7 @@
 """Result of fitting a starting model for a diagnosis, where the user gave none.
 
-Made by `fit_without_model` and `diagnose_values`, read by these and `study.workflows.diagnosis`.
+Made by `fit_without_model` and `diagnose_values`, read by these, `study.workflows.diagnosis` and
+`study.evaluation.real.diagnose_real`.
 """
 
 from dataclasses import dataclass

@@ -83,9 +83,9 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
     """Infer the quantity of the responses from the force balance of the first command (see the module's docstring); a
     position where the balance cannot be computed or there is no time axis (infinite band)."""
     channel_count = len(recordings[0].response.channels)
-    as_positions = [replace(_set_quantity(recording, "position"), position=None) for recording in recordings]
+    position_recordings = [replace(_set_quantity(recording, "position"), position=None) for recording in recordings]
     try:
-        motions = compute_motions(observe_parts(as_positions, channel_count))
+        motions = compute_motions(observe_parts(position_recordings, channel_count))
         regression = build_regression(motions, 0, (), turns=False)
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"
@@ -109,5 +109,5 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
 
 
 def _set_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:
-    """Set the quantity of all response channels, or one per channel."""
+    """Set the quantity of all response channels (a single name), or of each (a tuple)."""
     return replace(recording, response=replace(recording.response, quantity=quantity))

@@ -24,13 +24,13 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
-FORCES = frozenset({"force", "torque"})
+FORCE_QUANTITIES = frozenset({"force", "torque"})
 """Quantities of a measured force."""
-DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
+DRIVE_QUANTITIES = FORCE_QUANTITIES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
 """Quantities of commands that drive a motion; all other commands, such as a temperature, are conditions."""
 CONSTANT_RANGE = 1e-9
 """Range of a signal over its largest magnitude, up to which changes are rounding errors. Chosen by hand."""
-MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+MOTION_QUANTITIES = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 """Quantities of a motion: positions and their derivatives."""
 
 Recordings = tuple[Recording, ...]
@@ -59,7 +59,7 @@ def convert_to_driven_motions(
 def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
     """Move commands that drive no motion, such as temperatures and settings, to the recorded conditions."""
     command = recordings[0].command
-    condition_channels = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVES]
+    condition_channels = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVE_QUANTITIES]
     if not condition_channels or len(condition_channels) == len(command.channels):
         return recordings, ""
     kept_channels = [k for k in range(len(command.channels)) if k not in condition_channels]
@@ -78,7 +78,7 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
 def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
     """Keep only the position of an imposed motion that was recorded as position and speed."""
     command, response = recordings[0].command, recordings[0].response
-    if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
+    if not (set(command.quantities) <= MOTION_QUANTITIES and set(response.quantities) <= FORCE_QUANTITIES):
         return recordings, ""
     kept_channels = _find_lowest_derivative_channels(command)
     if len(kept_channels) == len(command.channels):
@@ -93,7 +93,10 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
     """Keep only the motions of the lowest derivative, where the responses are of several kinds."""
     signal = recordings[0].response
     quantities = set(signal.quantities)
-    if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
+    if (
+        not quantities & MOTION_QUANTITIES
+        or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1
+    ):
         return recordings, ""
     kept_channels = _find_lowest_derivative_channels(signal)
     dropped_names = [name for k, name in enumerate(signal.channels) if k not in kept_channels]
@@ -108,7 +111,7 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
 def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
     """Keep only the strongest forces, where there are more forces than imposed motions."""
     command, response = recordings[0].command, recordings[0].response
-    if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
+    if not (set(command.quantities) <= MOTION_QUANTITIES and set(response.quantities) <= FORCE_QUANTITIES):
         return recordings, ""
     motion_count = len(command.channels)
     if len(response.channels) <= motion_count:
@@ -173,7 +176,7 @@ def _inflect_verb(names: Sequence[str], singular: str) -> str:
 def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
     """Merge commands that drive the same single motion into their sum, each with its fitted gain."""
     command, response = recordings[0].command, recordings[0].response
-    if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCES:
+    if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCE_QUANTITIES:
         return recordings, ""
     try:
         gains, main_command = _fit_gains(recordings)
@@ -227,8 +230,10 @@ def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
 def _find_lowest_derivative_channels(signal: Signal) -> list[int]:
     """Find the indices of the motions with the lowest derivative, such as the positions among positions and
     velocities."""
-    # 9, above any derivative, for channels that are no motion.
-    orders = [DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTIONS else 9 for quantity in signal.quantities]
+    # Channels that are no motion get 9, above any order of derivative.
+    orders = [
+        DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTION_QUANTITIES else 9 for quantity in signal.quantities
+    ]
     return [k for k, order in enumerate(orders) if order == min(orders)]
 
 
@@ -241,10 +246,13 @@ def _select_excitation(excitation: Signal | None, command: Signal, kept_channels
 
 def _append_channels(condition: Signal | None, command: Signal, indices: Sequence[int]) -> Signal:
     """Append these channels of the command to the conditions (None = none yet)."""
-    added = command.select_channels(indices)
+    new_conditions = command.select_channels(indices)
     if condition is None:
-        return added
+        return new_conditions
     return Signal(
-        np.hstack([condition.samples, added.samples]), added.sample_rate_hz, (*condition.quantities, *added.quantities),
-        (*condition.units, *added.units), (*condition.channels, *added.channels),
-    )  # fmt: skip
+        np.hstack([condition.samples, new_conditions.samples]),
+        new_conditions.sample_rate_hz,
+        (*condition.quantities, *new_conditions.quantities),
+        (*condition.units, *new_conditions.units),
+        (*condition.channels, *new_conditions.channels),
+    )

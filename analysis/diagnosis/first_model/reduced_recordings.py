@@ -22,7 +22,7 @@ def is_reduction_needed(balances: Sequence[Balance]) -> bool:
     """Whether commands must be reduced: a balance has linear terms beyond one body per command (further motions, linear
     laws or a delay), or integrated accelerations; False where a named law is no column of the regression, because a law
     of the command acts on the whole command, not on a part. balances: at least one."""
-    if not all(law.has_column for balance in balances for law in balance.named):
+    if not all(judged_law.has_column for balance in balances for judged_law in balance.named):
         return False
     motion = balances[0].search.regression.motions[0]
     # `order` counts the time derivatives in the measurement: 2 is an acceleration, whose integrals are the motion.

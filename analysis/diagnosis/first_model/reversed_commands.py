@@ -19,7 +19,7 @@ from analysis.diagnosis.balance.regression import build_regression
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, is_free_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.data.recorded_conditions import REVERSED_CHANNELS
+from analysis.diagnosis.data.recorded_conditions import REVERSED_CHANNELS_KEY
 from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
 from equalizer.signals.recording import Recording
@@ -49,7 +49,7 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     signs = np.ones(axis_count)
     signs[reversed_axes] = -1.0
     verb = "is" if len(names) == 1 else "are"
-    added_meta = {REVERSED_CHANNELS: names}
+    added_meta = {REVERSED_CHANNELS_KEY: names}
     reversed_recordings = tuple(
         _multiply_forces(replace(recording, meta={**recording.meta, **added_meta}), is_motion_imposed, signs)
         for recording in recordings

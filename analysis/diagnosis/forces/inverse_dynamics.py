@@ -19,8 +19,8 @@ from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _NEAR_STATIC_HZ = 1e-6
-"""Frequency (Hz) by which the derivative of the inverse response at 0 Hz is computed as a finite difference. By
-hand."""
+"""Frequency (Hz) by which the derivative of the inverse response at 0 Hz is computed as a finite difference. Chosen
+by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,8 @@ def compute_band_motion(position: FloatArray, sample_rate_hz: float, band_hz: fl
     m = position.shape[1]
 
     def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 6 m, m): low pass times derivative of order 0 to 2, at the samples, then averaged over a period."""
+        """Compute (lines, 6 m, m): low pass times derivative of order 0 to 2, at the samples, then averaged over a
+        sample period."""
         derivative_factor = 2j * np.pi * frequency_hz
         averaging_gain = np.sinc(frequency_hz / sample_rate_hz)
         gains = [window_gain * derivative_factor**order for window_gain in (1.0, averaging_gain) for order in range(3)]
@@ -82,7 +83,8 @@ def compute_required_force(model: MechanicalModel, motion: BandMotion) -> Requir
     m, compute_inverse = model.inputs, make_fast_inverse_response(model, len(position), sample_rate_hz / 2)
 
     def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 4 m, m): from position to force (mean over a period), and to position and derivatives of the axes."""
+        """Compute (lines, 4 m, m): from position to force (mean over a sample period), and to position and derivatives
+        of the axes."""
         band_gain = compute_low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
         inverse = compute_inverse(frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]

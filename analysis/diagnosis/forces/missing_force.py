@@ -1,7 +1,7 @@
 """The force along each driven axis that would explain a model's residual, and the motion that it causes.
 
 Deconvolution through the model, regularised by the noise (Wiener filter): for each spectral line, with the residuals r
-and the model's transfer H from the m forces to the c channels, both in units of the noise,
+and the model's transfer H from the m forces to the c channels, both in units of the noise (`unit`),
 
     f = (H* H + diag(1 / s²))^-1 H* r        s: expected rms of the force
 
@@ -21,7 +21,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0
 """Length (s) of the zeros appended to the record: the discrete Fourier transform is periodic, and without them the
-motion at the record's end would wrap around to its start. By hand."""
+motion at the record's end would wrap around to its start. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,8 +40,9 @@ def estimate_missing_force(
     model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_rms_n: FloatArray
 ) -> MissingForce:
     """Estimate the force along each driven axis that explains the residuals (Wiener filter). residuals: (n, c), divided
-    by `unit` (c,), the rms of the noise; channels of the response, then of the position. expected_rms_n: (m,), expected
-    rms s of the force, N (N m); a larger value passes more force and more noise."""
+    by `unit` (c,), the rms of what counts as noise here (sensor noise, model error); channels of the response, then of
+    the position. expected_rms_n: (m,), expected rms s of the force, N (N m); a larger value passes more force and more
+    noise."""
     n, c = residuals.shape
     padded_length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
     transfer = compute_axis_transfer(model, sample_rate_hz, rfftfreq(padded_length, 1 / sample_rate_hz))
@@ -59,7 +60,7 @@ def estimate_missing_force(
 
 _LARGEST_CONDITION = 1e8
 """Largest condition number of the eigenvectors with which the modal form is used; beyond it, rounding errors would
-dominate, and each spectral line is solved for directly."""
+dominate, and each spectral line is solved for directly. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

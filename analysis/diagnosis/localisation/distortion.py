@@ -94,7 +94,9 @@ class Distortions:
     """Distortion by cell, and sentences on the kinds that the recording cannot show."""
 
     cells: tuple[Distortion, ...]
+    """One per channel, input, level, band and kind that the recording can show; may be empty."""
     remarks: tuple[str, ...]
+    """Sentences for the user."""
 
 
 def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
@@ -113,9 +115,7 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
         for period in settled_periods
     ]
     evaluated_periods = [
-        (period, detection)
-        for period, detection in zip(settled_periods, detection_lines, strict=True)
-        if detection is not None
+        (period, lines) for period, lines in zip(settled_periods, detection_lines, strict=True) if lines is not None
     ]
     if not evaluated_periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
@@ -178,11 +178,11 @@ def _compute_distortions(
         distortion_power = compute_excess_power(power[is_detection], noise_power[is_detection], degrees_of_freedom)
         excess_by_kind.append((kind, distortion_power, reached_lines / is_detection.sum(), int(is_detection.sum())))
     if spectrum.count > 1:
-        # Each line has count - 1 independent differences between periods, whose mean square is `spread`; the sum over
-        # them is divided by count - 1 again below.
-        spreads = np.repeat(spectrum.period_variance[in_band, channel], spectrum.count - 1)
+        # Each line has count - 1 independent differences between periods, whose mean square is the variance; the sum
+        # over them is divided by count - 1 again below.
+        period_variances = np.repeat(spectrum.period_variance[in_band, channel], spectrum.count - 1)
         distortion_power = compute_excess_power(
-            spreads,
+            period_variances,
             np.repeat(spectrum.noise_variance[in_band, channel], spectrum.count - 1),
             float(spectrum.noise_freedom[channel]),
         )

@@ -86,11 +86,10 @@ def _compute_trend(group_key: tuple[str, str, str, Band, bool, Kind], cells: Seq
 def _estimate_slope(
     levels: FloatArray, relative_db: FloatArray, line_counts: FloatArray, is_significant: Mask
 ) -> float | None:
-    """Estimate the slope in dB per doubling of the level; None where nothing is significant, a
-    level is not above 0, or fewer than two levels can be compared. Where the distortion is not
-    significant at a level, the detection limit takes its place, and bounds the slope: from below at the lowest level,
-    from above at the highest. A bound that does not show a trend is not used: the slope is then that of the significant
-    levels."""
+    """Estimate the slope in dB per doubling of the level; None where nothing is significant, a level is not above 0, or
+    fewer than two levels can be compared. Where the distortion is not significant at a level, the detection limit takes
+    its place, and bounds the slope: from below at the lowest level, from above at the highest. A bound that does not
+    show a trend is not used: the slope is then that of the significant levels."""
     if not is_significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
     bounded_slope = _regress_slope(np.log2(levels), relative_db, line_counts)
@@ -110,8 +109,10 @@ def _estimate_slope(
 def _regress_slope(doublings: FloatArray, relative_db: FloatArray, line_counts: FloatArray) -> float:
     """Regress the slope in dB per doubling of the level: linear regression, weighted by the number of lines. doublings:
     log2 of the levels."""
-    centred = doublings - np.average(doublings, weights=line_counts)
-    return float(np.sum(line_counts * centred * relative_db)) / float(np.sum(line_counts * centred**2))
+    centred_doublings = doublings - np.average(doublings, weights=line_counts)
+    return float(np.sum(line_counts * centred_doublings * relative_db)) / float(
+        np.sum(line_counts * centred_doublings**2)
+    )
 
 
 _LEAST_AMPLITUDE = 1e-300

@@ -2,7 +2,8 @@
 
 The power of the residual is compared with that of the noise plus an equivalence margin (noncentral F test), which
 includes the mismatch of clean recordings, if there are any. p-values are adjusted hierarchically (Benjamini and
-Bogomolov 2014). Called by `mismatch_maps`; `model_error` tests the cells against the model's error in other cells.
+Bogomolov, J. R. Stat. Soc. B 76:297, 2014). Called by `mismatch_maps`; `reference.learn_model_error` uses
+`learn_floor`.
 """
 
 from collections.abc import Hashable, Sequence
@@ -25,9 +26,9 @@ class Prediction:
     """A model's response to the recorded command; NaN where not computed."""
 
     response: FloatArray
-    """(n, p)"""
+    """(n, p), in the units of the recording."""
     position: FloatArray | None = None
-    """(n, d)"""
+    """(n, d), in the units of the recording; None = not predicted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Margin:
     """Relative model errors on clean recordings."""
 
     def compute_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Return the margin of a cell, as a share of its signal."""
+        """Compute the margin of a cell, as a share of its signal (rms)."""
         return float(np.hypot(self.share, self.learned.get_share(output, quantity, input, band_hz)))
 
 
@@ -173,15 +174,15 @@ def _compute_cell(
 
 
 def adjust_cell_p_values(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
-    """Return the cells with p-values adjusted for their number, nested by channel and band."""
+    """Adjust the p-values of the cells for their number, nested by channel and band; returns the cells with them."""
     paths = [((cell.output, cell.quantity), cell.band_hz) for cell in cells]
     p_values = adjust_nested_p_values(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
     return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, p_values, strict=True))
 
 
 def learn_floor(clean_cells: Sequence[Sequence[MismatchCell]]) -> ModelErrorFloor:
-    """Return the largest share of each cell over clean recordings and levels, times a factor that is larger for fewer
-    recordings (`ModelErrorFloor.margin_factor`). clean_cells: the cells of each recording."""
+    """Learn the floor: the largest share of each cell over clean recordings and levels, times a factor that is larger
+    for fewer recordings (`ModelErrorFloor.margin_factor`). clean_cells: the cells of each recording."""
     shares: dict[tuple[str, str, str, Band], float] = {}
     for cells in clean_cells:
         for cell in cells:

@@ -2,7 +2,8 @@
 
 Clean recordings are recordings of the same device without the fault. A mismatch of this size in the recordings to
 diagnose counts as model error, not as evidence for an effect: it is the floor of the significance test in
-`mismatch_cells`. `reference.learn_model_error` computes it.
+`mismatch_cells`. `reference.learn_model_error` computes it; `diagnose` and `search_by_simulation` hand it on, and
+`assemble_findings` describes it.
 """
 
 from collections.abc import Mapping, Sequence

@@ -23,8 +23,8 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 _WINDOW_S = 2.0
 """Length (s) of a window of a recording that has no period. Chosen by hand."""
 _LEAST_AMPLITUDE_SHARE = 0.1
-"""Least amplitude of a channel in the model error, relative to the strongest channel of the same signal.
-Chosen by hand."""
+"""Least amplitude of a channel in the model error, relative to the strongest channel of the same signal. Chosen by
+hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,10 +48,11 @@ def compute_residual_spectra(
     used: Mask | None = None,
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
-    """Compute the spectrum of each segment's mean period, or of windows of `_WINDOW_S` where nothing is periodic. None
-    without either, without known noise, or where no line is driven. used: (n,), usable samples; None = all. Segments
-    whose period differs from that of the first are left out. model_error: relative to the response (default chosen by
-    hand); counts as noise, or residuals of the re-tuned model on other axes would appear as a second force."""
+    """Compute the spectrum of each excerpt: the mean period of a segment, or a window of `_WINDOW_S` where nothing is
+    periodic. None where neither can be cut from usable samples, the noise is not known, or no line is driven. used:
+    (n,), usable samples; None = all. Segments whose period differs from that of the first are left out. model_error:
+    relative to the response (default chosen by hand); it counts as noise, because residuals of the re-tuned model on
+    other axes would else appear as a second force."""
     residuals = [recording.response.samples - prediction.response]
     channel_noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
@@ -60,15 +61,15 @@ def compute_residual_spectra(
     residual = np.hstack(residuals)
     is_usable = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
     usable_periods = (_select_usable_periods(periods, is_usable) for periods in find_settled_periods(recording))
-    segments = [periods for periods in usable_periods if periods.starts]
-    if not segments:
-        segments = _cut_windows(recording, is_usable)
-    segments = [segment for segment in segments if segment.length == segments[0].length]
-    if not segments or not floor.is_known:
+    excerpts = [periods for periods in usable_periods if periods.starts]
+    if not excerpts:
+        excerpts = _cut_windows(recording, is_usable)
+    excerpts = [excerpt for excerpt in excerpts if excerpt.length == excerpts[0].length]
+    if not excerpts or not floor.is_known:
         return None
-    lines_hz = segments[0].compute_line_frequencies(recording.sample_rate_hz)
+    lines_hz = excerpts[0].compute_line_frequencies(recording.sample_rate_hz)
     excitation = np.stack(
-        [compute_period_spectra(select_instrument_signal(recording), segment).mean(axis=0) for segment in segments]
+        [compute_period_spectra(select_instrument_signal(recording), excerpt).mean(axis=0) for excerpt in excerpts]
     )
     total_excitation = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
     detection_lines = find_detection_lines(total_excitation, compute_hold_samples(select_instrument_signal(recording)))
@@ -76,13 +77,13 @@ def compute_residual_spectra(
         return None
     first_line, last_line = np.flatnonzero(detection_lines.driven)[[0, -1]]
     driven_lines = slice(int(first_line), int(last_line) + 1)
-    spectra = np.stack([compute_period_spectra(residual, segment).mean(axis=0)[driven_lines] for segment in segments])
+    spectra = np.stack([compute_period_spectra(residual, excerpt).mean(axis=0)[driven_lines] for excerpt in excerpts])
     driven_hz = lines_hz[driven_lines]
     noise = np.stack(
-        [_compute_noise_power(channel_noises, floor.frequency_hz, driven_hz, segment) for segment in segments]
+        [_compute_noise_power(channel_noises, floor.frequency_hz, driven_hz, excerpt) for excerpt in excerpts]
     )
     noise += model_error**2 * np.stack(
-        [_compute_response_power(recording, segment, len(channel_noises) > 1)[driven_lines] for segment in segments]
+        [_compute_response_power(recording, excerpt, len(channel_noises) > 1)[driven_lines] for excerpt in excerpts]
     )
     return ResidualSpectra(driven_hz, spectra, noise, residuals[0].shape[1])
 

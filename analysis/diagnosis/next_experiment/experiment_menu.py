@@ -16,12 +16,12 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.excitation import apply_fades, make_log_sweep, make_sine
 from equalizer.signals.signal import FloatArray
 
-SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
+LOWEST_HZ, LOWEST_SHARE = 1.0, 0.1
 """Lowest frequency of sweeps: in Hz, or as a share of their usual upper end; the lower of the two. The numbers of this
 module are chosen by hand."""
-SWEEP_CYCLES, LONG_FACTOR = 8.0, 5.0
+SWEEP_CYCLES, LONG_SWEEP_FACTOR = 8.0, 5.0
 """Length of an experiment in cycles of the sweep's lowest frequency, and the factor on it for the long sweep."""
-USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
+USUAL_END_HZ, USUAL_END_SHARE, WIDE_END_SHARE = 240.0, 0.24, 0.45
 """Upper end of sweeps: in Hz, or as a share of the sample rate, the lower of the two; and that of wide sweeps, as a
 share of the sample rate, below half of it."""
 ADDED_MASS_SHARE = 0.12
@@ -51,10 +51,10 @@ class Experiment:
 def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, level: float) -> tuple[Experiment, ...]:
     """List the experiments that can be proposed. axis: index of the driven axis on which the rivals act. level: largest
     command recorded on it, above 0; no experiment exceeds it."""
-    usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
-    fastest_hz = FASTEST_SHARE * sample_rate_hz
-    slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)
-    length_s = SWEEP_CYCLES / slowest_hz
+    usual_end_hz = min(USUAL_END_HZ, USUAL_END_SHARE * sample_rate_hz)
+    wide_end_hz = WIDE_END_SHARE * sample_rate_hz
+    lowest_hz = min(LOWEST_HZ, LOWEST_SHARE * usual_end_hz)
+    length_s = SWEEP_CYCLES / lowest_hz
     fade_samples = int(_FADE_SHARE * length_s * sample_rate_hz)
     sinusoid_hz = 4.0 / length_s  # four cycles per experiment
     added_mass = ADDED_MASS_SHARE * _compute_driven_mass(model)
@@ -62,43 +62,43 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
     def drive_axis(waveform: FloatArray) -> FloatArray:
         return np.outer(apply_fades(waveform, fade_samples, fade_samples), np.arange(model.inputs) == axis)
 
-    def make_sweep(peak: float, highest_hz: float = usual_hz, length_factor: float = 1.0) -> FloatArray:
-        samples = int(length_factor * length_s * sample_rate_hz)
-        return drive_axis(make_log_sweep(slowest_hz, highest_hz, peak, samples, sample_rate_hz))
+    def make_sweep(peak: float, highest_hz: float = usual_end_hz, length_factor: float = 1.0) -> FloatArray:
+        sample_count = int(length_factor * length_s * sample_rate_hz)
+        return drive_axis(make_log_sweep(lowest_hz, highest_hz, peak, sample_count, sample_rate_hz))
 
     def make_sinusoid(peak: float) -> FloatArray:
         return drive_axis(make_sine(sinusoid_hz, peak, int(length_s * sample_rate_hz), sample_rate_hz))
 
-    sweep, wide_sweep = (f"a sweep from {slowest_hz:.3g} to {upper_hz:.3g} Hz" for upper_hz in (usual_hz, fastest_hz))
-    levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
+    sweep, wide_sweep = (f"a sweep from {lowest_hz:.3g} to {end_hz:.3g} Hz" for end_hz in (usual_end_hz, wide_end_hz))
+    level_words = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
     sweeps = (
         Experiment(f"{sweep} at {level / divisor:.3g}, {words}", make_sweep(level / divisor), "sweep")
-        for divisor, words in levels.items()
+        for divisor, words in level_words.items()
     )
-    is_stiff = _is_stiff(model, axis, slowest_hz)
+    is_stiff = _is_stiff(model, axis, lowest_hz)
     static_experiments = _list_static_experiments(sweep, level, make_sweep(level / 2), fade_samples) if is_stiff else ()
-    sinusoid_words, long_s = f"a slow sinusoid of {sinusoid_hz:.3g} Hz", LONG_FACTOR * length_s
+    sinusoid_words, long_s = f"a slow sinusoid of {sinusoid_hz:.3g} Hz", LONG_SWEEP_FACTOR * length_s
     small_sinusoid_words = f"{sinusoid_words} at {level / 10:.3g}, so small that the device hardly moves"
     long_sweep_words = f"{wide_sweep} at {level:.3g} that lasts {long_s:.3g} s"
     mass_words = _describe_added_mass(model, added_mass)
     return (
         *sweeps,
-        Experiment(f"{wide_sweep} at {level:.3g}", make_sweep(level, fastest_hz), "sweep"),
+        Experiment(f"{wide_sweep} at {level:.3g}", make_sweep(level, wide_end_hz), "sweep"),
         Experiment(f"{sinusoid_words} at {level:.3g}", make_sinusoid(level), "slow"),
         Experiment(small_sinusoid_words, make_sinusoid(level / 10), "slow"),
-        Experiment(long_sweep_words, make_sweep(level, fastest_hz, LONG_FACTOR), "sweep", minutes=1.5),
+        Experiment(long_sweep_words, make_sweep(level, wide_end_hz, LONG_SWEEP_FACTOR), "sweep", minutes=1.5),
         *static_experiments,
         Experiment(f"{sweep} at {level:.3g} with {mass_words}", make_sweep(level), "sweep", added_mass, minutes=3.0),
     )
 
 
-def _is_stiff(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
+def _is_stiff(model: MechanicalModel, axis: int, lowest_hz: float) -> bool:
     """Whether a constant force deflects the axis at most twice as far as a sinusoid of the sweep's lowest frequency:
     an axis without stiffness, or with little, would be driven away. From the static compliance b' K^-1 b and the
     dynamic one b' (M s^2 + D s + K)^-1 b, with b the axis; False where a matrix is singular or the static compliance is
     not positive."""
     input_vector = compute_driven_axes(model)[:, axis]
-    s = 2j * np.pi * slowest_hz
+    s = 2j * np.pi * lowest_hz
     try:
         static_compliance = np.linalg.solve(model.stiffness, input_vector)
         dynamic_compliance = np.linalg.solve(model.mass * s**2 + model.damping * s + model.stiffness, input_vector)
@@ -113,8 +113,8 @@ def _list_static_experiments(
     """List two experiments with a static force: a sweep about another position, and releases from deflection. sweep:
     its description. half_sweep: (n, m), the sweep at half the level."""
     axis_mask = (np.abs(half_sweep).max(axis=0) > 0).astype(np.float64)
-    samples = len(half_sweep)
-    constant_force = apply_fades(np.full(samples, level / 2), fade_samples, fade_samples)
+    sample_count = len(half_sweep)
+    constant_force = apply_fades(np.full(sample_count, level / 2), fade_samples, fade_samples)
     return (
         Experiment(
             f"{sweep} at {level / 2:.3g} in addition to a constant force of the same size, which moves the device to "
@@ -125,16 +125,16 @@ def _list_static_experiments(
         Experiment(
             f"{RELEASE_COUNT} releases: a force that grows slowly to {level:.3g}, in alternating directions, and ends "
             "abruptly",
-            np.outer(_make_release_command(level, samples), axis_mask),
+            np.outer(_make_release_command(level, sample_count), axis_mask),
             "step",
         ),
     )
 
 
-def _make_release_command(level: float, samples: int) -> FloatArray:
+def _make_release_command(level: float, max_sample_count: int) -> FloatArray:
     """Make (n,), in the command's unit: ramps up to the level, in either direction in turn, each followed by zero force
-    for as long, in which the device decays freely. n is at most `samples`."""
-    ramp_samples = samples // (2 * RELEASE_COUNT)
+    for as long, in which the device decays freely. n is at most `max_sample_count`."""
+    ramp_samples = max_sample_count // (2 * RELEASE_COUNT)
     ramp = np.append(np.linspace(0.0, level, ramp_samples), np.zeros(ramp_samples))
     signs = [1.0 if index % 2 == 0 else -1.0 for index in range(RELEASE_COUNT)]
     return np.concatenate([sign * ramp for sign in signs])

@@ -1,8 +1,8 @@
 """Complete, settled periods of a recording's periodic segments, and their spectra.
 
 Called for the noise estimate from repeated periods (`noise_floor`, `repeat_noise`), for spectra of the residual
-(`localisation`), for clusters of residuals (`standard_errors`) and by `analysis.look.repeats`.
-"""
+(`localisation`), for clusters of residuals (`standard_errors`), for shorter fits (`search.short_recordings`) and by
+`analysis.look.repeats`."""
 
 from dataclasses import dataclass
 

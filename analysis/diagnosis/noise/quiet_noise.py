@@ -47,8 +47,9 @@ class FastNoise:
 
 
 def estimate_fast_rest_noise(recording: Recording, samples: FloatArray) -> FastNoise | None:
-    """Estimate the noise from third differences in windows of 0.25 s, from 0.25 s after the end of an excitation.
-    samples: (n, channels), of the recording. None where there is no such window without gaps."""
+    """Estimate the noise from third differences in windows of `_WINDOW_S`, from `_WINDOW_S` after the end of an
+    excitation. samples: (n, channels), of the recording. None where there is no such window without gaps, or a window
+    has fewer than `_LEAST_WINDOW_SAMPLES` samples."""
     window_samples = round(_WINDOW_S * recording.sample_rate_hz)
     if window_samples < _LEAST_WINDOW_SAMPLES:
         return None
@@ -68,8 +69,8 @@ def estimate_rest_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
     """Estimate the noise at rest: density (lines, channels) at `frequency_hz`, and its degrees of freedom. None without
-    a rest of a quarter of a second (or with fewer than `_LEAST_WINDOW_SAMPLES` samples in it), or where a reading is
-    constant at rest, because an encoder's steps then hide its noise."""
+    a rest of `_WINDOW_S` (or with fewer than `_LEAST_WINDOW_SAMPLES` samples in it), or where a reading is constant at
+    rest, because an encoder's steps then hide its noise."""
     window_samples = round(_WINDOW_S * recording.sample_rate_hz)
     if window_samples < _LEAST_WINDOW_SAMPLES:
         return None
@@ -89,8 +90,9 @@ def estimate_quiet_band_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
     """Estimate a white density (lines, channels) with the power of the median line above the driven band, and its
-    degrees of freedom; None without such a band of at least `_LEAST_LINES` lines, or with a constant excitation. The
-    median excludes the lines of harmonics."""
+    degrees of freedom; None without such a band of at least `_LEAST_LINES` lines, with a constant excitation, or where
+    the longest stretch without gaps has fewer than 2 `_LEAST_LINES` samples. The median excludes the lines of
+    harmonics."""
     excitation = select_instrument_signal(recording)
     start, stop = _find_longest_run(np.hstack([samples, excitation]))
     samples, excitation_run = samples[start:stop], excitation[start:stop]

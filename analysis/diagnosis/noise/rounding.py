@@ -19,7 +19,8 @@ from equalizer.signals.signal import FloatArray
 _FOURIER_TERMS = np.arange(1, 200)
 """Terms k of the Fourier series."""
 _MAX_EXAMINED_SAMPLES, _BISECTIONS = 20_000, 40
-"""Number of samples, from the first on, in which a step is searched for; number of bisections."""
+"""Number of samples, from the first on, in which a step is searched for, to limit the computing time; number of
+bisections, each of which halves the interval."""
 _TOLERANCE = 1e-3
 """Largest deviation from multiples of a step, relative to the step: float32 storage leaves no exact multiples."""
 
@@ -56,27 +57,27 @@ def find_rounding_step(samples: FloatArray) -> float:
     return step if is_regular and len(distinct_values) < 0.5 * len(finite_samples) else 0.0
 
 
-def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
-    """Compute the total noise, rounding included. between_repeats: variance between repeats of a motion over many
-    steps. step: 0 = not rounded. Variances above step² are not corrected, because noise then blurs the saw tooth
-    completely."""
+def undo_rounding(repeat_variance: float, step: float) -> RoundedNoise:
+    """Compute the total noise, rounding included. repeat_variance: variance between repeats of a motion over many
+    steps, in the step's unit squared. step: 0 = not rounded. Variances above step² are not corrected, because noise
+    then blurs the saw tooth completely."""
     if step == 0:
-        return RoundedNoise(between_repeats, 0.0)
-    scaled_variance = between_repeats / step**2
+        return RoundedNoise(repeat_variance, 0.0)
+    scaled_variance = repeat_variance / step**2
     if scaled_variance > 1.0:
-        return RoundedNoise(between_repeats, 0.0)
+        return RoundedNoise(repeat_variance, 0.0)
     repeating = _compute_repeating_variance(_solve_variance_before_rounding(scaled_variance)) * step**2
-    return RoundedNoise(between_repeats + repeating, repeating)
+    return RoundedNoise(repeat_variance + repeating, repeating)
 
 
-def _solve_variance_before_rounding(between_repeats: float) -> float:
+def _solve_variance_before_rounding(repeat_variance: float) -> float:
     """Solve for v from the variance between repeats, both for steps of 1: bisection, as one grows with the other."""
-    low, high = 0.0, 1.0 if between_repeats > 0 else 0.0
+    low, high = 0.0, 1.0 if repeat_variance > 0 else 0.0
     for _ in range(_BISECTIONS):
         midpoint = (low + high) / 2
         low, high = (
             (midpoint, high)
-            if midpoint + 1 / 12 - _compute_repeating_variance(midpoint) < between_repeats
+            if midpoint + 1 / 12 - _compute_repeating_variance(midpoint) < repeat_variance
             else (low, midpoint)
         )
     return high
@@ -85,6 +86,6 @@ def _solve_variance_before_rounding(between_repeats: float) -> float:
 def _compute_repeating_variance(variance: float) -> float:
     """Compute the variance of the repeating part for steps of 1 (module docstring). variance: v. Without noise, the sum
     of all further terms is added."""
-    blurred = np.exp(-4 * np.pi**2 * _FOURIER_TERMS**2 * variance) / _FOURIER_TERMS**2
+    term_powers = np.exp(-4 * np.pi**2 * _FOURIER_TERMS**2 * variance) / _FOURIER_TERMS**2
     omitted_terms = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _FOURIER_TERMS**2))
-    return float((np.sum(blurred) + omitted_terms) / (2 * np.pi**2))
+    return float((np.sum(term_powers) + omitted_terms) / (2 * np.pi**2))

@@ -45,7 +45,9 @@ class _RetunedFit:
     measure: ErrorMeasure
     tuning: Tuning
     retuned: FittedCandidate
+    """The fit without effects, with its held-out error."""
     cells: tuple[MismatchCell, ...]
+    """Mismatch of that fit by channel, input, octave and level."""
     channel_shares: FloatArray
     """(c,): rms of the residual above the noise over the rms of the signal."""
 
@@ -58,8 +60,8 @@ class _RetunedFit:
         )
 
     @property
-    def signal(self) -> FloatArray:
-        """(c,): signal level, see `_compute_signal_level`."""
+    def signal_level(self) -> FloatArray:
+        """Signal level (c,), see `_compute_signal_level`."""
         return _compute_signal_level(self.measure, self.retuned.fitted.residuals)
 
 
@@ -68,14 +70,16 @@ class LearnedError:
     """A model's error on clean recordings: its size by cell, its spectrum as a whitening filter, and the recordings."""
 
     floor: ModelErrorFloor
+    """Its share of the signal, by cell and by channel."""
     whitening: WhiteningFilter
     """Filter that makes the residuals white; see the module docstring."""
     share: FloatArray
     """(c,): rms of the whitened residual over the signal's; see `_compute_signal_level`."""
     references: ReferenceRecordings
+    """The clean recordings, on which effects are fitted for comparison."""
 
     def make_noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> WhitenedMeasure:
-        """Return the error measure of the recordings to diagnose, with this residual as coloured noise."""
+        """Make the error measure of the recordings to diagnose, with this residual as coloured noise."""
         return whiten_measure(
             measure, self.whitening, self.share * _compute_signal_level(measure, measure.residuals(model, ()))
         )
@@ -104,7 +108,8 @@ def learn_model_error(
 def learn_model_floor(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> ModelErrorFloor:
-    """Return only the floor of `learn_model_error`; an empty one where the clean recordings cannot be compared."""
+    """Learn only the floor of `learn_model_error`; an empty one where the clean recordings cannot be compared, or a fit
+    is singular (LinAlgError)."""
     try:
         return learn_model_error(clean, model, diagnosed, map_, progress).floor
     except (IncomparableRecordingsError, np.linalg.LinAlgError):
@@ -134,7 +139,7 @@ def _learn_spectrum(floor: ModelErrorFloor, fits: Sequence[_RetunedFit], map_: M
     share = np.max(shares, axis=0)
     references = [
         prepare_reference_recording(
-            whiten_measure(add_learned_noise(fit.measure, floor), whitening, share * fit.signal),
+            whiten_measure(add_learned_noise(fit.measure, floor), whitening, share * fit.signal_level),
             fit.tuning,
             fit.retuned.fitted.deviations,
             map_,
@@ -145,7 +150,7 @@ def _learn_spectrum(floor: ModelErrorFloor, fits: Sequence[_RetunedFit], map_: M
 
 
 def _compute_signal_level(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
-    """Compute (c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither
+    """Compute (c,): standard deviation of the measured or the predicted signal, whichever is smaller, so that neither
     hum and drift nor a bad model increases it."""
     measured = [record.measured for record in measure.records]
     predicted = [samples - residual * measure.unit for samples, residual in zip(measured, residuals, strict=True)]
@@ -180,7 +185,7 @@ def _compute_channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> 
 
 
 def add_learned_noise(measure: ErrorMeasure, floor: ModelErrorFloor) -> ErrorMeasure:
-    """Return the measure with the learned residual counted as noise; unchanged without a learned share per channel."""
+    """Add the learned residual to the noise of a measure; unchanged without a learned share per channel."""
     return measure.with_floor(np.array(floor.channels) * _compute_signal_rms(measure)) if floor.channels else measure
 
 

@@ -1,8 +1,10 @@
 """A black-box correction as a reference for the named effects: where it predicts better, an effect is still missing.
 
-A polynomial of the commands and of the re-tuned model's prediction is added to each channel of its prediction, term by
-term, each time the one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as
-many terms per channel as the named effects have parameters. Called by `examine_fits`.
+The residual of the re-tuned model is fitted by a polynomial of the commands and of the model's prediction, channel by
+channel, with as many terms as the named effects have parameters. Terms are selected by orthogonal matching pursuit:
+the term with the largest projection of the residual, then a least-squares fit of all selected terms (Pati, Rezaiifar
+and Krishnaprasad 1993; a variant of the orthogonal least squares of Chen, Billings and Luo 1989). Called by
+`examine_fits`.
 """
 
 from collections.abc import Sequence
@@ -21,7 +23,8 @@ SELECTION_SAMPLES = 20_000
 """Most samples for the selection of terms, evenly spaced among the fit samples; the final fit uses all.
 Limits the computing time; chosen by hand."""
 _LEAST_RMS = 1e-6
-"""Least rms of a term on the samples for the selection; over all samples it is about 1. Chosen by hand."""
+"""Rms of a term on the samples for the selection (of a regressor over all samples: 1) up to which the term is not used.
+Chosen by hand."""
 _TINY = np.finfo(np.float64).tiny
 """Lower limit of a divisor, so that a signal of zeros gives zeros."""
 
@@ -29,8 +32,9 @@ _TINY = np.finfo(np.float64).tiny
 def fit_black_box(
     measure: ErrorMeasure, retuned: FittedCandidate, term_count: int, physics_error: float | None
 ) -> BlackBox | None:
-    """Fit the black box with `term_count` terms per channel, and compute its error on the test samples. physics_error:
-    that of the named effects there, as in `document.Errors`. None where that is None or nothing is held out."""
+    """Fit the black box with `term_count` terms per channel to the fit samples, and compute its error on the test
+    samples. physics_error: error of the model with the named effects on the test samples, relative to the signal
+    (`document.Errors.after`). Returns None where it is None or no sample is held out."""
     if physics_error is None or not any(record.test.any() for record in measure.records):
         return None
     fit_masks = [record.fit for record in measure.records]
@@ -47,11 +51,11 @@ def fit_black_box(
     stride = max(len(fit_regressors) // SELECTION_SAMPLES, 1)
     selection_terms = _compute_terms(fit_regressors[::stride], range(_count_terms(fit_regressors)))
     term_rms = _compute_term_rms(selection_terms)
-    selected = [_select_terms(selection_terms / term_rms, target, term_count) for target in residuals[::stride].T]
-    used_terms = sorted({term_number for term_numbers in selected for term_number in term_numbers})
+    channel_terms = [_select_terms(selection_terms / term_rms, target, term_count) for target in residuals[::stride].T]
+    used_terms = sorted({term_number for term_numbers in channel_terms for term_number in term_numbers})
     terms_matrix = _compute_terms(fit_regressors, used_terms) / term_rms[used_terms]
     weights = np.zeros((len(used_terms), residuals.shape[1]))
-    for channel, term_numbers in enumerate(selected):
+    for channel, term_numbers in enumerate(channel_terms):
         columns = [used_terms.index(term_number) for term_number in term_numbers]
         weights[columns, channel] = np.linalg.lstsq(terms_matrix[:, columns], residuals[:, channel], rcond=None)[0]
     test_errors = [
@@ -70,14 +74,14 @@ def fit_black_box(
 
 
 def _compute_term_rms(term_values: FloatArray) -> FloatArray:
-    """Compute (terms,): rms; infinite for terms that vanish where they are fitted, such as products of commands that
-    are never played together, so that they are not used elsewhere."""
+    """Compute the rms of each term (terms,); infinite up to `_LEAST_RMS`, so that a term that vanishes on the fit
+    samples, such as the product of two commands that are never played together, is 0 on all samples."""
     rms = np.sqrt(np.mean(term_values**2, axis=0))
     return np.where(rms > _LEAST_RMS, rms, np.inf)
 
 
 def _clip_to_fitted_range(regressors: list[FloatArray], fit_masks: list[Mask]) -> list[FloatArray]:
-    """Clip the regressors to their range on the fit samples: beyond it, a polynomial extrapolates badly."""
+    """Clip the regressors to their range on the fit samples, because a polynomial extrapolates badly."""
     fitted_regressors = np.vstack(
         [record_regressors[mask] for record_regressors, mask in zip(regressors, fit_masks, strict=True)]
     )
@@ -88,8 +92,8 @@ def _clip_to_fitted_range(regressors: list[FloatArray], fit_masks: list[Mask]) -
 
 
 def _make_regressors(command: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Make (n, 2 signals): commands and predictions of the previous sample, and their changes since; each with an rms
-    of 1, or 0 where it vanishes."""
+    """Make the regressors (n, 2 signals): commands and predictions at the previous sample, and their changes from it to
+    the present one; each has an rms of 1, or is 0 throughout."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
     previous_signals = np.vstack([signals[:1], signals[:-1]])
@@ -98,31 +102,31 @@ def _make_regressors(command: FloatArray, predicted: FloatArray) -> FloatArray:
 
 
 def _count_terms(regressors: FloatArray) -> int:
-    """Count the terms of `_compute_terms`: four powers of each regressor, and products of two signals."""
-    width: int = regressors.shape[1]
-    return 4 * width + len(list(combinations(range(width // 2), 2)))
+    """Count the terms of `_compute_terms`: four functions of each regressor, and products of two signals."""
+    regressor_count: int = regressors.shape[1]
+    return 4 * regressor_count + len(list(combinations(range(regressor_count // 2), 2)))
 
 
 def _compute_terms(regressors: FloatArray, term_numbers: Sequence[int]) -> FloatArray:
-    """Compute (n, terms): the terms of these numbers. regressors: (n, 2 signals). With s a regressor, number = power (2
-    signals) + index: s, s², s |s| and s³ for powers 0 to 3; then the products of two signals."""
-    width = regressors.shape[1]
-    products = list(combinations(range(width // 2), 2))
-    values = np.empty((len(regressors), len(term_numbers)))
+    """Compute the terms of these numbers, (n, terms). regressors: (n, 2 signals). Numbers count the regressors s, then
+    s², then s |s|, then s³, and then the products of two different signals at the previous sample."""
+    regressor_count = regressors.shape[1]
+    products = list(combinations(range(regressor_count // 2), 2))
+    term_values = np.empty((len(regressors), len(term_numbers)))
     for column, term_number in enumerate(term_numbers):
-        power, index = divmod(term_number, width)
-        if power < 4:
-            signal = regressors[:, index]
-            values[:, column] = signal * (1.0, signal, np.abs(signal), signal**2)[power]
+        form_index, regressor_index = divmod(term_number, regressor_count)
+        if form_index < 4:
+            signal = regressors[:, regressor_index]
+            term_values[:, column] = signal * (1.0, signal, np.abs(signal), signal**2)[form_index]
         else:
-            first_signal, second_signal = products[term_number - 4 * width]
-            values[:, column] = regressors[:, first_signal] * regressors[:, second_signal]
-    return values
+            first_signal, second_signal = products[term_number - 4 * regressor_count]
+            term_values[:, column] = regressors[:, first_signal] * regressors[:, second_signal]
+    return term_values
 
 
 def _select_terms(candidate_terms: FloatArray, target: FloatArray, term_count: int) -> list[int]:
-    """Select terms by forward selection: each time the one most correlated with the residual of the least-squares fit.
-    candidate_terms: (n, terms); target: (n,). Returns indices, in the order of selection."""
+    """Select terms by orthogonal matching pursuit: each time the one most correlated with the residual of the
+    least-squares fit. candidate_terms: (n, terms); target: (n,). Returns indices in the order of selection."""
     selected_terms: list[int] = []
     residual = target
     term_power = np.sum(candidate_terms**2, axis=0)
@@ -139,8 +143,8 @@ def _select_terms(candidate_terms: FloatArray, target: FloatArray, term_count: i
 
 
 def _normalise_error(measure: ErrorMeasure, errors: FloatArray) -> float:
-    """Compute rms error over rms signal, root mean square over channels. errors: (test samples, c), in units of the
-    measure."""
-    signal_level = np.maximum(compute_signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
-    rms = np.sqrt(np.mean(errors**2, axis=0)) * measure.unit / signal_level
-    return float(np.sqrt(np.mean(rms**2)))
+    """Compute rms error over rms signal on the test samples, root mean square over channels. errors: (test samples, c),
+    in units of `measure.unit`."""
+    signal_rms = np.maximum(compute_signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
+    relative_rms = np.sqrt(np.mean(errors**2, axis=0)) * measure.unit / signal_rms
+    return float(np.sqrt(np.mean(relative_rms**2)))

@@ -36,24 +36,26 @@ LOCALISATION_NAME = "the localisation"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Examination:
-    """Results computed from the fits after a search."""
+    """Localisation of the mismatch, curves of the named effects and black-box model, computed after a search."""
 
     evidence: tuple[Evidence, ...]
     """Residuals and motion under the re-tuned model, one entry per recording."""
     localisation: Localisation
+    """Entry point, dependence on the state, and distortion of the mismatch."""
     signatures: tuple[Signature, ...]
     """Curve of each named effect, such as its force over position, velocity or command."""
     black_box: BlackBox | None
-    """Fitted to the residuals of the re-tuned model; None without one (see `_fit_black_box`)."""
+    """Fitted to the residuals of the re-tuned model; None where band powers were compared, nothing was held out, or its
+    fit crashed."""
 
 
-def examine_fits(result: SearchResult, floor: NoiseFloor, maps: MismatchMaps) -> Examination:
-    """Localise the mismatch of the given, the re-tuned and the final model, and characterise the named effects. floor:
-    noise of the first recording. maps: mismatch maps of these three stages."""
-    context, explanation = result.context, result.found
+def examine_fits(search_result: SearchResult, noise_floor: NoiseFloor, maps: MismatchMaps) -> Examination:
+    """Localise the mismatch of the given, the re-tuned and the final model, and compute the curves of the named
+    effects. noise_floor: of the first recording. maps: mismatch maps of these three stages."""
+    context, explanation = search_result.context, search_result.found
     measure, tuning, stages = context.full_measure, context.tuning, explanation.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
-    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
+    entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], noise_floor, maps.cells["retuned"])
     entry_point = context.guard.run(LOCALISATION_NAME, "its work", entry_search, None)
     # Stages with the same fit are examined once.
     stage_by_fit = {id(fitted): stage for stage, fitted in stages.items()}
@@ -71,7 +73,7 @@ def examine_fits(result: SearchResult, floor: NoiseFloor, maps: MismatchMaps) ->
         WorkPart(
             LOCALISATION_NAME,
             "its work",
-            partial(find_distortions, measure.records[0].recording, floor),
+            partial(find_distortions, measure.records[0].recording, noise_floor),
             Distortions((), ()),
         ),
     ]
@@ -97,7 +99,8 @@ def _fit_black_box(context: SearchContext, explanation: Explanation) -> BlackBox
 
 def _compute_signatures(context: SearchContext, explanation: Explanation) -> tuple[Signature, ...]:
     """Compute the curve of each named effect: the missing force or residual of the final model without that effect, in
-    the record of `_find_main_record`; empty without named effects."""
+    the record of `_find_main_record`; empty without named effects. Of an effect with parameters per axis, the axis with
+    the largest main parameter is shown."""
     measure, tuning, fitted = context.full_measure, context.tuning, explanation.after.fitted
     if not fitted.hypothesis.claims:
         return ()
@@ -127,11 +130,11 @@ def _compute_signatures(context: SearchContext, explanation: Explanation) -> tup
 
 
 def _find_main_record(measure: ErrorMeasure) -> int:
-    """Find the index of the record with the most samples to fit or choose by, the first of equals; other records may be
-    held out entirely."""
+    """Find the index of the record with the most samples for the fit or the choice of effects, the first of equals;
+    other records may be held out entirely."""
     return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
 
 
 def _compute_strength(values: Values) -> float:
-    """Compute the strength of an effect: the magnitude of its main parameter, the first of its values."""
+    """Compute the strength of an effect: the magnitude of the first of its values, its main parameter."""
     return abs(next(iter(values.values())))

@@ -1,5 +1,4 @@
-"""Format sentences of the report for a diagnosis of backlash with impacts, which compares band powers instead of
-samples.
+"""Sentences of the report on backlash with impacts, whose diagnosis compares band powers instead of samples.
 
 Errors are rms natural logarithms of the ratio of predicted to measured amplitude (`errors.band_power`), so that
 exp(error) is the typical factor between them. Called by `wording`; the remark by `search_by_simulation`.

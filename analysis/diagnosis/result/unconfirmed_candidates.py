@@ -23,11 +23,12 @@ def list_unconfirmed_candidates(
     unconfirmed: Sequence[UnconfirmedEffect], black_box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
     """List the unconfirmed effects as candidates of the document: of each hypothesis, the claim with index
-    `UnconfirmedEffect.claim` (a negative one counts from the end).
+    `UnconfirmedEffect.claim` (a negative one counts from the end). Empty without unconfirmed effects.
 
     black_box: the fitted model without physics, for comparison; None where there is none. `share_of_black_box` of a
-    candidate is its gain relative to that of the black box or, where candidates gain more, to their largest gain. Both
-    are at most 1."""
+    candidate is its gain relative to that of the black box or, where a candidate gains more, to the largest gain of a
+    candidate. `held_out_gain` and `share_of_black_box` are limited to 1; the gains are at least 0. 1e-300
+    avoids a division by 0."""
     if not unconfirmed:
         return ()
     labels, largest_gain = (
@@ -73,8 +74,9 @@ def _compute_black_box_gain(black_box: BlackBox | None) -> float:
 def add_held_out_gains(
     effects: Sequence[NamedEffect], measure: ErrorMeasure, fits: Sequence[FittedCandidate]
 ) -> tuple[NamedEffect, ...]:
-    """Add the held-out gains with 95 % intervals to the effects, None where they are not known. effects: in the order
-    in which the search added them. fits: the fit without effects, then the fit after each added effect."""
+    """Add the held-out gains with 95 % intervals, widened to contain the gain, to the effects; None where it cannot be
+    estimated. effects: in the order in which the search added them. fits: the fit without effects, then the fit after
+    each added effect."""
     effects_with_gain = []
     for index, effect in enumerate(effects):
         gain = estimate_held_out_gain(measure, fits[index], fits[index + 1])

@@ -1,5 +1,5 @@
-"""Write sentences that doubt a unit or a sign: a channel differs from the model's prediction by a constant factor only,
-or the command is not a force.
+"""Sentences on likely errors of a unit or a sign: a channel differs from the model's prediction by a constant factor
+only, or the command is not a force.
 
 A wrong unit or reversed wiring is more likely than a device with such a response. Thresholds: `UNIT_FACTOR` on the
 ratio of amplitudes, `UNIT_CORRELATION` on the correlation coefficient. Called by `assemble_findings` and
@@ -17,12 +17,12 @@ from equalizer.plant.mechanical_model import MechanicalModel
 
 def describe_unit_doubts(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
     """Describe, in a sentence each, the channels whose measurement differs from the given model's prediction by a
-    factor of `UNIT_FACTOR` or more either way, or by its sign, while both correlate well; the factor is that of the
-    first recording that shows it."""
+    factor of at least `UNIT_FACTOR` or at most its reciprocal, or by its sign, while both correlate well
+    (`UNIT_CORRELATION`); the factor is that of the first such recording."""
     factors: dict[str, float] = {}
     for series in time_series:
         for channel, name in enumerate(series.channels):
-            factor = _compute_factor(series, channel)
+            factor = _compute_signed_ratio(series, channel)
             if factor is not None and not 1 / UNIT_FACTOR < factor < UNIT_FACTOR:
                 factors.setdefault(name, factor)
     return tuple(
@@ -32,10 +32,10 @@ def describe_unit_doubts(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
     )
 
 
-def _compute_factor(series: TimeSeries, channel: int) -> float | None:
-    """Compute the ratio of the measured to the predicted rms, both without their means, with the sign of the
-    correlation; None where the correlation is below `UNIT_CORRELATION` in magnitude, a signal is constant, or no sample
-    is finite."""
+def _compute_signed_ratio(series: TimeSeries, channel: int) -> float | None:
+    """Compute the ratio of the measured to the predicted rms, both about their means, with the sign of the correlation;
+    None where the correlation is below `UNIT_CORRELATION` in magnitude, a signal is constant or overflows, or no sample
+    of both is finite."""
     measured, predicted = series.measured[:, channel], series.before[:, channel]
     is_finite = np.isfinite(measured) & np.isfinite(predicted)
     if not is_finite.any():
@@ -43,18 +43,23 @@ def _compute_factor(series: TimeSeries, channel: int) -> float | None:
     measured_deviation, predicted_deviation = (
         signal[is_finite] - np.mean(signal[is_finite]) for signal in (measured, predicted)
     )
-    norms = (
+    deviation_norms = (
         float(np.sqrt(measured_deviation @ measured_deviation)),
         float(np.sqrt(predicted_deviation @ predicted_deviation)),
     )
     covariance = float(measured_deviation @ predicted_deviation)
-    if min(norms) == 0 or not np.isfinite(norms).all() or abs(covariance) < UNIT_CORRELATION * norms[0] * norms[1]:
+    if (
+        min(deviation_norms) == 0
+        or not np.isfinite(deviation_norms).all()
+        or abs(covariance) < UNIT_CORRELATION * deviation_norms[0] * deviation_norms[1]
+    ):
         return None
-    return float(np.copysign(norms[0] / norms[1], covariance))
+    return float(np.copysign(deviation_norms[0] / deviation_norms[1], covariance))
 
 
 def _describe_factor(factor: float) -> str:
-    """Describe the factor in words: "12 times as large and with the other sign"."""
+    """Describe the factor in words, such as "12 times as large and with the other sign"; its magnitude only from
+    `UNIT_FACTOR` on, either way."""
     magnitude = max(abs(factor), 1 / abs(factor))
     magnitude_text = f"{magnitude:.3g}" if magnitude < 100 else f"{magnitude:.0f}"
     phrases = (

@@ -17,7 +17,7 @@ from analysis.diagnosis.result.candidate_wording import (
     describe_refinements,
     format_class_noun,
 )
-from analysis.diagnosis.result.ceiling_wording import (
+from analysis.diagnosis.result.error_wording import (
     describe_black_box,
     describe_ceiling,
     describe_confirmation,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
 from analysis.diagnosis.search.compare_candidates import compare_candidates
-from analysis.diagnosis.search.no_prediction import leaves_no_predictive_power
+from analysis.diagnosis.search.no_prediction import has_unpredicted_channel
 from analysis.diagnosis.search.parsimony import are_exclusive, move_preferred_first
 from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.search.search_context import (
@@ -101,7 +101,7 @@ def compare_plausible_fits(
         [
             candidate
             for candidate in compare_candidates(context, base, fits)
-            if not leaves_no_predictive_power(context.measure, base, candidate.fitted)
+            if not has_unpredicted_channel(context.measure, base, candidate.fitted)
             and is_newest_within_data(candidate.fitted.hypothesis, evidence)
         ]
     )

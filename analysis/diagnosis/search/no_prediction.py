@@ -1,4 +1,4 @@
-"""Detects explanations without predictive power: the prediction is hardly better than a constant.
+"""Detect explanations without predictive power: their prediction is hardly better than a constant.
 
 An effect that stops the simulated device, or a low-pass filter that passes nothing, leaves the whole signal as
 residual. That can be a smaller error than that of a wrong prediction, although it explains nothing. Called by `search`,
@@ -28,10 +28,10 @@ def has_no_predictive_power(measure: ErrorMeasure, candidate: FittedCandidate) -
     )
 
 
-def leaves_no_predictive_power(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
-    """Whether the newest effect leaves no predictive power in the channel where it reduces the error most, or in a
-    channel whose sensor it acts on: a residual of at least `NO_PREDICTION_SHARE` of the signal and of
-    `NO_PREDICTION_ERROR` times the noise. Such an effect only frees the model to fit the other channels."""
+def has_unpredicted_channel(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
+    """Whether the channel in which the newest effect reduces the error most, or one whose sensor the effect acts on, is
+    not predicted: its rms residual is at least `NO_PREDICTION_SHARE` of the signal and at least `NO_PREDICTION_ERROR`
+    times the noise. Such an effect only enables the model to fit the other channels better. base: fit without it."""
     base_rms, fitted_rms = _compute_residual_rms(measure, base), _compute_residual_rms(measure, fitted)
     most_improved_channel = int(
         np.argmax(np.log(np.maximum(base_rms, _LEAST_RMS)) - np.log(np.maximum(fitted_rms, _LEAST_RMS)))

@@ -1,4 +1,4 @@
-"""Revises the effects that forward selection found: exchanges one for another, or drops one (backward elimination).
+"""Revise the effects that forward selection found: exchange one for another, or drop one (backward elimination).
 
 Forward selection chooses the first effect while that effect alone must explain the whole error, so that the choice may
 be a compromise. The first effect is therefore searched for again with the later effects kept; where another effect fits
@@ -34,7 +34,7 @@ from equalizer.effects.effect import Effect
 
 def remove_effect(context: SearchContext, explanation: Explanation, effect_index: int) -> Explanation:
     """Remove one effect from the explanation and refit the effects found after it. effect_index: in the order in which
-    they were found. Without its only effect, the explanation is the re-tuned model."""
+    they were found. After the removal of its only effect, the explanation is the re-tuned model."""
     if len(explanation.steps) == 1:
         return replace(explanation, after=explanation.retuned, steps=())
     earlier_steps, later_steps = explanation.steps[:effect_index], list(explanation.steps[effect_index + 1 :])
@@ -64,8 +64,8 @@ def remove_effect(context: SearchContext, explanation: Explanation, effect_index
 
 
 def remove_last_refitted(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Remove the last of at least two effects. The others are refitted from the values that they had with it, which may
-    lead to a smaller minimum of the cost than the one before it was added; the smaller of both is used."""
+    """Remove the last of at least two effects. The others keep the fit from before it was added, or are refitted from
+    their values in the fit with it, whichever has the smaller cost (the cost may have several minima)."""
     last_index, explanation_without_last = (
         len(explanation.steps) - 1,
         remove_effect(context, explanation, len(explanation.steps) - 1),
@@ -87,16 +87,18 @@ def remove_last_refitted(context: SearchContext, explanation: Explanation) -> Ex
 
 def _omit_effect(context: SearchContext, candidate: FittedCandidate, effect_index: int) -> FittedCandidate:
     """Remove the effect of this index from the candidate, its other values unchanged and not refitted."""
-    reduced: Hypothesis = remove_claim(candidate.fitted.hypothesis, effect_index)
-    return context.score_fit(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reduced))
+    reduced_hypothesis: Hypothesis = remove_claim(candidate.fitted.hypothesis, effect_index)
+    return context.score_fit(
+        evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reduced_hypothesis)
+    )
 
 
 def drop_unnecessary_effects(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
-    """Drop the first of at least two effects without which the others fit as well; of more than two, repeat. A later
-    effect may have made it superfluous, and the last may only have led the others out of a local minimum. Of more than
-    two effects without reference recordings, else drop the one without which the others leave the smallest error, if
-    that is as small as the noise (`is_near_noise`): no law is exact, and a third effect may only fit the remaining
-    error. Unchanged where every effect is needed, or no time is left."""
+    """Drop one of at least two effects by backward elimination: in the order of the search, the first without which the
+    others fit as well (not `is_worthwhile`), because later effects replace it; repeated until every effect is needed or
+    one remains. Where there is none, but three or more effects and no reference recordings: drop the one without which
+    the error is smallest, if that is near the noise (`is_near_noise`), because laws are inexact and a third effect may
+    only fit the remaining error. Unchanged where every effect is needed or no time is left."""
     sufficient_explanations, last_index = [], len(explanation.steps) - 1
     for effect_index in range(len(explanation.steps) if time_left() else 0):
         reduced = (
@@ -112,13 +114,17 @@ def drop_unnecessary_effects(context: SearchContext, explanation: Explanation, t
             )
         if not time_left():
             break
-    return min(sufficient_explanations, key=lambda reduced: reduced.after.score.mean_log_error, default=explanation)
+    return min(
+        sufficient_explanations,
+        key=lambda reduced: reduced.after.score.mean_log_error,
+        default=explanation,
+    )
 
 
 def drop_unconfirmed_effects(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Drop a last effect that was added to an explanation whose error was at most `EXPLAINED_ERROR` already, the error
-    of correct laws on a real device, if the held-out error is not smaller with it; repeat. The first effect stays, as
-    do all where nothing is held out or the simulation diverges."""
+    """Drop the last effect if the error before it was added was at most `EXPLAINED_ERROR`, that of correct laws on a
+    real device, and the held-out error is not smaller with it; repeated for the effect before. The first effect is
+    kept, and all are where the held-out error is infinite (nothing held out, or a diverged simulation)."""
     while len(explanation.steps) > 1 and explanation.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
         if explanation.after.held_out_error < context.with_test_score(explanation.steps[-2]).held_out_error or np.isinf(
             explanation.after.held_out_error
@@ -129,8 +135,8 @@ def drop_unconfirmed_effects(context: SearchContext, explanation: Explanation) -
 
 
 def drop_negligible_effects(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Drop last effects, but not the first, that remove less than `LAST_EFFECT_SHARE` of the mismatch, while the error
-    is above the noise and the others are still worth naming."""
+    """Drop the last effect while it removes less than `LAST_EFFECT_SHARE` of the mismatch, the error is not near the
+    noise, and the others are worth naming (`is_worth_naming`); the first effect is kept."""
     while len(explanation.steps) > 1 and not is_near_noise(explanation):
         if compute_step_shares(explanation.retuned, explanation.steps)[-1] >= LAST_EFFECT_SHARE:
             break
@@ -150,10 +156,10 @@ def exchange_first_effects(
 ) -> Explanation:
     """Exchange the first effect for one of the catalogue that fits better with the others, at most as often as there
     are effects. Unchanged where the error is small (`has_small_error`), where effects may not be changed
-    (`_may_exchange`), where no other effect fits better, or where the comparison crashes."""
+    (`_can_exchange`), where no other effect fits better, or where the comparison crashes."""
     limited_context = replace(context, map_=limit_map(context.map_, time_left))
     for _ in explanation.steps:
-        if not _may_exchange(context, explanation, time_left) or has_small_error(
+        if not _can_exchange(context, explanation, time_left) or has_small_error(
             explanation.retuned, explanation.after
         ):
             break
@@ -173,8 +179,10 @@ def _search_first_effect(
 ) -> tuple[Explanation, tuple[FittedCandidate, ...]]:
     """Search the whole catalogue for candidates in place of the first effect. Returns the explanation without that
     effect, and the candidates, the preferred one first."""
-    remaining = remove_effect(context, explanation, 0)
-    return remaining, find_next_effect(context, catalogue, remaining.steps[-1].fitted, _make_exchange_step(progress))
+    explanation_without_first = remove_effect(context, explanation, 0)
+    return explanation_without_first, find_next_effect(
+        context, catalogue, explanation_without_first.steps[-1].fitted, _make_exchange_step(progress)
+    )
 
 
 def exchange_first_for_relatives(
@@ -184,23 +192,26 @@ def exchange_first_for_relatives(
     progress: Progress,
     time_left: TimeBudget,
 ) -> Explanation:
-    """Exchange the first effect for another of its family, or a refinement, at the same site: which of them fits best
-    may show only when the second effect is known.
+    """Exchange the first effect for a related one (`list_relatives`) at the same site, because the fits of related
+    effects may differ only once the second effect is in the model.
 
-    The candidates start from the whole explanation without the first effect, whose other values are not refitted; only
-    a candidate with a smaller error than the first effect is fitted further. The first effect is among the candidates,
-    so that a refinement must gain as much as in any step.
+    The candidates start from the explanation without the first effect, the other values unchanged; only a candidate
+    with a smaller cost than the explanation is fitted further. The first effect is among the candidates, so that a
+    refinement must reduce the error by as much as in any step. Unchanged as for `exchange_first_effects`.
     """
-    family = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
-    if len(family) < 2 or not _may_exchange(context, explanation, time_left):
+    related_effects = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
+    if len(related_effects) < 2 or not _can_exchange(context, explanation, time_left):
         return explanation
     limited_context, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
     sites = explanation.steps[0].fitted.hypothesis.claims[-1].sites
 
     def compare_relatives() -> tuple[Explanation, tuple[FittedCandidate, ...]]:
+        """Compare the related effects in place of the first: as `compare_replacements` of `_exchange_first`."""
         base = _omit_effect(limited_context, last_step, 0).fitted
         evidence = gather_evidence(limited_context.measure, limited_context.tuning, base)[0]
-        first_fits = find_first_fits(limited_context, family, base, evidence, _make_exchange_step(progress), sites)
+        first_fits = find_first_fits(
+            limited_context, related_effects, base, evidence, _make_exchange_step(progress), sites
+        )
         improved_fits = [fitted for fitted in first_fits if fitted.cost < last_step.fitted.cost]
         current_candidate = _move_first_to_end(limited_context, last_step)
         ranked_candidates = move_preferred_first(
@@ -223,16 +234,17 @@ def _move_first_to_end(context: SearchContext, candidate: FittedCandidate) -> Fi
     return context.score_fit(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reordered))
 
 
-def _may_exchange(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> bool:
-    """Whether there are two or more effects that may be changed, the error is above `EXPLAINED_ERROR`, and time is
-    left."""
+def _can_exchange(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> bool:
+    """Whether two or more effects were found, none of them is fixed (certain effects, reference recordings, a search
+    that ended early, an excluded name), the error is above `EXPLAINED_ERROR`, and time is left."""
     is_fixed = context.certain or context.references is not None or explanation.ended_early or explanation.excluded_name
     is_improvable = len(explanation.steps) > 1 and explanation.after.score.worst_channel > EXPLAINED_ERROR
     return not is_fixed and is_improvable and time_left()
 
 
 def _make_exchange_step(progress: Progress) -> Step:
-    """Make the step of the work that the progress display shows for an exchange."""
+    """Make the step that the progress display shows for an exchange; 0.8: share of the search that precedes it.
+    Chosen."""
     return Step("looking again for the first effect", 0.8, progress)
 
 
@@ -241,20 +253,22 @@ def _exchange_first(
     explanation: Explanation,
     compare_replacements: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
 ) -> Explanation | None:
-    """Replace the first effect by a candidate that fits better with the other effects, which is then last in the order;
-    None where there is none, where time is out, or where the comparison crashes. compare: returns the explanation
-    without the first effect, and the candidates in its place, the preferred one first."""
+    """Replace the first effect by the preferred candidate, which becomes the last in the order. None where that
+    candidate is excluded or not worthwhile (`is_worthwhile`), the time is over, or the comparison crashes.
+    compare_replacements: returns the explanation without the first effect, and the candidates in its place, the
+    preferred one first."""
 
-    def find_exchange() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
+    def compare_within_time() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
+        """Compare the replacements; None where the time is over."""
         try:
             return compare_replacements()
         except OutOfTimeError:
             return None
 
-    comparison = context.guard.run(explanation.steps[-1].newest, "its exchange", find_exchange, None)
+    comparison = context.guard.run(explanation.steps[-1].newest, "its exchange", compare_within_time, None)
     if comparison is None:
         return None
-    remaining, ranked_candidates = comparison
+    explanation_without_first, ranked_candidates = comparison
     nameable_candidates = tuple(
         candidate for candidate in ranked_candidates if candidate.newest not in context.excluded
     )
@@ -265,10 +279,14 @@ def _exchange_first(
     ):
         return None
     # Rivals of the former first effect are not those of the effect that is first now.
-    rounds = (remaining.rounds[0][:1], *remaining.rounds[1 : len(remaining.steps)], nameable_candidates)
+    rounds = (
+        explanation_without_first.rounds[0][:1],
+        *explanation_without_first.rounds[1 : len(explanation_without_first.steps)],
+        nameable_candidates,
+    )
     return replace(
-        remaining,
+        explanation_without_first,
         after=context.with_test_score(nameable_candidates[0]),
         rounds=rounds,
-        steps=(*remaining.steps, nameable_candidates[0]),
+        steps=(*explanation_without_first.steps, nameable_candidates[0]),
     )

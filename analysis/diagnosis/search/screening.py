@@ -1,4 +1,4 @@
-"""Ranks hypotheses by the reduction of the cost that a linearised fit predicts; one simulation per hypothesis.
+"""Rank hypotheses by the reduction of the cost that a linearised fit predicts; one simulation per hypothesis.
 
 Let e be the prediction errors of the base fit, and c the change of the prediction by a hypothesis at its starting
 values, both in units of the noise. The error of a fit is approximated by e - S d - c s, linear in d, the change of the
@@ -48,15 +48,18 @@ def screen(
     model = tuning.tune(base.deviations)
     errors = stack_fit_residuals(measure, base.residuals)
 
-    def predict_cost(hypothesis: Hypothesis) -> ScreenedHypothesis:
-        combined = combine_hypotheses(base.hypothesis, hypothesis)
+    def screen_hypothesis(hypothesis: Hypothesis) -> ScreenedHypothesis:
+        """Simulate one hypothesis and predict the cost of its fit."""
+        combined_hypothesis = combine_hypotheses(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
-            changed_errors = stack_fit_residuals(measure, measure.residuals(model, combined.list_placed_effects()))
+            changed_errors = stack_fit_residuals(
+                measure, measure.residuals(model, combined_hypothesis.list_placed_effects())
+            )
         return ScreenedHypothesis(
-            combined, _predict_cost(base, jacobian, errors, errors - changed_errors, tuning.bound)
+            combined_hypothesis, _predict_cost(base, jacobian, errors, errors - changed_errors, tuning.bound)
         )
 
-    screened_hypotheses: list[ScreenedHypothesis] = list(map_(predict_cost, suggested))  # type: ignore[arg-type]
+    screened_hypotheses: list[ScreenedHypothesis] = list(map_(screen_hypothesis, suggested))  # type: ignore[arg-type]
     return tuple(sorted(screened_hypotheses, key=lambda screened: screened.cost))
 
 

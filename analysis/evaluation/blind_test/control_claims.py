@@ -2,8 +2,8 @@
 
 A recording that is shuffled or silent must give no named effect (negative control); a recording that is mirrored, or
 whose axes are exchanged, must give the corresponding answer. A claim is a predicate on the answers to a control's
-inputs (`CLAIMS`); None among the answers = the diagnosis refused or failed. `study.evaluation.challenge.controls`
-makes the inputs, `study.evaluation.bank.run_controls` runs the controls.
+inputs (`CLAIMS`); an answer is None where the diagnosis refused or failed. `study.evaluation.challenge.controls` makes
+the inputs; `study.evaluation.bank.run_controls` runs the controls and calls `judge_control`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,40 +37,40 @@ def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) ->
     return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_format_answer, answers)))
 
 
-def _is_no_effect_named(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether no effect has a probability of `NAMED_PROBABILITY` or more; None counts as no effect."""
+def _has_no_named_effect(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether no effect of any answer has a probability of `NAMED_PROBABILITY` or more; None counts as no effect."""
     return not any(
         effect.probability >= NAMED_PROBABILITY for answer in answers if answer is not None for effect in answer.effects
     )
 
 
-def _is_none_explained(answers: Sequence[Diagnosis | None]) -> bool:
+def _has_no_explained_answer(answers: Sequence[Diagnosis | None]) -> bool:
     """Whether no answer has the verdict "explained"; None counts as not explained."""
     return all(answer is None or answer.verdict != "explained" for answer in answers)
 
 
 def _has_no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether every answer finds no mismatch, or only parameters that differ; False if an answer is None."""
+    """Whether every verdict is "no_mismatch" or "parameters" (only parameters differ); False if an answer is None."""
     return all(answer is not None and answer.verdict in ("no_mismatch", "parameters") for answer in answers)
 
 
-def _are_answers_equal(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether all answers have the same verdict, effects and axes, and at least one effect; False if one is None."""
+def _has_equal_answers(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether all answers have the same verdict, effects and axes, and at least one effect; False if any is None."""
     distinct_answers = {_list_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
     return len(distinct_answers) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
-def _are_answers_equal_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
+def _has_equal_answers_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
     """Whether all answers have the same verdict and effects, and at least one effect; axes may differ. False if an
     answer is None."""
     distinct_answers = {_list_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
     return len(distinct_answers) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
-def _are_axes_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether two answers have the same verdict and effects, and each effect is on another axis in the second; False
-    where an effect has no axis."""
-    if not _are_answers_equal_but_axes(answers):
+def _has_exchanged_axes(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether two answers have the same verdict and effects, at least one, and each effect is on another axis in the
+    second; False where an effect has no axis or an answer is None. Raises ValueError for another number of answers."""
+    if not _has_equal_answers_but_axes(answers):
         return False
     first_axes, second_axes = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
     return all(
@@ -79,40 +79,41 @@ def _are_axes_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
     )
 
 
-def _have_opposite_signs(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether two answers have the same verdict, effects and axes, and the first parameter of their first effect has
-    the same magnitude (`MAGNITUDE_TOLERANCE`) and the opposite sign."""
+def _has_opposite_signs(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether the first two answers have the same verdict, effects and axes, and the first parameter of their first
+    effect has the same magnitude (`MAGNITUDE_TOLERANCE`) and the opposite sign; False if an answer is None or has no
+    effect."""
     main_parameters = [
         next(iter(answer.effects[0].parameters.values())).value for answer in answers if answer and answer.effects
     ]
-    if len(main_parameters) != len(answers) or not _are_answers_equal(answers):
+    if len(main_parameters) != len(answers) or not _has_equal_answers(answers):
         return False
     return abs(main_parameters[0] + main_parameters[1]) <= MAGNITUDE_TOLERANCE * abs(main_parameters[0])
 
 
-def _list_verdict_and_effects(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
+def _list_verdict_and_effects(answer: Diagnosis, with_axes: bool) -> tuple[object, ...]:
     """List the verdict, then each effect with its axis, or with None if `with_axes` is False; answers are compared by
     it."""
-    return diagnosis.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in diagnosis.effects)
+    return answer.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in answer.effects)
 
 
-def _format_answer(diagnosis: Diagnosis | None) -> str:
-    """Format verdict and effects, as "explained: coulomb_friction of x"."""
-    if diagnosis is None:
+def _format_answer(answer: Diagnosis | None) -> str:
+    """Format verdict and effects, such as "explained: coulomb_friction of x"; "no answer" for None."""
+    if answer is None:
         return "no answer"
     effects_text = ", ".join(
-        f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in diagnosis.effects
+        f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in answer.effects
     )
-    return diagnosis.verdict.replace("_", " ") + (f": {effects_text}" if effects_text else "")
+    return answer.verdict.replace("_", " ") + (f": {effects_text}" if effects_text else "")
 
 
 CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
-    "no name": _is_no_effect_named,
-    "not explained": _is_none_explained,
+    "no name": _has_no_named_effect,
+    "not explained": _has_no_explained_answer,
     "nothing": _has_no_mismatch,
-    "same": _are_answers_equal,
-    "same but axes": _are_answers_equal_but_axes,
-    "axis exchanged": _are_axes_exchanged,
-    "opposite": _have_opposite_signs,
+    "same": _has_equal_answers,
+    "same but axes": _has_equal_answers_but_axes,
+    "axis exchanged": _has_exchanged_axes,
+    "opposite": _has_opposite_signs,
 }
 """Predicate on the answers, by the name of the claim."""

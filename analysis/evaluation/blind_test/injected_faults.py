@@ -1,5 +1,4 @@
-"""Score the diagnosis on faults that were injected into real recordings: class of each answer, shares of correct
-answers.
+"""Score the diagnosis on faults that were injected into real recordings: class of each answer, shares of each class.
 
 `study.evaluation.real.inject_real` injects the faults and reads the outcomes; `injected_section` shows the shares in
 the report, `real_summary` in the terminal.
@@ -11,7 +10,7 @@ from typing import Any, Literal, get_args
 
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share
 
-DETECTABLE = 1.25
+LEAST_DETECTABLE_CHANGE = 1.25
 """Least factor by which a fault changes the held-out error of the device's base model, up or down, to count as
 detectable. Chosen by hand."""
 AnswerClass = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
@@ -58,11 +57,11 @@ class InjectedOutcome:
 
     @property
     def detectable(self) -> bool:
-        """Whether the fault changes the error by at least the factor `DETECTABLE`, up or down; False without a fault,
-        or where `change` is None."""
+        """Whether the fault changes the error by at least the factor `LEAST_DETECTABLE_CHANGE`, up or down; False
+        without a fault, or where `change` is None."""
         if not self.effects or self.change is None:
             return False
-        return self.change >= DETECTABLE or self.change <= 1 / DETECTABLE
+        return self.change >= LEAST_DETECTABLE_CHANGE or self.change <= 1 / LEAST_DETECTABLE_CHANGE
 
     @property
     def answer_class(self) -> AnswerClass:
@@ -93,8 +92,8 @@ class InjectedOutcome:
 
 
 def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedOutcome:
-    """Read the outcome from a sealed label and the document that the diagnosis wrote, both parsed from JSON. Raises
-    KeyError where a key of the label is missing."""
+    """Read the outcome from a sealed label and the document that the diagnosis wrote, both parsed from JSON; without a
+    diagnosis the verdict is "failed". Raises KeyError where a key of the label, or of a named effect, is missing."""
     diagnosis = answer.get("diagnosis", {})
     effects = diagnosis.get("effects", [])
     names = [effect["effect"] for effect in effects]
@@ -116,33 +115,33 @@ def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> Injecte
 
 
 def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[IntervalEstimate, ...]:
-    """Compute the shares of correct and wrong answers, with Wilson's 95 % intervals, for cases without a fault, with
-    detectable and with undetectable faults."""
-    detectable = [outcome for outcome in outcomes if outcome.detectable]
-    undetectable = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
-    faultless = [outcome for outcome in outcomes if not outcome.effects]
+    """Compute the shares of correct, misnamed and wrong answers, with Wilson's 95 % intervals: of cases without a fault
+    (correct only), with detectable faults (all three), and with undetectable ones (correct and wrong)."""
+    detectable_cases = [outcome for outcome in outcomes if outcome.detectable]
+    undetectable_cases = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
+    faultless_cases = [outcome for outcome in outcomes if not outcome.effects]
     return (
-        compute_share("nothing injected, nothing named", faultless, lambda case: case.is_correct),
-        compute_share("detectable faults named, or in the class", detectable, lambda case: case.is_correct),
+        compute_share("nothing injected, nothing named", faultless_cases, lambda case: case.is_correct),
+        compute_share("detectable faults named, or in the class", detectable_cases, lambda case: case.is_correct),
         compute_share(
             "detectable faults, another name at the right place",
-            detectable,
-            _make_class_test("other name, right place"),
+            detectable_cases,
+            _make_class_predicate("other name, right place"),
         ),
-        compute_share("detectable faults, a wrong fault named", detectable, _make_class_test("wrong")),
-        compute_share("too weak to ask for, named all the same", undetectable, lambda case: case.is_correct),
-        compute_share("too weak to ask for, a wrong fault named", undetectable, _make_class_test("wrong")),
+        compute_share("detectable faults, a wrong fault named", detectable_cases, _make_class_predicate("wrong")),
+        compute_share("too weak to ask for, named all the same", undetectable_cases, lambda case: case.is_correct),
+        compute_share("too weak to ask for, a wrong fault named", undetectable_cases, _make_class_predicate("wrong")),
     )
 
 
-def _make_class_test(answer_class: AnswerClass) -> Callable[[InjectedOutcome], bool]:
-    """Make the test whether the answer to a case is of this class."""
+def _make_class_predicate(answer_class: AnswerClass) -> Callable[[InjectedOutcome], bool]:
+    """Make the predicate whether the answer to a case is of this class."""
     return lambda case: case.answer_class == answer_class
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Counts and shares of a group of cases: of a kind of fault, or of a recording."""
+    """Counts and shares of a group of cases, such as those of one kind of fault or of one recording."""
 
     name: str
     """Name of the group."""
@@ -156,27 +155,29 @@ class Tally:
     """Share of the cases without a fault in which nothing was named."""
 
 
-def make_tallies(outcomes: Sequence[InjectedOutcome], get_key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
-    """Make the tally of each group, ordered by name. get_key: name of the group of an outcome; outcomes with an empty
-    name are left out."""
+def make_tallies(
+    outcomes: Sequence[InjectedOutcome], get_group_name: Callable[[InjectedOutcome], str]
+) -> tuple[Tally, ...]:
+    """Make the tally of each group, ordered by name. get_group_name: gives the name of an outcome's group; outcomes
+    with an empty one are left out."""
     return tuple(
-        _make_tally(name, [outcome for outcome in outcomes if get_key(outcome) == name])
-        for name in sorted({*map(get_key, outcomes)} - {""})
+        _make_tally(name, [outcome for outcome in outcomes if get_group_name(outcome) == name])
+        for name in sorted({*map(get_group_name, outcomes)} - {""})
     )
 
 
 def _make_tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
     """Make the tally of the outcomes of a group."""
-    faults = [outcome for outcome in outcomes if outcome.effects]
-    detectable = [fault for fault in faults if fault.detectable]
-    faultless = [outcome for outcome in outcomes if not outcome.effects]
+    faulty_cases = [outcome for outcome in outcomes if outcome.effects]
+    detectable_cases = [faulty_case for faulty_case in faulty_cases if faulty_case.detectable]
+    faultless_cases = [outcome for outcome in outcomes if not outcome.effects]
     counts = tuple(
-        sum(case.answer_class == answer_class for case in detectable) for answer_class in ANSWER_CLASSES[:-1]
+        sum(case.answer_class == answer_class for case in detectable_cases) for answer_class in ANSWER_CLASSES[:-1]
     )
     return Tally(
         name,
-        len(faults),
+        len(faulty_cases),
         counts,
-        compute_share(name, detectable, lambda case: case.is_correct),
-        compute_share(name, faultless, lambda case: case.is_correct),
+        compute_share(name, detectable_cases, lambda case: case.is_correct),
+        compute_share(name, faultless_cases, lambda case: case.is_correct),
     )

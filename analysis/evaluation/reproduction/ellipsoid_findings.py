@@ -16,7 +16,7 @@ MAX_COUPLING_RATIO = 1.25
 """Largest ratio of the largest to the smallest coupling that counts as "nearly the same". Chosen: the paper prints no
 number."""
 
-_DIFFERS = (
+_DIFFERENCES = (
     "The simulated device's mount was given its modes so that the coupling follows the published one over frequency: "
     "alike up to 15 Hz, most at 25 Hz, less at 35 Hz. That it does shows that the simulation is set up as intended, "
     "nothing more.",
@@ -28,18 +28,19 @@ _DIFFERS = (
 """Differences from the publication, for the report."""
 
 
-def make_ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
-    """Compare the ellipses, measured on the simulated device, with the published figure 3. results: an ellipse per
-    frequency; a finding whose frequencies are absent is left out."""
-    coupling = {
-        result.frequency_hz: result.phasor.off_axis_ratio
-        for result in results
-        if result.phasor.off_axis_ratio is not None
+def make_ellipsoid_findings(ellipsoids: Sequence[EllipsoidResult]) -> FigureFindings:
+    """Compare the ellipses, measured on the simulated device, with the published figure 3. ellipsoids: one per
+    frequency. A comparison is left out where its frequencies are absent or have no coupling (no motion along the
+    direction)."""
+    coupling_by_hz = {
+        ellipsoid.frequency_hz: ellipsoid.phasor.off_axis_ratio
+        for ellipsoid in ellipsoids
+        if ellipsoid.phasor.off_axis_ratio is not None
     }
     findings = (
-        *(_describe_coupling(result) for result in results),
-        _compare_low_frequency_coupling(coupling),
-        _compare_high_frequency_coupling(coupling),
+        *(_describe_coupling(ellipsoid) for ellipsoid in ellipsoids),
+        _compare_low_frequency_coupling(coupling_by_hz),
+        _compare_high_frequency_coupling(coupling_by_hz),
     )
     return FigureFindings(
         figure=3,
@@ -49,48 +50,50 @@ def make_ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFinding
         "to see whether coupling could explain the thresholds. Coupling is nearly the same at 5, 10 and 15 Hz, and at "
         "35 Hz it is less than at 25 Hz.",
         findings=tuple(finding for finding in findings if finding is not None),
-        differs=_DIFFERS,
+        differs=_DIFFERENCES,
     )
 
 
-def _describe_coupling(result: EllipsoidResult) -> Finding:
-    """Describe coupling and shape of the ellipse at one frequency, not compared, because the paper prints no number."""
-    ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
-    ratio_text = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
+def _describe_coupling(ellipsoid: EllipsoidResult) -> Finding:
+    """Describe coupling and shape of the ellipse at one frequency, without a comparison: the paper prints no number."""
+    coupling, axes = ellipsoid.phasor.off_axis_ratio, ellipsoid.moments.normalised_axes
+    ratio_text = "" if coupling is None else f"off the direction over along it {100 * coupling:.0f} %; "
     return Finding(
-        what=f"{result.frequency_hz:g} Hz",
+        what=f"{ellipsoid.frequency_hz:g} Hz",
         published="drawn, no number",
-        here=f"{ratio_text}mean squares: axes 1 : {axes[1]:.2f}, tilt {format_number(result.moments.tilt_deg, 0)}°",
-        value=ratio,
+        here=f"{ratio_text}mean squares: axes 1 : {axes[1]:.2f}, tilt {format_number(ellipsoid.moments.tilt_deg, 0)}°",
+        value=coupling,
         unit="1",
         as_published=None,
     )
 
 
-def _compare_low_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
+def _compare_low_frequency_coupling(coupling_by_hz: dict[float, float]) -> Finding | None:
     """Test whether coupling is nearly the same at 5, 10 and 15 Hz; None for fewer than two of these frequencies.
-    coupling: by frequency in Hz."""
-    low_frequency_coupling = [coupling[frequency_hz] for frequency_hz in (5.0, 10.0, 15.0) if frequency_hz in coupling]
+    coupling_by_hz: by frequency in Hz, > 0."""
+    low_frequency_coupling = [
+        coupling_by_hz[frequency_hz] for frequency_hz in (5.0, 10.0, 15.0) if frequency_hz in coupling_by_hz
+    ]
     if len(low_frequency_coupling) < 2:
         return None
-    largest_ratio = max(low_frequency_coupling) / min(low_frequency_coupling)
+    max_to_min_ratio = max(low_frequency_coupling) / min(low_frequency_coupling)
     return Finding(
         what="Coupling at 5, 10 and 15 Hz",
         published="nearly identical",
-        here=f"largest over smallest {largest_ratio:.2f}",
-        value=largest_ratio,
+        here=f"largest over smallest {max_to_min_ratio:.2f}",
+        value=max_to_min_ratio,
         unit="1",
-        as_published=largest_ratio <= MAX_COUPLING_RATIO,
+        as_published=max_to_min_ratio <= MAX_COUPLING_RATIO,
         rule=f"largest over smallest at most {MAX_COUPLING_RATIO:g}",
     )
 
 
-def _compare_high_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
-    """Test whether coupling at 35 Hz is less than at 25 Hz; None where either is missing. coupling: by frequency in
-    Hz."""
-    if not {25.0, 35.0} <= coupling.keys():
+def _compare_high_frequency_coupling(coupling_by_hz: dict[float, float]) -> Finding | None:
+    """Test whether coupling at 35 Hz is less than at 25 Hz; None where either is missing. coupling_by_hz: by frequency
+    in Hz, > 0."""
+    if not {25.0, 35.0} <= coupling_by_hz.keys():
         return None
-    ratio = coupling[35.0] / coupling[25.0]
+    ratio = coupling_by_hz[35.0] / coupling_by_hz[25.0]
     return Finding(
         what="Coupling at 35 Hz over that at 25 Hz",
         published="less than 1",

@@ -1,8 +1,9 @@
 """Frequency response of a device from target to delivered acceleration, for the reproduction of the published figure 5.
 
 T(f) is the ratio of the spectra of one steady period, line by line; column i belongs to a target along axis i. T is the
-identity matrix for a perfect equalizer. `study.evaluation.reproduction` measures it (`reproduce_playback`,
-`reproduce_baselines`); `equalized_findings` and `played_responses` compare and draw it.
+identity matrix for a perfect equalizer. Called by `study.evaluation.reproduction` (`reproduce_playback`,
+`reproduce_equalized`, `reproduce_baselines`), which measures T; `equalized_findings` compares it with the published
+one, and `played_responses` draws it.
 `equalizer.tracking.feedforward.quality` defines flatness, coupling and axis error.
 """
 
@@ -27,14 +28,16 @@ class PlayedResponse:
     """Measured response from target to delivered acceleration, with the conditions of its measurement."""
 
     name: str
+    """Name of the row in the document and figures."""
     device: str
+    """Name of the device model."""
     place_m: tuple[float, float, float]
     """Place of the handle in the workspace: x, y, z in m."""
     hand: bool
     """Whether a simulated hand held the handle."""
     signal: SignalKind
     frequency_hz: FloatArray
-    """(lines,)"""
+    """(lines,): frequencies of the spectral lines."""
     response: ComplexArray
     """(lines, axes, axes): T, delivered over target; the last index is the axis of the target."""
     peak_force_n: float
@@ -66,7 +69,7 @@ def mask_lines_in_band(
     band_hz: tuple[float, float], period_samples: int, sample_rate_hz: float
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Make the mask (period_samples // 2 + 1,) of the lines of a period's real FFT that lie within the band, ends
-    included."""
+    included, with a tolerance of 1e-9 Hz for rounding."""
     frequency_hz = np.fft.rfftfreq(period_samples, 1 / sample_rate_hz)
     return np.asarray((frequency_hz >= band_hz[0] - 1e-9) & (frequency_hz <= band_hz[1] + 1e-9))
 
@@ -78,26 +81,26 @@ def estimate_response(
     period_samples), the signal of each axis, played one axis at a time. delivered: for each of these, one steady period
     (period_samples, axes)."""
     period_samples = target.shape[1]
-    in_band = mask_lines_in_band(band_hz, period_samples, sample_rate_hz)
+    is_in_band = mask_lines_in_band(band_hz, period_samples, sample_rate_hz)
     columns = [
-        np.fft.rfft(delivered_period, axis=0)[in_band] / np.fft.rfft(wave)[in_band][:, None]
+        np.fft.rfft(delivered_period, axis=0)[is_in_band] / np.fft.rfft(wave)[is_in_band][:, None]
         for wave, delivered_period in zip(target, delivered, strict=True)
     ]
-    frequency_hz = np.asarray(np.fft.rfftfreq(period_samples, 1 / sample_rate_hz)[in_band], dtype=np.float64)
+    frequency_hz = np.asarray(np.fft.rfftfreq(period_samples, 1 / sample_rate_hz)[is_in_band], dtype=np.float64)
     return frequency_hz, np.stack(columns, axis=2)
 
 
 def normalise_gain(response: ComplexArray) -> ComplexArray:
-    """Divide the response by the geometric mean of its diagonal gains over all lines and axes, an error that a static
-    gain would correct."""
+    """Divide the response by the geometric mean of its diagonal gains over all lines and axes: the deviation from 1 of
+    this mean could be corrected by a static gain."""
     diagonal = np.abs(np.einsum("lii->li", response))
     normalised: ComplexArray = response / np.exp(np.log(diagonal).mean())
     return normalised
 
 
 def compute_coupling_db(response: ComplexArray) -> FloatArray:
-    """Compute (lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst target axis i; at least -240 dB,
-    so that the logarithm of no coupling is finite."""
+    """Compute the coupling in dB (lines,): the largest |T_ji| / |T_ii| with j != i, over all target axes i; at least
+    -240 dB (1e-12), so that the logarithm of 0 is finite."""
     diagonal = np.abs(np.einsum("lii->li", response))
     off_diagonal = np.abs(response) * (1 - np.eye(response.shape[1]))
     coupling_db: FloatArray = 20 * np.log10(np.maximum((off_diagonal.max(axis=1) / diagonal).max(axis=1), 1e-12))
@@ -110,11 +113,11 @@ def make_played_row(playback: PlayedResponse) -> PlayedRow:
     quality = measure_quality(playback.response)
     axis_count = playback.response.shape[1]
     error = np.sqrt((np.abs(playback.response - np.eye(axis_count)) ** 2).sum() / (axis_count * len(playback.response)))
-    x, y, z = (1000 * coordinate_m for coordinate_m in playback.place_m)
+    x_mm, y_mm, z_mm = (1000 * coordinate_m for coordinate_m in playback.place_m)
     return PlayedRow(
         name=playback.name,
         device=playback.device,
-        place_mm=(x, y, z),
+        place_mm=(x_mm, y_mm, z_mm),
         hand=playback.hand,
         signal=playback.signal,
         flatness_db=quality.flatness_db,

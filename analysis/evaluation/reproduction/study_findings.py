@@ -2,7 +2,7 @@
 
 Group means are compared pairwise with simultaneous p-values (Tukey-Kramer, `PairDifference`). Thresholds are force
 amplitudes in N, and those at the cap are censored. The limit of direction perception follows `LIMIT_RULE`. Called by
-`write_reproduction`.
+`study.evaluation.reproduction.write_reproduction`; `response_findings` quotes `LIMIT_RULE`.
 """
 
 from dataclasses import dataclass
@@ -39,13 +39,13 @@ _DIFFERENCES = (
 
 
 @dataclass(frozen=True, slots=True)
-class _Means:
-    """Access to the study's means, comparisons and censored thresholds by frequency."""
+class _ThresholdSummary:
+    """Means, pairwise comparisons and censored thresholds of a study, by frequency."""
 
     analysis: StudyAnalysis
 
     def compute_mean(self, frequency_hz: float) -> float | None:
-        """Compute the group mean of the thresholds in N; None where no run was completed."""
+        """Compute the group mean of the thresholds in N; None where no run was completed at this frequency."""
         thresholds_n = [
             threshold_n
             for threshold_n in self.analysis.table.group_by_frequency().get(format_frequency(frequency_hz), ())
@@ -69,12 +69,13 @@ class _Means:
 
 
 def find_direction_limit(analysis: StudyAnalysis) -> float | None:
-    """Find the limit of direction perception (Hz) by `LIMIT_RULE`; None where no tested frequency fulfils it."""
-    means = _Means(analysis)
+    """Find the limit of direction perception (Hz) by `LIMIT_RULE`; None where no tested frequency fulfils it. Raises
+    ValueError where no frequency was tested."""
+    summary = _ThresholdSummary(analysis)
     lowest_hz, *higher_hz = analysis.table.frequencies_hz
     for frequency_hz in higher_hz:
-        pair = means.find_pair(lowest_hz, frequency_hz)
-        if pair is not None and pair.difference > 0 and pair.p < SIGNIFICANT_P and means.count_censored(frequency_hz):
+        pair = summary.find_pair(lowest_hz, frequency_hz)
+        if pair is not None and pair.difference > 0 and pair.p < SIGNIFICANT_P and summary.count_censored(frequency_hz):
             return frequency_hz
     return None
 
@@ -82,15 +83,17 @@ def find_direction_limit(analysis: StudyAnalysis) -> float | None:
 def make_study_findings(analysis: StudyAnalysis) -> FigureFindings:
     """Make the findings on the published figure 2: means, differences and censoring of the thresholds over
     frequency."""
-    means = _Means(analysis)
+    summary = _ThresholdSummary(analysis)
     tested_hz = analysis.table.frequencies_hz
     findings = [
-        *(_find_mean_threshold(means, frequency_hz) for frequency_hz in tested_hz),
-        _find_rise(means, 5.0, 15.0, "apparently up, not significant with ten participants", significant=False),
-        _find_rise(means, 15.0, 25.0, "apparently up, not significant", significant=False),
-        _find_rise(means, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", significant=True),
-        _find_censoring(means, analysis),
-        _find_similarity(means),
+        *(_make_mean_finding(summary, frequency_hz) for frequency_hz in tested_hz),
+        _make_rise_finding(
+            summary, 5.0, 15.0, "apparently up, not significant with ten participants", published_as_significant=False
+        ),
+        _make_rise_finding(summary, 15.0, 25.0, "apparently up, not significant", published_as_significant=False),
+        _make_rise_finding(summary, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", published_as_significant=True),
+        _make_censoring_finding(summary, analysis),
+        _make_similarity_finding(summary),
     ]
     return FigureFindings(
         figure=2,
@@ -106,11 +109,11 @@ def make_study_findings(analysis: StudyAnalysis) -> FigureFindings:
     )
 
 
-def _find_mean_threshold(means: _Means, frequency_hz: float) -> Finding:
-    """Find the mean threshold (N) at one frequency, compared with nothing, because the paper prints no number."""
-    mean_threshold_n, censored_count = means.compute_mean(frequency_hz), means.count_censored(frequency_hz)
+def _make_mean_finding(summary: _ThresholdSummary, frequency_hz: float) -> Finding:
+    """Make the finding on the mean threshold (N) at one frequency, without a comparison: the paper prints no number."""
+    mean_threshold_n, censored_count = summary.compute_mean(frequency_hz), summary.count_censored(frequency_hz)
     censored_text = (
-        f", {censored_count} of {len(means.analysis.table.subjects)} thresholds cut by the cap"
+        f", {censored_count} of {len(summary.analysis.table.subjects)} thresholds cut by the cap"
         if censored_count
         else ""
     )
@@ -124,34 +127,37 @@ def _find_mean_threshold(means: _Means, frequency_hz: float) -> Finding:
     )
 
 
-def _find_rise(means: _Means, low_hz: float, high_hz: float, published: str, significant: bool) -> Finding | None:
-    """Find whether the mean rises between two frequencies, with the published significance at
-    `SIGNIFICANT_P`; None where means or comparison are missing."""
+def _make_rise_finding(
+    summary: _ThresholdSummary, low_hz: float, high_hz: float, published: str, published_as_significant: bool
+) -> Finding | None:
+    """Make the finding on the rise of the mean between two frequencies: as published where it rises and its
+    significance at `SIGNIFICANT_P` is the published one. None where a mean or the comparison is missing."""
     pair, low_mean_n, high_mean_n = (
-        means.find_pair(low_hz, high_hz),
-        means.compute_mean(low_hz),
-        means.compute_mean(high_hz),
+        summary.find_pair(low_hz, high_hz),
+        summary.compute_mean(low_hz),
+        summary.compute_mean(high_hz),
     )
     if pair is None or low_mean_n is None or high_mean_n is None:
         return None
     is_rising = pair.difference > 0
-    rule = f"up, and {'significant' if significant else 'not significant'} at 5 %, in all pairs at once"
+    rule = f"up, and {'significant' if published_as_significant else 'not significant'} at 5 %, in all pairs at once"
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
         published=published,
         here=f"{format_signed(pair.difference)} N, p {_format_p(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
-        as_published=is_rising and (pair.p < SIGNIFICANT_P) == significant,
+        as_published=is_rising and (pair.p < SIGNIFICANT_P) == published_as_significant,
         rule=rule,
     )
 
 
-def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
-    """Find whether the cap censors some thresholds at 35 Hz, but not all; None where 35 Hz was not tested."""
+def _make_censoring_finding(summary: _ThresholdSummary, analysis: StudyAnalysis) -> Finding | None:
+    """Make the finding on censoring at 35 Hz: as published where the cap censors some thresholds, but not all. None
+    where 35 Hz was not tested."""
     if 35.0 not in analysis.table.frequencies_hz:
         return None
-    censored_count, participant_count = means.count_censored(35.0), len(analysis.table.subjects)
+    censored_count, participant_count = summary.count_censored(35.0), len(analysis.table.subjects)
     return Finding(
         what="Cut by the cap at 35 Hz",
         published="several participants, while others converge",
@@ -163,9 +169,10 @@ def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
     )
 
 
-def _find_similarity(means: _Means) -> Finding | None:
-    """Find whether the means at 35 and 45 Hz are fairly similar (`MAX_MEAN_DIFFERENCE`); None where one is missing."""
-    mean_35_hz_n, mean_45_hz_n = means.compute_mean(35.0), means.compute_mean(45.0)
+def _make_similarity_finding(summary: _ThresholdSummary) -> Finding | None:
+    """Make the finding on the means at 35 and 45 Hz: as published where they differ by less than `MAX_MEAN_DIFFERENCE`.
+    None where a mean is missing."""
+    mean_35_hz_n, mean_45_hz_n = summary.compute_mean(35.0), summary.compute_mean(45.0)
     if mean_35_hz_n is None or mean_45_hz_n is None:
         return None
     relative_difference = abs(mean_35_hz_n - mean_45_hz_n) / max(mean_35_hz_n, mean_45_hz_n)
@@ -181,5 +188,5 @@ def _find_similarity(means: _Means) -> Finding | None:
 
 
 def _format_p(p: float) -> str:
-    """Format a p-value with three decimals, or "< 0.001"."""
+    """Format a p-value as "= 0.012", with three decimals, or as "< 0.001"."""
     return "< 0.001" if p < 0.001 else f"= {p:.3f}"

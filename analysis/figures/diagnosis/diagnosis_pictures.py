@@ -1,8 +1,8 @@
-"""Draw all figures of one diagnosis, in the order of the report; called by `write_diagnosis` (`list_drawings`).
-
-`draw_diagnosis_pictures` is `analysis.diagnosis_pictures` of the Python interface.
+"""Draw all figures of one diagnosis, in the order of the report.
 
 Each figure is drawn as an independent unit of work, so that one whose drawing crashes can be left out (`Guard`).
+`study.workflows.diagnosis.write_diagnosis` calls `list_drawings`; `draw_diagnosis_pictures` is part of the Python
+interface (`analysis`).
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from analysis.figures.picture import Picture, convert_to_sample_units
 
 
 def draw_diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
-    """Draw the figures for which there are data. guard: notes crashes and leaves the figure out; without it, or while
+    """Draw the figures for which there are data. guard: records a crash and leaves its figure out; by default, or where
     it is off, exceptions propagate."""
     picture_lists = (guard or Guard()).run_parts(map, list_drawings(findings))
     return tuple(picture for pictures in picture_lists for picture in pictures)
@@ -29,18 +29,22 @@ def draw_diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> t
 
 def list_drawings(findings: Findings) -> list[WorkPart]:
     """List the drawings as independent units of work; each returns its pictures, none where there are no data."""
-    # Where a motion is imposed and the force is measured, levels are those of the motion, and have no force unit.
+    # Where the measured channels are forces, the motion is imposed, so that levels have no unit of force.
     is_motion_imposed = any(
-        level_unit.startswith("N") for series in findings.time_series for level_unit in series.units
+        channel_unit.startswith("N") for series in findings.time_series for channel_unit in series.units
     )
     level_unit = "" if is_motion_imposed else findings.given.system.force
     held_out_data = findings.time_series, findings.noise_rms, findings.channel_errors
 
-    def draw_map(number: int) -> Sequence[Picture]:
-        return [make_mismatch_map_picture(findings.maps, number, level_unit)]
+    def draw_map(input_number: int) -> Sequence[Picture]:
+        """Make the mismatch map of one driving input."""
+        return [make_mismatch_map_picture(findings.maps, input_number, level_unit)]
 
     drawings: list[tuple[str, Callable[[], Sequence[Picture]]]] = [
-        *(("the mismatch map", partial(draw_map, number)) for number in range(len(rank_driving_inputs(findings.maps)))),
+        *(
+            ("the mismatch map", partial(draw_map, input_number))
+            for input_number in range(len(rank_driving_inputs(findings.maps)))
+        ),
         ("the map of states", lambda: make_state_map_pictures(findings.state_maps)),
         ("the figure of signatures", lambda: make_signature_pictures(findings.signatures)),
         ("the figure of rivals", lambda: make_rivals_pictures(findings.explanation, findings.axes or ("x", "y", "z"))),
@@ -57,7 +61,7 @@ def list_drawings(findings: Findings) -> list[WorkPart]:
 
 
 def _draw_with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool) -> Sequence[Picture]:
-    """Draw the pictures; with labels in samples instead of seconds where the time axis is unknown."""
+    """Draw the pictures. is_timed: whether the time axis is known; else their labels are in samples instead of s."""
     return draw() if is_timed else [convert_to_sample_units(picture) for picture in draw()]
 
 

@@ -43,19 +43,19 @@ class TriedExplanation:
     words: str
     """Effect and axis, in words."""
     training_error: float
-    """Error on the data that were fitted to and chosen by."""
+    """Error on the data that were used for fitting and model selection."""
     test_error: float
     """Error on held-out data; NaN where not computed."""
 
 
 def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[TriedExplanation, ...]:
-    """List the best fit of each hypothesis of a round, at most `MOST_RIVALS`: first the round's choice, which may have
-    a larger error than a less simple one; then the others, the smallest error first. axes: displayed names of the
+    """List the first fit of each hypothesis of a round, at most `MOST_RIVALS`: first the round's choice, which may have
+    a larger error than a more complex one; then the others by increasing training error. axes: displayed names of the
     axes."""
     best_by_hypothesis: dict[object, TriedExplanation] = {}
     for candidate in round_:
-        words = ", ".join(_describe_claim(claim, axes) for claim in candidate.fitted.hypothesis.claims[-1:])
-        best_by_hypothesis.setdefault(candidate.fitted.hypothesis.key, _make_explanation(words, candidate.score))
+        effect_words = ", ".join(_describe_claim(claim, axes) for claim in candidate.fitted.hypothesis.claims[-1:])
+        best_by_hypothesis.setdefault(candidate.fitted.hypothesis.key, _make_explanation(effect_words, candidate.score))
     chosen, alternatives = list(best_by_hypothesis.values())[:1], list(best_by_hypothesis.values())[1:]
     return (*chosen, *sorted(alternatives, key=lambda rival: rival.training_error))[:MOST_RIVALS]
 
@@ -65,15 +65,15 @@ def make_rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple
     them was added."""
     retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
-    tested_rounds = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
-    for number in tested_rounds[: len(_ORDINALS)]:
-        round_ = explanation.rounds[number - 1]
-        explanations, is_accepted = list_explanations(round_, axes), number <= len(explanation.steps)
+    tested_rounds = [round_number for round_number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
+    for round_number in tested_rounds[: len(_ORDINALS)]:
+        round_ = explanation.rounds[round_number - 1]
+        explanations, is_accepted = list_explanations(round_, axes), round_number <= len(explanation.steps)
         if explanations:
             pictures.append(
                 Picture(
-                    name=f"rivals-{number}",
-                    title=f"What was tried for the {_ORDINALS[tested_rounds.index(number)]} effect"
+                    name=f"rivals-{round_number}",
+                    title=f"What was tried for the {_ORDINALS[tested_rounds.index(round_number)]} effect"
                     + ("" if is_accepted else "; none was accepted"),
                     caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
                     "in addition to the effects found before. "
@@ -102,12 +102,12 @@ def draw_rivals(
     figure = create_figure(8.8, 1.05 + 0.3 * len(explanations))
     axes = figure.add_subplot()
     style_axes(axes)
-    for row, trial in enumerate(explanations):
+    for row, entry in enumerate(explanations):
         colour = COMPLETED_STAGE.colour if row == 0 and is_accepted else GREY
-        axes.plot([trial.training_error, trial.test_error], [row, row], color=colour, linewidth=1.2, zorder=2)
-        axes.plot(trial.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
-        if np.isfinite(trial.test_error):
-            axes.plot(trial.test_error, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
+        axes.plot([entry.training_error, entry.test_error], [row, row], color=colour, linewidth=1.2, zorder=2)
+        axes.plot(entry.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
+        if np.isfinite(entry.test_error):
+            axes.plot(entry.test_error, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
     axes.axvline(
         retuned.training_error,
         color=RETUNED_STAGE.colour,
@@ -135,11 +135,11 @@ def draw_rivals(
     return figure
 
 
-def _draw_label(axes: Axes, position: float, label: str, side: Literal["left", "right"]) -> None:
-    """Draw a label above the axes at the abscissa `position`. side: horizontal alignment of the text, as in
+def _draw_label(axes: Axes, error_ratio: float, label: str, side: Literal["left", "right"]) -> None:
+    """Draw a label above the axes at the abscissa `error_ratio`. side: horizontal alignment of the text, as in
     Matplotlib."""
     axes.annotate(
-        label, (position, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
+        label, (error_ratio, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
         textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,
     )  # fmt: skip
 
@@ -150,10 +150,10 @@ def _describe_rival(rival: TriedExplanation) -> str:
     return f"{rival.words}: {rival.training_error:.3g}{held_out_text}."
 
 
-def _scale_axis(axes: Axes, values: FloatArray) -> None:
-    """Set the abscissa to the range of the errors with a margin of 10 to 15 %, at least 0.9 to 1.5; logarithmic if its
-    upper end exceeds 4 (chosen by hand)."""
-    low, high = min(0.9, 0.9 * float(values.min(initial=1.0))), 1.15 * float(values.max(initial=1.0))
+def _scale_axis(axes: Axes, errors: FloatArray) -> None:
+    """Set the abscissa to the range of the errors and 1 (noise alone), with margins of 10 % below and 15 % above, at
+    least up to 1.5; logarithmic if 1.15 times the largest error exceeds 4. The numbers are chosen by hand."""
+    low, high = min(0.9, 0.9 * float(errors.min(initial=1.0))), 1.15 * float(errors.max(initial=1.0))
     axes.set_xscale("log" if high > 4 else "linear")
     axes.set_xlim(low, max(high, 1.5))
     if high > 4:
@@ -170,12 +170,12 @@ def _describe_claim(claim: Claim, axes: Sequence[str]) -> str:
 
 
 def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
-    """Make the explanation with the geometric means of its errors over the channels."""
+    """Make the explanation from the errors of a fit: geometric means over the channels and sets of samples."""
     training_errors = np.concatenate([score.fit, score.choose])
     return TriedExplanation(words, _compute_geometric_mean(training_errors), _compute_geometric_mean(score.test))
 
 
-def _compute_geometric_mean(values: FloatArray) -> float:
-    """Compute the geometric mean of errors; values below 1e-6 count as 1e-6, so that the logarithm of 0 is finite; NaN
-    gives NaN."""
-    return float(np.exp(np.mean(np.log(np.maximum(values, 1e-6)))))
+def _compute_geometric_mean(errors: FloatArray) -> float:
+    """Compute the geometric mean of errors (c,); errors below 1e-6 count as 1e-6, so that the logarithm of 0 is finite;
+    NaN gives NaN."""
+    return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-6)))))

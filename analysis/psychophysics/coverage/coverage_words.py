@@ -1,8 +1,8 @@
 """Measured coverage of each confidence interval near the force cap, as sentences for reports and as a table.
 
 Coverage is the share of simulated studies whose 95 % interval contains the true value. `measured_coverage` has the
-counts; a report shows the sentence with the interval it belongs to, docs/statistics.md has the table. Called by
-`two_analyses`.
+counts; a report shows the sentence with the interval it belongs to. Called by `two_analyses`; `make coverage`
+(tests/references) writes the table into docs/statistics.md.
 """
 
 from collections.abc import Sequence
@@ -61,14 +61,14 @@ def format_coverage_table(rows: Sequence[MeasuredCoverage]) -> list[str]:
     for analysis, title in INTERVAL_TITLES.items():
         for row in rows:
             if row.analysis == analysis:
-                bias = "" if row.bias_db is None else format_signed(row.bias_db)
-                lines.append(f"| {title} | {MEDIAN_TEXTS.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
+                bias_text = "" if row.bias_db is None else format_signed(row.bias_db)
+                lines.append(f"| {title} | {MEDIAN_TEXTS.get(row.frequency_hz, '')} | {bias_text} | {row.percent} |")
     return lines
 
 
 def describe_coverage(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
-    """Describe the coverage and bias of one analysis (a key of `INTERVAL_TITLES`) at each median threshold; empty
-    where no row has the analysis."""
+    """Describe the coverage and bias of one analysis (a key of `INTERVAL_TITLES`) at each median threshold, or its
+    type-1 error (a row with the frequency 0); empty where no row has the analysis."""
     texts = []
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:

@@ -1,16 +1,16 @@
-"""Whether answers followed the delivery within a direction: logistic regression of answers on residuals.
+"""Logistic regression of the answers on the delivered stimulus within a direction: did answers depend on a cue?
 
-A residual is a trial's cue value against the others of that participant, direction and level, so the direction itself
-explains none of it. A participant who judges by strength answers "first" more often at positive residuals, whichever
-direction was played. For a participant who judges by direction, more strength makes both directions clearer, which is
-the separate term c.
+A residual is a trial's cue value minus the value fitted for that participant, direction and level, so the direction
+itself explains none of it. A participant who judges by intensity answers "first" more often at positive residuals,
+whichever direction was played. For a participant who judges by direction, more intensity makes both directions clearer,
+which is the separate term c.
 
     logit P(answer first) = person + side (a + b level + c residual) + g residual
 
-side is +1 or -1 for the direction shown. For spectrum and coupling, the residual of the strength is added with the same
-two terms, as both vary with a roved level. The level is in dB from the mean of the participant's levels; g is the
+side is +1 or -1 for the direction shown. For spectrum and coupling, the residual of the intensity is added with the
+same two terms, as both vary with a roved level. The level is in dB from the mean of the participant's levels; g is the
 effect of the cue, in logits per dB. The staircase makes levels depend on earlier answers, but not the residual of a
-trial. Called by `cue_findings`.
+trial. Called by `cue_findings`; `cue_section` prints `CUE_ONLY_SLOPE`.
 
 Source: the regression of answers on trial-by-trial stimuli, A. J. Ahumada, J. Lovell, J. Acoust. Soc. Am. 49 (1971),
 1751-1756.
@@ -29,19 +29,19 @@ from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials
 from equalizer.signals.signal import FloatArray
 
 LOGITS_PER_D = 1.702
-"""A logistic curve over this times z is a normal one within 0.01 (D. C. Haley, Stanford technical report 15, 1952)."""
+"""Factor c with logistic(c z) = Phi(z) within 0.01 for all z (D. C. Haley, Stanford technical report 15, 1952)."""
 CUE_ONLY_SLOPE = LOGITS_PER_D / TYPICAL_NOISE_DB
-"""Slope in logits per dB of a participant with the internal noise `TYPICAL_NOISE_DB` who judges by the cue alone."""
+"""Slope (logits per dB) of a participant with the internal noise `TYPICAL_NOISE_DB` who judges by the cue alone."""
 MOST_NEWTON_STEPS, LEAST_LIKELIHOOD_GAIN = 50, 1e-8
 """Largest number of Newton steps of the logistic regression, and gain in log-likelihood below which it has converged.
 Chosen."""
 LEAST_RESIDUAL_SD_DB = 1e-6
-"""Standard deviation of a residual below which it is rounding."""
+"""Standard deviation (dB) of residuals up to which they count as rounding errors. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class AnswersOnDelivery:
-    """One cue at one frequency, over all participants."""
+    """Result of the regression on one cue at one frequency, over all participants."""
 
     frequency_hz: float
     cue: Cue
@@ -51,7 +51,7 @@ class AnswersOnDelivery:
     """Standard deviation of the residuals; 0 without trials."""
     slope: float | None
     """g, in logits per dB: positive where more of the cue goes with answers of the first direction. None where the
-    delivery did not vary within a direction, or the answers fix no slope."""
+    delivery did not vary within a direction, or the answers do not determine it."""
     lower: float | None
     upper: float | None
     """Limits of the 95 % Wald interval of the slope, logits per dB."""
@@ -60,23 +60,24 @@ class AnswersOnDelivery:
 
     @property
     def is_conclusive(self) -> bool:
-        """Whether a participant who relied on the cue would have shown: the interval is narrower than that slope."""
+        """Whether the test could detect reliance on the cue: its interval is narrower than `CUE_ONLY_SLOPE`."""
         return self.lower is not None and self.upper is not None and self.upper - self.lower < CUE_ONLY_SLOPE
 
 
 def regress_answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
-    """Compute a regression for each measured cue; all but that of the strength include the strength's residual."""
-    strength_db = trials.values_db.get(Cue.INTENSITY)
+    """Compute a regression for each measured cue; all but that on the intensity include the residual of the
+    intensity."""
+    intensity_db = trials.values_db.get(Cue.INTENSITY)
     return tuple(
-        _regress_answers_on_cue(trials, cue, values_db, None if cue is Cue.INTENSITY else strength_db)
+        _regress_answers_on_cue(trials, cue, values_db, None if cue is Cue.INTENSITY else intensity_db)
         for cue, values_db in trials.values_db.items()
     )
 
 
 def _regress_answers_on_cue(
-    trials: DeliveredTrials, cue: Cue, values_db: FloatArray, strength_db: FloatArray | None
+    trials: DeliveredTrials, cue: Cue, values_db: FloatArray, intensity_db: FloatArray | None
 ) -> AnswersOnDelivery:
-    """Regress the answers on one cue. values_db: (n,), values of the cue. strength_db: (n,), strength as a further
+    """Regress the answers on one cue. values_db: (n,), values of the cue. intensity_db: (n,), intensity as a further
     regressor; None = it is the cue itself, or was not measured."""
     residual_db, has_residual = _compute_residuals(trials, values_db)
     trial_count = int(has_residual.sum())
@@ -95,12 +96,12 @@ def _regress_answers_on_cue(
             trials.nominal_db[has_residual], person_index
         )
         person_indicators = (person_index[:, None] == np.unique(person_index)).astype(np.float64)
-        strength_terms = _make_strength_terms(trials, strength_db, has_residual)
+        intensity_terms = _make_intensity_terms(trials, intensity_db, has_residual)
         side_terms = np.column_stack(
-            [np.ones(trial_count), centred_level_db, residual_db / residual_sd_db, strength_terms]
+            [np.ones(trial_count), centred_level_db, residual_db / residual_sd_db, intensity_terms]
         )
         design = np.column_stack(
-            [person_indicators, side_sign[:, None] * side_terms, strength_terms, residual_db / residual_sd_db]
+            [person_indicators, side_sign[:, None] * side_terms, intensity_terms, residual_db / residual_sd_db]
         )
         slope, standard_error = _fit_logistic_slope(design, answer_sign > 0)
     if slope is None or standard_error is None:
@@ -113,14 +114,15 @@ def _regress_answers_on_cue(
     )  # fmt: skip
 
 
-def _make_strength_terms(
-    trials: DeliveredTrials, strength_db: FloatArray | None, has_residual: NDArray[np.bool_]
+def _make_intensity_terms(
+    trials: DeliveredTrials, intensity_db: FloatArray | None, has_residual: NDArray[np.bool_]
 ) -> FloatArray:
-    """Make the strength regressor (n, 1), standardised; (n, 0) where it was not measured or did not vary."""
+    """Make the residual of the intensity as a regressor (n, 1), divided by its standard deviation; (n, 0) where it was
+    not measured or did not vary."""
     residual_db = (
         np.zeros(int(has_residual.sum()))
-        if strength_db is None
-        else _compute_residuals(trials, strength_db)[0][has_residual]
+        if intensity_db is None
+        else _compute_residuals(trials, intensity_db)[0][has_residual]
     )
     residual_sd_db = float(residual_db.std())
     return (
@@ -144,9 +146,9 @@ def _compute_residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[
     return residual_db, has_residual
 
 
-def _compute_group_means(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:
-    """Compute the mean of each entry's group, (n,). group: (n,), index of the group."""
-    _, group_index = np.unique(group, return_inverse=True)
+def _compute_group_means(values: FloatArray, group_of_value: NDArray[np.intp]) -> FloatArray:
+    """Compute the mean of each value's group, (n,). group_of_value: (n,), index of the group."""
+    _, group_index = np.unique(group_of_value, return_inverse=True)
     means: FloatArray = (np.bincount(group_index, weights=values) / np.bincount(group_index))[group_index]
     return means
 
@@ -154,8 +156,9 @@ def _compute_group_means(values: FloatArray, group: NDArray[np.intp]) -> FloatAr
 def _fit_logistic_slope(
     design: FloatArray, answered_first: NDArray[np.bool_]
 ) -> tuple[float, float] | tuple[None, None]:
-    """Fit a logistic regression; return its last coefficient and its standard error, None where they are not determined
-    (condition number above 1e12) or the search does not converge. design: (n, p); answered_first: (n,).
+    """Fit a logistic regression; returns the last coefficient and its standard error, None where they are not
+    determined (condition number of the information above 1e12, chosen) or the search does not converge. design: (n, p);
+    answered_first: (n,).
 
     Newton's method, each step halved up to ten times until the log-likelihood, which is concave, does not fall.
     """

@@ -10,7 +10,7 @@ Phi(1/2) = 69 % of the answers right.
 
 With friction, the delivered stimulus depends on the level in a way that a participant can learn. Difference and spread
 are therefore those at the same level: a parabola of the level (dB) is fitted with them. Called by `cue_findings`;
-`answers_on_delivery` uses the residuals of the fit.
+`answers_on_delivery` calls `fit_same_level_difference` for its residuals.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapter 1.
 """
@@ -32,7 +32,7 @@ TYPICAL_NOISE_DB = 1.0
 JND_D_PRIME = 1.0
 """d' of one just noticeable difference (JND)."""
 CONFIDENCE = 0.95
-"""Confidence of the intervals."""
+"""Confidence level of the intervals of the difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ class CueSensitivity:
     upper_db: float
     """95 % confidence interval of the difference, from the residuals of the trials."""
     spread_db: float
-    """Standard deviation over trials of one direction at the same level."""
+    """Standard deviation over trials of one direction at the same level (root mean square residual of the fit)."""
 
     def compute_d_prime(self, noise_db: float) -> float:
-        """Compute d' of a participant with this internal noise who uses this cue alone."""
+        """Compute d' of a participant with this internal noise (dB, > 0) who uses this cue alone."""
         return abs(self.difference_db) / math.hypot(noise_db, self.spread_db)
 
     @property
@@ -68,7 +68,7 @@ class CueSensitivity:
 
 def estimate_cue_sensitivities(trials: DeliveredTrials) -> tuple[CueSensitivity, ...]:
     """Estimate the sensitivity by cue and participant, over the trials with a measurement of the cue. Participants for
-    whom `fit_same_level_difference` gives None are left out."""
+    whom `fit_same_level_difference` returns None are left out."""
     sensitivities = []
     for cue, values_db in trials.values_db.items():
         for person, subject in enumerate(trials.subjects):

@@ -6,8 +6,8 @@ the level of the staircase L in N:
     intensity 20 log10(a / L)      spectrum 20 log10(1 + h / a)      coupling 20 log10(1 + c / a)
 
 Spectrum and coupling are the contributions of h and c to the amplitude if they were in phase with it, an upper bound.
-In dB all three can be compared with the same internal noise of a participant. Called by the
-other modules of `cues`, by `study_analysis` (gaps) and by `power.felt_delivery`.
+In dB all three can be compared with the same internal noise of a participant. Called by `cues.cue_findings`,
+`study_analysis` (gaps) and `power.felt_delivery`; the other modules of `cues` use the data classes.
 """
 
 import math
@@ -35,7 +35,7 @@ class Cue(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeliveredTrials:
-    """The counted test trials at one frequency with a measured acceleration; arrays are (n,)."""
+    """The valid test trials at one frequency with a measured acceleration; arrays are (n,)."""
 
     frequency_hz: float
     subjects: tuple[str, ...]
@@ -68,16 +68,23 @@ class CueGap:
 
 
 def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
-    """Select the counted test trials with a measured acceleration, grouped by frequency, ascending; empty without
-    any."""
-    measured_trials = [t for t in trials if t.phase is Phase.TEST and t.is_valid and t.delivered_mps2 and t.level_n > 0]
+    """Select the valid test trials with a measured acceleration and a level above 0, grouped by frequency, ascending;
+    empty without any."""
+    measured_trials = [
+        played_trial
+        for played_trial in trials
+        if played_trial.phase is Phase.TEST
+        and played_trial.is_valid
+        and played_trial.delivered_mps2
+        and played_trial.level_n > 0
+    ]
     swapped_sessions = _find_swapped_sessions(measured_trials)
     delivered_groups = []
     for frequency_hz in sorted({trial.frequency_hz for trial in measured_trials}):
         frequency_trials = [trial for trial in measured_trials if trial.frequency_hz == frequency_hz]
         subjects = tuple(dict.fromkeys(trial.subject for trial in frequency_trials))
         person_index = {subject: index for index, subject in enumerate(subjects)}
-        signs = np.array(
+        label_signs = np.array(
             [-1.0 if (trial.subject, trial.session) in swapped_sessions else 1.0 for trial in frequency_trials]
         )
         delivered_groups.append(
@@ -85,14 +92,14 @@ def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, .
                 frequency_hz=frequency_hz,
                 subjects=subjects,
                 person=np.array([person_index[trial.subject] for trial in frequency_trials]),
-                side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in frequency_trials]),
-                answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in frequency_trials]),
+                side=label_signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in frequency_trials]),
+                answer=label_signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in frequency_trials]),
                 nominal_db=_convert_to_db([trial.staircase_n for trial in frequency_trials]),
                 played_db=_convert_to_db([trial.level_n for trial in frequency_trials]),
                 values_db={
                     cue: _convert_to_db(ratios)
                     for cue, compute_ratio in _RATIO_FUNCTIONS.items()
-                    if (ratios := _read_cue_values(frequency_trials, compute_ratio))
+                    if (ratios := _compute_cue_ratios(frequency_trials, compute_ratio))
                 },
             )
         )
@@ -115,8 +122,8 @@ def find_cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
 
 def _find_swapped_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
     """Find participant and session of each session in which label 1 is the direction at the larger angle. Labels belong
-    to the session: they may be swapped when a participant comes again. A session with trials of one direction only is
-    compared with the larger angle of all sessions."""
+    to the session, because they may be swapped in another one of the participant. For a session with trials of one
+    direction only, its angle is compared with the larger of the study's two."""
     angles_by_session: dict[tuple[str, str], dict[int, float]] = {}
     for trial in trials:
         if trial.angle_deg is not None:
@@ -141,8 +148,8 @@ def _is_swapped(session_angles: dict[int, float], larger_angle_deg: float | None
     return larger_angle_deg is not None and (label == 1) == (angle_deg == larger_angle_deg)
 
 
-def _read_cue_values(trials: list[Trial], compute_ratio: Callable[[Trial], float | None]) -> list[float]:
-    """Read the ratio of each trial, NaN where it has none; empty where no trial has a value."""
+def _compute_cue_ratios(trials: list[Trial], compute_ratio: Callable[[Trial], float | None]) -> list[float]:
+    """Compute the ratio of each trial, NaN where it is None; empty where it is None for all trials."""
     ratios = [compute_ratio(trial) for trial in trials]
     is_measured = any(ratio is not None for ratio in ratios)
     return [math.nan if ratio is None else ratio for ratio in ratios] if is_measured else []
@@ -174,5 +181,5 @@ _RATIO_FUNCTIONS: dict[Cue, Callable[[Trial], float | None]] = {
 def _convert_to_db(amplitudes: list[float]) -> FloatArray:
     """Convert amplitudes, ratios or levels to dB, 20 log10; NaN for NaN, and for values that are not positive, which
     only a damaged log holds."""
-    values = np.array(amplitudes, dtype=np.float64)
-    return 20.0 * np.log10(np.where(values > 0, values, np.nan))
+    amplitude_array = np.array(amplitudes, dtype=np.float64)
+    return 20.0 * np.log10(np.where(amplitude_array > 0, amplitude_array, np.nan))

@@ -51,12 +51,13 @@ T_AT_THRESHOLD = {
 }
 """t0 of each family."""
 STARTING_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
-"""Slope at which a search begins, by family: a Weibull slope of 2 over newtons, and slopes about as steep at the
-threshold."""
+"""Slope at which a search begins, by family: chosen as a Weibull slope of 2 over newtons, and slopes about as steep at
+the threshold."""
 
 
 def differentiate_evidence(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute q(t) and its first two derivatives by t, each in the shape of t. t above `LARGEST_T` counts as that."""
+    """Compute q(t) and its first two derivatives by t, each in the shape of t. t above `LARGEST_T` is replaced by
+    it."""
     log_survival, log_survival_derivative, log_survival_curvature = _compute_log_survival(
         np.minimum(t, LARGEST_T), family
     )
@@ -71,8 +72,8 @@ def differentiate_evidence(t: FloatArray, family: Family) -> tuple[FloatArray, F
 
 
 def compute_mean_evidence(t: FloatArray, family: Family) -> FloatArray:
-    """Compute q(t) without its derivatives, in the shape of t: takes a quarter of the time of
-    `differentiate_evidence`."""
+    """Compute q(t) without its derivatives, in the shape of t, in a quarter of the time of `differentiate_evidence`. t
+    above `LARGEST_T` is replaced by it."""
     t = np.minimum(t, LARGEST_T)
     match family:
         case Family.WEIBULL:

@@ -17,7 +17,7 @@ from analysis.psychophysics.hierarchy.curve import (
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
-BINS = 8
+BIN_COUNT = 8
 """Number of bins with equal numbers of trials: about 400 trials each in a study of ten participants. Chosen."""
 
 
@@ -39,25 +39,27 @@ class ShareBin:
 class GoodnessOfFit:
     """Observed and predicted shares in bins. There is no p-value: the staircase sets each level by the answers before,
     and each person's parameters were fitted to the same answers, so that the observed shares of the lowest bins are
-    some standard errors too low although the model is right. Only a systematic pattern over the bins indicates
-    misfit."""
+    some standard errors too low even for a correct model. Only a systematic pattern over the bins indicates misfit."""
 
     bins: tuple[ShareBin, ...]
+    """In ascending order of the predicted share."""
 
 
 def compute_goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
-    """Compute the shares in at most `BINS` bins of about equally many trials, in ascending order of the predicted
+    """Compute the shares in at most `BIN_COUNT` bins of about equally many trials, in ascending order of the predicted
     share. All trials of a cell (one run, level and direction) are in the same bin."""
     predicted_shares, answers = predict_shares(fit), fit.answers
-    trials = answers.right + answers.wrong
+    trial_counts = answers.right + answers.wrong
     cell_order = np.argsort(predicted_shares, kind="stable")
-    bin_index = np.minimum((np.cumsum(trials[cell_order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
+    bin_index = np.minimum(
+        (np.cumsum(trial_counts[cell_order]) - 0.5) / trial_counts.sum() * BIN_COUNT, BIN_COUNT - 1
+    ).astype(int)
     bins = []
-    for index in range(BINS):
+    for index in range(BIN_COUNT):
         bin_cells = cell_order[bin_index == index]
         if len(bin_cells):
             cell_trials, cell_correct, cell_shares = (
-                trials[bin_cells],
+                trial_counts[bin_cells],
                 answers.right[bin_cells],
                 predicted_shares[bin_cells],
             )
@@ -80,10 +82,12 @@ def predict_shares(fit: HierarchicalFit) -> FloatArray:
     """Predict the probability (m,) of a right answer in each cell of `fit.answers`, with the person's own threshold,
     slope and criterion: lapse + (1 - 2 lapse) Phi(q(t) - side criterion), t = t0 + slope ln(10)/20 (level -
     threshold)."""
-    answers, k = fit.answers, fit.layout.k
+    answers, frequency_count = fit.answers, fit.layout.k
     person = answers.person
-    slope_per_db = np.exp(fit.latent[person, k]) * NEPER_PER_DB
-    t = T_AT_THRESHOLD[fit.family] + slope_per_db * (answers.level_db - fit.latent[:, :k].ravel()[answers.run])
+    slope_per_db = np.exp(fit.latent[person, frequency_count]) * NEPER_PER_DB
+    t = T_AT_THRESHOLD[fit.family] + slope_per_db * (
+        answers.level_db - fit.latent[:, :frequency_count].ravel()[answers.run]
+    )
     return compute_proportion_correct(
-        differentiate_evidence(t, fit.family)[0] - answers.side * fit.latent[person, k + 1], fit.lapse
+        differentiate_evidence(t, fit.family)[0] - answers.side * fit.latent[person, frequency_count + 1], fit.lapse
     )

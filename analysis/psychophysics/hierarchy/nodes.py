@@ -24,7 +24,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class NodeCounts:
-    """Number of nodes of each kind."""
+    """Number of nodes per latent parameter."""
 
     shared: int
     """Outer, of the deviation u."""
@@ -37,12 +37,12 @@ class NodeCounts:
 
 
 COARSE_COUNTS, FINE_COUNTS, FIXED_COUNTS = NodeCounts(3, 5, 3, 5), NodeCounts(5, 5, 3, 7), NodeCounts(5, 7, 3, 7)
-"""Numbers of nodes. With FINE, medians are within 0.03 dB of those with twice as many of each kind, also where most are
-above the cap. FIXED has more nodes, at fixed positions, for searches that do not converge with FINE because a person's
-posterior has two maxima."""
+"""Numbers of nodes, chosen. With FINE, medians are within 0.03 dB of those with twice as many of each kind, also where
+most are above the cap. FIXED has more nodes, at fixed positions, for searches that do not converge with FINE because a
+person's posterior has two maxima."""
 
 
-LEAST_VARIANCE_SHARE = 1e-4
+ADDED_VARIANCE_SHARE = 1e-4
 """Share of the variance of the node positions that is added to the posterior variance, which would be 0 where all
 weight is on a single node. Chosen: small against the variance itself."""
 
@@ -114,22 +114,26 @@ def compute_laplace_moments(parameters: FloatArray, mode: FloatArray, informatio
     `PopulationParameters.from_parameters`. mode: (n, k + 2), posterior mode; information: (n, k + 2, k + 2), expected
     information of the answers there."""
     k = mode.shape[1] - 2
-    population, index = PopulationParameters.from_parameters(parameters, k), np.arange(k)
+    population, frequency_index = PopulationParameters.from_parameters(parameters, k), np.arange(k)
     interaction_variance, shared_variance = population.interaction_sd**2, population.shared_sd**2
-    # u given all thresholds is normal: its mean is `u_weight` times the sum of their deviations from the population
-    # means, its variance is `u_variance`.
+    # Given all thresholds, u is normal: its mean is `u_weight` times the sum of their deviations from the population
+    # means, its variance is `u_variance`. `shared_projection` maps thresholds, b and c to u, b and c.
     u_variance = 1.0 / (1.0 / shared_variance + k / interaction_variance)
     u_weight = u_variance / interaction_variance
-    weights = np.zeros((3, k + 2))
-    weights[0, :k], weights[1, k], weights[2, k + 1] = u_weight, 1.0, 1.0
-    covariance = weights @ np.linalg.inv(compute_prior_precision(parameters, k) + information) @ weights.T
+    shared_projection = np.zeros((3, k + 2))
+    shared_projection[0, :k], shared_projection[1, k], shared_projection[2, k + 1] = u_weight, 1.0, 1.0
+    covariance = (
+        shared_projection @ np.linalg.inv(compute_prior_precision(parameters, k) + information) @ shared_projection.T
+    )
     covariance[:, 0, 0] += u_variance
-    shared_means = mode @ weights.T
+    shared_means = mode @ shared_projection.T
     shared_means[:, 0] -= u_weight * population.means.sum()
-    threshold_variances = 1.0 / (information[:, index, index] + 1.0 / interaction_variance)
-    coupling = np.concatenate([np.full((len(mode), k, 1), 1.0 / interaction_variance), -information[:, :k, k:]], axis=2)
+    threshold_variances = 1.0 / (information[:, frequency_index, frequency_index] + 1.0 / interaction_variance)
+    scaled_regression = np.concatenate(
+        [np.full((len(mode), k, 1), 1.0 / interaction_variance), -information[:, :k, k:]], axis=2
+    )
     return Moments(
-        shared_means, covariance, mode[:, :k], coupling * threshold_variances[..., None], threshold_variances
+        shared_means, covariance, mode[:, :k], scaled_regression * threshold_variances[..., None], threshold_variances
     )
 
 
@@ -151,12 +155,12 @@ def place_nodes(moments: Moments, counts: NodeCounts) -> Nodes:
 
 
 def compute_posterior_moments(nodes: Nodes, outer_weight: FloatArray, inner_weight: FloatArray) -> Moments:
-    """Compute the posterior moments by the nodes. outer_weight: (n, q), posterior probabilities of the outer nodes;
-    inner_weight: (n, q, k, r), those of the inner nodes at each outer node."""
+    """Compute the posterior moments as weighted sums over the nodes. outer_weight: (n, q), posterior probabilities of
+    the outer nodes; inner_weight: (n, q, k, r), those of the inner nodes at each outer node."""
     shared_means = np.einsum("nq,nqa->na", outer_weight, nodes.outer_positions)
     outer_deviation = nodes.outer_positions - shared_means[:, None]
     covariance = np.einsum("nq,nqa,nqb->nab", outer_weight, outer_deviation, outer_deviation)
-    covariance += LEAST_VARIANCE_SHARE * np.einsum("na,ab->nab", nodes.outer_positions.var(axis=1), np.eye(3))
+    covariance += ADDED_VARIANCE_SHARE * np.einsum("na,ab->nab", nodes.outer_positions.var(axis=1), np.eye(3))
     inner_means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.inner_positions)
     threshold_means = np.einsum("nq,nqk->nk", outer_weight, inner_means)
     threshold_deviation = inner_means - threshold_means[:, None]
@@ -166,14 +170,15 @@ def compute_posterior_moments(nodes: Nodes, outer_weight: FloatArray, inner_weig
     residual = threshold_deviation - np.einsum("nka,nqa->nqk", regression, outer_deviation)
     inner_variance = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.inner_positions - inner_means[..., None]) ** 2)
     threshold_variances = np.einsum("nq,nqk->nk", outer_weight, inner_variance + residual**2)
-    threshold_variances += LEAST_VARIANCE_SHARE * nodes.inner_positions.var(axis=3).mean(axis=1)
+    threshold_variances += ADDED_VARIANCE_SHARE * nodes.inner_positions.var(axis=3).mean(axis=1)
     return Moments(shared_means, covariance, threshold_means, regression, threshold_variances)
 
 
 @cache
 def _make_gauss_hermite_rule(count: int) -> tuple[FloatArray, FloatArray]:
-    """Make Gauss-Hermite positions x, and log(w / sum of w) + x² / 2: the sum of exp(log weight) f(x) is then the
-    integral of f over the real line, divided by sqrt(2 pi), the constant of the normal prior densities."""
+    """Make Gauss-Hermite positions x and log weights log(w / sum of w) + x² / 2, (count,) each: the sum of exp(log
+    weight) f(x) is the integral of f over the real line, divided by sqrt(2 pi), the constant of the normal prior
+    densities."""
     positions, weights = np.polynomial.hermite_e.hermegauss(count)
     return positions, np.log(weights / weights.sum()) + positions**2 / 2.0
 
@@ -187,4 +192,4 @@ def _make_product_rule(counts: NodeCounts) -> tuple[FloatArray, FloatArray]:
     ]
     product_nodes = list(product(*axis_rules))
     positions = np.array([[position for position, _ in node] for node in product_nodes])
-    return positions, np.array([sum(weight for _, weight in node) for node in product_nodes])
+    return positions, np.array([sum(log_weight for _, log_weight in node) for node in product_nodes])

@@ -1,9 +1,9 @@
 """Maximum of the penalized marginal likelihood by quadrature, from the maximum by Laplace's method.
 
 Newton's method with the Hessian of `quadrature`: first with coarse nodes, then with fine ones. Nodes are placed anew
-after each step by the posterior moments of the last evaluation; a search that does not converge is repeated with nodes
-at fixed positions. The same search, with a parameter fixed, gives profile likelihoods for `inference`; `fit` calls
-it for the maximum."""
+after each step by the posterior moments of the last evaluation; a search that does not converge is continued with nodes
+at fixed positions. The same search, with a parameter fixed, gives profile likelihoods for `inference`; `fit` calls it
+for the maximum."""
 
 from dataclasses import dataclass, replace
 
@@ -43,7 +43,7 @@ class QuadratureEvaluation:
     """The penalized marginal likelihood by quadrature at given parameters, with gradients and Hessian."""
 
     parameters: FloatArray
-    """(size,): the population's parameters (`ParameterLayout`)."""
+    """(size,): the population's parameters (`ParameterLayout`); size is their number."""
     cost: float
     """Minus the penalized log marginal likelihood."""
     log_likelihood: float
@@ -70,13 +70,13 @@ class QuadratureSearch:
             (-np.inf if lower is None else lower, np.inf if upper is None else upper)
             for lower, upper in objective.bounds
         ]
-        self._lower, self._upper = np.array(bounds).T
+        self._lower_bounds, self._upper_bounds = np.array(bounds).T
         self._longest_steps = np.full(len(bounds), LONGEST_STEPS[1])
         self._longest_steps[: objective.layout.k] = LONGEST_STEPS[0]
 
     def find_maximum(self, parameters: FloatArray) -> QuadratureEvaluation:
-        """Find the maximum by fine nodes; `converged` is False where no search converged. parameters: maximum by
-        Laplace's method."""
+        """Find the maximum by fine nodes, or by fixed ones where that search does not converge; `converged` is False
+        where neither does. parameters: (size,), maximum by Laplace's method."""
         coarse_minimum = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS)
         fine_minimum = self._search_minimum(
             self._evaluate(coarse_minimum.parameters, coarse_minimum.moments, FINE_COUNTS), FINE_COUNTS
@@ -88,8 +88,9 @@ class QuadratureSearch:
         )
 
     def find_lowest_cost(self, parameters: FloatArray, fixed_index: int | None = None) -> float:
-        """Find the lowest cost near these parameters, by coarse nodes. fixed_index: index of a parameter that keeps its
-        value (profile likelihood)."""
+        """Find the lowest cost near these parameters (size,) by coarse nodes, where that search does not converge again
+        from the maximum by Laplace's method. fixed_index: index of a parameter that keeps its value (profile
+        likelihood)."""
         minimum = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS, fixed_index)
         if not minimum.converged:
             laplace_parameters = maximise(self.objective, parameters, fixed_index).x
@@ -101,7 +102,7 @@ class QuadratureSearch:
 
     def _evaluate_start(self, parameters: FloatArray, counts: NodeCounts) -> QuadratureEvaluation:
         """Evaluate the cost at the parameters, clipped to their bounds, with nodes placed by Laplace's method."""
-        parameters = np.clip(parameters, self._lower, self._upper)
+        parameters = np.clip(parameters, self._lower_bounds, self._upper_bounds)
         moments = compute_laplace_moments(parameters, *self.objective.marginal.find_modes(parameters))
         return self._evaluate(parameters, moments, counts)
 
@@ -116,26 +117,26 @@ class QuadratureSearch:
                 return current
             step_fraction = 1.0 / max(1.0, float(np.abs(step / self._longest_steps).max()))
             for _ in range(STEP_ATTEMPTS):
-                candidate = self._evaluate(
-                    np.clip(current.parameters + step_fraction * step, self._lower, self._upper),
+                next_evaluation = self._evaluate(
+                    np.clip(current.parameters + step_fraction * step, self._lower_bounds, self._upper_bounds),
                     current.moments,
                     counts,
                 )
-                if candidate.cost <= current.cost + ACCEPTED_COST_RISE:
+                if next_evaluation.cost <= current.cost + ACCEPTED_COST_RISE:
                     break
                 step_fraction /= 4.0
             else:
                 # No step lowers the cost, because the nodes do not fit the posterior yet: place them anew, by the
                 # moments of the last evaluation, without a step.
-                candidate = self._evaluate(current.parameters, current.moments, counts)
-            current = replace(candidate, moments=current.moments) if counts is FIXED_COUNTS else candidate
+                next_evaluation = self._evaluate(current.parameters, current.moments, counts)
+            current = replace(next_evaluation, moments=current.moments) if counts is FIXED_COUNTS else next_evaluation
         return replace(current, converged=False)
 
     def _compute_newton_step(self, current: QuadratureEvaluation, fixed_index: int | None) -> FloatArray:
         """Compute the Newton step (size,); 0 for the fixed parameter, and for parameters at a bound that the step would
         cross."""
-        is_at_bound = ((current.parameters <= self._lower) & (current.gradient > 0)) | (
-            (current.parameters >= self._upper) & (current.gradient < 0)
+        is_at_bound = ((current.parameters <= self._lower_bounds) & (current.gradient > 0)) | (
+            (current.parameters >= self._upper_bounds) & (current.gradient < 0)
         )
         is_free = (np.arange(len(current.parameters)) != fixed_index) & ~is_at_bound
         eigenvalues, eigenvectors = np.linalg.eigh(current.hessian[np.ix_(is_free, is_free)])

@@ -31,7 +31,7 @@ from protocols.procedure.staircase import to_db
 
 SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
 """Standard deviations of the priors of a slope's logarithm and of a criterion (d'): twice the differences among the
-simulated people of `hapteq power`."""
+simulated people of `hapteq power`. Chosen."""
 LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
 """Quantiles of the lapse rate's prior over which a run's likelihood is averaged: the medians of three equally probable
 parts."""

@@ -4,7 +4,8 @@ Each simulated study is tested at one pair of frequencies at the 5 % level by th
 (t test over pseudo-thresholds), means of runs in dB (paired t test), and the published procedure (Tukey's test in
 newtons: |difference| > q sqrt(MS_within / n)). Power is the share of studies that find the difference; without a true
 difference this share is the type-1 error.
-Called by `study.workflows.planning.simulate_power`.
+Called by `study.workflows.planning.simulate_power`; `study.cli.power` and `analysis.figures.power_curves` use its
+results.
 """
 
 import math
@@ -29,7 +30,8 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class StudyVerdict:
-    """Results of one simulated study for one pair of frequencies, at the 5 % level."""
+    """Verdicts and errors of the three analyses on one simulated study, for one pair of frequencies, at the 5 %
+    level."""
 
     people: int
     """Number of participants."""
@@ -97,7 +99,7 @@ def judge_study(
         compute_pair_contrast(crowd.frequencies_hz, values_db, pair_hz, CONFIDENCE)
         for values_db in (pseudo_thresholds_db, study.threshold_db)
     )
-    group_names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
+    group_names = [f"{group_hz:g} Hz" for group_hz in crowd.frequencies_hz]
     anova = compute_one_way_anova(
         {name: list(column) for name, column in zip(group_names, study.threshold_n.T, strict=True)}
     )

@@ -23,13 +23,13 @@ SLIP_DEFLECTION_M = 50e-9
 BRISTLE_DAMPING = 0.5
 """Damping of the bristle over sqrt(stiffness * mass), with the mass along the axis: twice the damping ratio. Chosen."""
 MAX_PARTS = 12
-"""Maximum number of parts into which a step is divided unless the bristle slips throughout."""
+"""Maximum number of parts into which a step is divided unless the bristle slips throughout. Chosen."""
 TRAVEL_PER_PART = 0.3
 """Intended travel per part, in units of z_max: sets the number of parts. Chosen."""
 SLIDING_SHARE = 1 - 1e-6
-"""Share of the full deflection above which the bristle counts as sliding."""
-MAX_ITERATIONS = 12
-"""Maximum number of Newton iterations for the travel of one part."""
+"""Share of the deflection in sliding above which the bristle counts as sliding. Chosen."""
+MAX_NEWTON_ITERATIONS = 12
+"""Maximum number of Newton iterations for the travel of one part. Chosen."""
 TRAVEL_TOLERANCE = 3e-3
 """Residual of the travel equation, in units of z_max, at which the iteration ends: the last linear correction reduces
 it to about its square."""
@@ -56,7 +56,7 @@ def _solve_bristle_deflection(
     # derivative of the end's deflection with respect to the travel.
     travel = free_travel / (1.0 + compliance * (1.0 + damping))
     end_deflection, deflection_rate, residual = start_deflection, 0.0, 0.0
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(MAX_NEWTON_ITERATIONS):
         sliding_deflection = sliding_deflections[0] if travel > 0.0 else -sliding_deflections[1]
         if sliding_deflection == 0.0:
             end_deflection, deflection_rate = 0.0, 0.0
@@ -87,13 +87,14 @@ def compute_friction_force(
     forward_level: float, backward_level: float, start_z: float, memory: FloatArray, step_motion: FloatArray
 ) -> float:
     """Compute the mean friction force (N) over a step, with the level (N) `forward_level` where v > 0 and
-    `backward_level` where v < 0; called by the laws of all effects with dry friction but presliding hysteresis.
+    `backward_level` where v < 0; called by the laws of Coulomb, Stribeck, asymmetric and position-dependent friction
+    and of the loose joint.
 
     start_z: deflection over z_max at the start of the step; step_motion: see `instant`. Writes the deflection at the
     end, over z_max, to `memory[0]` and the force (N) at the end to `step_motion[F_END]`.
 
     """
-    level, start_v, per_newton = max(forward_level, backward_level), step_motion[V], step_motion[V_PER_N]
+    level, start_v, v_per_newton = max(forward_level, backward_level), step_motion[V], step_motion[V_PER_N]
     if level <= 0:
         step_motion[F_END] = 0.0
         return 0.0
@@ -101,7 +102,7 @@ def compute_friction_force(
     # The velocity does not reverse within the step and the bristle slips already: the force is constant.
     sliding_z = -sliding_force / level
     if (
-        start_v * (step_motion[V_FREE] + per_newton * sliding_force) > 0
+        start_v * (step_motion[V_FREE] + v_per_newton * sliding_force) > 0
         and start_z * sliding_z > SLIDING_SHARE * sliding_z * sliding_z
     ):
         memory[0], step_motion[F_END] = sliding_z, sliding_force
@@ -112,7 +113,7 @@ def compute_friction_force(
     v, free_dv, dv_per_force = (
         start_v * step_s / SLIP_DEFLECTION_M,
         (step_motion[V_FREE] - start_v) * step_s / SLIP_DEFLECTION_M,
-        per_newton * level * step_s / SLIP_DEFLECTION_M,
+        v_per_newton * level * step_s / SLIP_DEFLECTION_M,
     )
     damping = BRISTLE_DAMPING / np.sqrt(dv_per_force)
     travel = abs(v) + 0.5 * abs(free_dv - dv_per_force * start_z)
@@ -138,9 +139,9 @@ _READ_ONLY_VECTOR = types.Array(types.float64, 1, "A", readonly=True)
 
 @njit(types.float64[::1](_READ_ONLY_VECTOR, types.float64), cache=True)
 def compute_bristle_deflection(position: FloatArray, slip_deflection: float) -> FloatArray:
-    """Compute the deflection (n,) over `slip_deflection`, at which the bristle slips, by Dahl's equation dz/dx = 1 -
-    sgn(v) z along a position (n,) in the unit of `slip_deflection`; from 0 at the first sample. For regressions on a
-    measured position, not for a simulation."""
+    """Compute the deflection (n,) of a bristle, relative to `slip_deflection`, at which it slips, by Dahl's equation
+    dz/dx = 1 - sgn(v) z along a position (n,) in the unit of `slip_deflection`, from 0 at the first sample. Called by
+    `presliding_hysteresis` and `analysis.diagnosis` for regressions on a measured position, not in a simulation."""
     deflection = np.zeros(position.shape[0])
     for k in range(1, position.shape[0]):
         travel = (position[k] - position[k - 1]) / slip_deflection

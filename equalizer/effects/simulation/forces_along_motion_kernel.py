@@ -40,7 +40,7 @@ _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _THREE_MATRICES = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-untyped-call]
-"""Types of the kernel's arguments."""
+"""Numba types of the arguments of `evaluate_laws_along_motion`."""
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
 """Positions, velocities and accelerations, (n, m) each."""
@@ -53,19 +53,19 @@ def _write_all_axes(
     """Write motion and command of all axes at step k into `step_motion`. The effect of one axis's force on the others
     is contained in their measured motion."""
     for read_axis in range(commands.shape[1]):
-        block, is_own_axis = LENGTH + BLOCK_SIZE * read_axis, 1.0 if read_axis == axis else 0.0
+        block, own_axis_factor = LENGTH + BLOCK_SIZE * read_axis, 1.0 if read_axis == axis else 0.0
         step_motion[block + AXIS_X], step_motion[block + AXIS_V] = motion[0][k, read_axis], motion[1][k, read_axis]
         step_motion[block + AXIS_X_END], step_motion[block + AXIS_V_END] = (
             motion[0][k + 1, read_axis],
             motion[1][k + 1, read_axis],
         )
         step_motion[block + AXIS_X_PER_N], step_motion[block + AXIS_V_PER_N] = (
-            is_own_axis * per_newton[0, read_axis],
-            is_own_axis * per_newton[1, read_axis],
+            own_axis_factor * per_newton[0, read_axis],
+            own_axis_factor * per_newton[1, read_axis],
         )
         step_motion[block + AXIS_A], step_motion[block + AXIS_A_PER_N] = (
             motion[2][k, read_axis],
-            is_own_axis * per_newton[2, read_axis],
+            own_axis_factor * per_newton[2, read_axis],
         )
         step_motion[block + AXIS_COMMAND] = commands[k, read_axis]
 
@@ -86,8 +86,9 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
     force, on entry: unbalanced force over each step (see `forces_along_motion.compute_effect_forces_along_motion`),
     from which friction at rest follows, because it does not follow from the motion. motion: positions, velocities and
     accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law reads them. per_newton: (3, m), position,
-    velocity and acceleration that 1 N over a step adds. places: (items, 6) law, axis, begin and end in `parameters`,
-    begin and end in `memory`. step_s: step in s. The last row of force repeats the row before it."""
+    velocity and acceleration that 1 N over a step adds. places: (placed laws, 6), index of law and of axis, begin and
+    end (exclusive) in `parameters`, then in `memory`. step_s: step in s. The last row of force repeats the row before
+    it."""
     position, velocity, acceleration = motion
     reads_all_axes = commands.shape[0] > 0
     step_motion = np.zeros(LENGTH + BLOCK_SIZE * force.shape[1] if reads_all_axes else LENGTH)
@@ -96,8 +97,8 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
         step_motion[TIME_S] = k * step_s
         unbalanced_force = force[k].copy()
         force[k] = 0.0
-        for item in range(places.shape[0]):
-            axis = places[item, 1]
+        for place_index in range(places.shape[0]):
+            axis = places[place_index, 1]
             step_motion[X], step_motion[V] = position[k, axis], velocity[k, axis]
             step_motion[X_PER_N], step_motion[V_PER_N], step_motion[A_PER_N] = (
                 per_newton[0, axis],
@@ -113,9 +114,11 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
                 step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_X_END] = step_motion[X_FREE]
                 step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_V_END] = step_motion[V_FREE]
                 step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_A] = step_motion[A_FREE]
-            law_memory = memory[places[item, 4] : places[item, 5]]
+            law_memory = memory[places[place_index, 4] : places[place_index, 5]]
             # The law's force balances a part of the unbalanced force; the next law reads the rest.
-            law_force = laws[places[item, 0]](parameters[places[item, 2] : places[item, 3]], law_memory, step_motion)
+            law_force = laws[places[place_index, 0]](
+                parameters[places[place_index, 2] : places[place_index, 3]], law_memory, step_motion
+            )
             force[k, axis] += law_force
             unbalanced_force[axis] += law_force
     force[len(position) - 1] = force[len(position) - 2]

@@ -38,17 +38,17 @@ SIGNALS_PER_AXIS = 4
 conditions follow them."""
 FORCE_TOLERANCE = 1e-7
 """Tolerance of the implicit equation, relative to the forces of its first evaluations. Chosen."""
-MAX_ITERATIONS = 60
+MAX_ROOT_ITERATIONS = 60
 """Largest number of iterations of the root search: secant steps and, every second one, bisection where the root is
-bracketed."""
+bracketed. Chosen."""
 
 
 @njit(inline="always")
-def _evaluate(
+def _evaluate_force(
     parameters: FloatArray, memory: FloatArray, step_motion: FloatArray, phase: int, force: float, extrapolate: float
 ) -> float:
-    """Evaluate the law: its force (N) at the step's start or end (`phase`), if `force` (N) acted over the step.
-    Accelerations are means over the step; with extrapolate = 1 they are extrapolated linearly to its end."""
+    """Evaluate the law's force (N) at the step's start or end (`phase`: START or END), if `force` (N) acted over the
+    step. Accelerations are means over the step; with extrapolate = 1 they are extrapolated linearly to its end."""
     m, condition_count, step_s = (int(parameters[AXIS_COUNT]), int(parameters[CONDITION_COUNT]), step_motion[STEP_S])
     signal_count = 1 + SIGNALS_PER_AXIS * m + condition_count
     signals = memory[STACK_SIZE : STACK_SIZE + signal_count]
@@ -86,12 +86,12 @@ def _evaluate(
 
 
 @njit(inline="always")
-def _compute_end_weight(start_force: float, first_end: float, second_end: float) -> float:
+def _compute_end_weight(start_force: float, first_end_force: float, second_end_force: float) -> float:
     """Compute the weight w of the step's end: (1 + s) / 2, limited to 1/2 to 1, with the slope s = -dF_end/dF as a
-    difference quotient. first_end: force (N) at the end if `start_force` acted; second_end: that if `first_end`
-    acted."""
-    force_change = first_end - start_force
-    slope = (first_end - second_end) / force_change if force_change != 0.0 else 0.0
+    difference quotient. first_end_force: force (N) at the end if `start_force` acted; second_end_force: that if
+    `first_end_force` acted."""
+    force_change = first_end_force - start_force
+    slope = (first_end_force - second_end_force) / force_change if force_change != 0.0 else 0.0
     return min(0.5 * (1.0 + max(slope, 0.0)), 1.0)
 
 
@@ -102,40 +102,42 @@ def compute_law_force(parameters: FloatArray, memory: FloatArray, step_motion: F
 
     parameters: in the order of `AXIS_COUNT` to `CONDITION_VALUES`, then the conditions' samples and the program.
     memory: stack, signals, and the operators' memory, which is advanced to the step's end. step_motion: see `instant`;
-    F_END is written. w, f_start, f_end: as in the equation of the module; low, high: forces that bracket the root or
-    the last two of the secant method. An inertial law is one that reads an acceleration.
+    F_END is written. w, f_start, f_end: as in the equation of the module; f_end_1, f_end_2: F_end(f_start) and
+    F_end(f_end_1); f_low, f_high: forces that bracket the root, or the last two of the secant method. An inertial law
+    is one that reads an acceleration.
     """
     is_inertial = parameters[READS_ACCELERATION] != 0.0
-    f_start = low = _evaluate(parameters, memory, step_motion, START, 0.0, 0.0)
+    f_start = f_low = _evaluate_force(parameters, memory, step_motion, START, 0.0, 0.0)
     condition_count = int(parameters[CONDITION_COUNT])
     operator_memory = memory[STACK_SIZE + 1 + SIGNALS_PER_AXIS * int(parameters[AXIS_COUNT]) + condition_count :]
     operator_memory[0] = STARTED
-    f_end = first_end = high = _evaluate(parameters, memory, step_motion, END, low, 0.0)
-    second_end = _evaluate(parameters, memory, step_motion, END, high, 0.0)
-    w = 1.0 if is_inertial else _compute_end_weight(f_start, first_end, second_end)
-    low_residual, high_residual = (low - (1 - w) * f_start - w * first_end, high - (1 - w) * f_start - w * second_end)
-    tolerance, force = FORCE_TOLERANCE * (abs(f_start) + abs(first_end) + abs(second_end)), high
-    # Every second step bisects if the root is bracketed; the others are secant steps.
-    for iteration in range(MAX_ITERATIONS):
+    f_end = f_end_1 = f_high = _evaluate_force(parameters, memory, step_motion, END, f_low, 0.0)
+    f_end_2 = _evaluate_force(parameters, memory, step_motion, END, f_high, 0.0)
+    w = 1.0 if is_inertial else _compute_end_weight(f_start, f_end_1, f_end_2)
+    low_residual, high_residual = (f_low - (1 - w) * f_start - w * f_end_1, f_high - (1 - w) * f_start - w * f_end_2)
+    tolerance, force = FORCE_TOLERANCE * (abs(f_start) + abs(f_end_1) + abs(f_end_2)), f_high
+    for iteration in range(MAX_ROOT_ITERATIONS):
         residual_change = high_residual - low_residual
         is_bracketed = (low_residual < 0) != (high_residual < 0)
         if iteration % 2 == 1 and is_bracketed:
-            force = 0.5 * (low + high)
+            force = 0.5 * (f_low + f_high)
         else:
-            force = high - high_residual * (high - low) / residual_change if residual_change != 0.0 else high
-        f_end = _evaluate(parameters, memory, step_motion, END, force, 0.0)
+            force = f_high - high_residual * (f_high - f_low) / residual_change if residual_change != 0.0 else f_high
+        f_end = _evaluate_force(parameters, memory, step_motion, END, force, 0.0)
         residual = force - (1 - w) * f_start - w * f_end
-        if not abs(residual) > tolerance or abs(high - low) <= 1e-2 * tolerance:
+        if not abs(residual) > tolerance or abs(f_high - f_low) <= 1e-2 * tolerance:
             break
         if is_bracketed and (residual < 0) == (low_residual < 0):
-            low, low_residual = force, residual
+            f_low, low_residual = force, residual
         else:
             if not is_bracketed:
-                low, low_residual = high, high_residual
-            high, high_residual = force, residual
+                f_low, low_residual = f_high, high_residual
+            f_high, high_residual = force, residual
     # While sticking, the end's force lies between those of the two sliding directions: solved for, not evaluated.
     step_motion[F_END] = (
-        _evaluate(parameters, memory, step_motion, END, force, 1.0) if is_inertial else (force - (1 - w) * f_start) / w
+        _evaluate_force(parameters, memory, step_motion, END, force, 1.0)
+        if is_inertial
+        else (force - (1 - w) * f_start) / w
     )
     commit_step(
         parameters[CONDITION_VALUES + int(parameters[SAMPLE_COUNT]) * condition_count :],

@@ -69,7 +69,8 @@ class MissingForceSpectra:
 
 def estimate_missing_force_spectra(evidence: Evidence, axis: int) -> MissingForceSpectra:
     """Estimate the Welch spectra of the acceleration of an axis and of the missing force at all axes, at the lines
-    below 0.45 of the sample rate where the acceleration has more than `LEAST_POWER_SHARE` of its largest power."""
+    below 0.45 (chosen) of the sample rate where the acceleration has more than `LEAST_POWER_SHARE` of its largest
+    power."""
     sample_rate_hz, is_used = evidence.sample_rate_hz, evidence.used[:, None]
     acceleration = np.gradient(evidence.axis_velocity, 1 / sample_rate_hz, axis=0) * is_used
     window_samples = min(int(WINDOW_S * sample_rate_hz), len(is_used))
@@ -130,8 +131,8 @@ def find_likely_oscillators(
     if not len(missing.frequency_hz):
         return []
     weight = np.sqrt(np.maximum(missing.power, np.finfo(float).tiny))
-    omega = 2j * np.pi * missing.frequency_hz
-    linear_terms = np.stack([np.ones_like(omega), 1 / omega, 1 / omega**2], axis=1) * weight[:, None]
+    s = 2j * np.pi * missing.frequency_hz
+    linear_terms = np.stack([np.ones_like(s), 1 / s, 1 / s**2], axis=1) * weight[:, None]
     force = missing.cross / weight[:, None]
     target = np.vstack([force.real, force.imag])
     basis = _compute_orthonormal_basis(np.vstack([linear_terms.real, linear_terms.imag]))

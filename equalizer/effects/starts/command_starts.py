@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 LEAST_EXPLAINED_SHARE = 1e-3
 """Least share of the missing force's sum of squares that a value must explain to become a starting value. Chosen."""
 DELAYS_SAMPLES = (0, 1)
-"""Delays of the effect's force against the missing force that are tried, in samples."""
+"""Delays (samples) of the missing force against the effect's force that are tried; the better one counts. Chosen."""
 LOG_TOLERANCE = 3e-3
 """Relative tolerance of the parameter in the golden-section search. Chosen."""
 GOLDEN_SHARE = (5**0.5 - 1) / 2
@@ -48,10 +48,9 @@ def find_command_parameter(
         misfit_sum = 0.0
         for axis, (force, basis) in zip(axes, forces, strict=True):
             commanded = evidence.command[:, axis]
-            change_of_force = change(commanded, step_s, value) - commanded
+            force_change = change(commanded, step_s, value) - commanded
             misfit_sum += min(
-                _compute_misfit(force - np.roll(change_of_force, shift)[used_indices], basis)
-                for shift in DELAYS_SAMPLES
+                _compute_misfit(force - np.roll(force_change, shift)[used_indices], basis) for shift in DELAYS_SAMPLES
             )
         return misfit_sum
 
@@ -93,8 +92,8 @@ def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
     gain_at_peak = mean_linear_gain + mean_square_gain * strongest_command
     if explained_share < LEAST_EXPLAINED_SHARE or gain_at_peak <= 0:
         return None
-    # Force and command agree at the reference. If that is not positive or ten times the strongest command or more, the
-    # gain is wrong as well; the strongest command is then the reference.
+    # Force and command agree at the reference. If that is not positive or at least ten times (chosen) the strongest
+    # command, the gain is wrong as well; the strongest command is then the reference.
     equal_command = (1 - mean_linear_gain) / mean_square_gain if mean_square_gain else 0.0
     square_share, reference = (
         (1 - mean_linear_gain, equal_command)
@@ -144,8 +143,8 @@ def make_force_level_grid(evidence: Evidence, site: int, count: int = 12) -> lis
 
 
 def _compute_force_and_basis(evidence: Evidence, axis: int, project_out_motion: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute the missing force (k,) where samples count, and an orthonormal basis (k, columns) of position, velocity
-    and acceleration; without columns unless project_out_motion."""
+    """Compute the missing force (k,) at the samples with `evidence.used` > 0, and an orthonormal basis (k, columns) of
+    position, velocity and acceleration; without columns unless project_out_motion."""
     is_used, velocity = evidence.used > 0, evidence.axis_velocity[:, axis]
     force = evidence.axis_force[is_used, axis]
     if not project_out_motion:

@@ -16,7 +16,7 @@ LEAST_LATTICE_SHARE = 0.999
 """Share of the values above which they count as lying on a lattice. Chosen, as are the limits below."""
 LEAST_POINTS, LARGEST_POINT_RATIO = 3, 0.2
 """Least number of occupied lattice points, and the largest, relative to the number of samples."""
-LEAST_PEAK_RATIO = 12.0
+LEAST_RIPPLE_RATIO = 12.0
 """Least ratio of a peak in the histogram's spectrum to the median around it."""
 BIN_NOISE_RATIO = 0.2
 """Width of a bin of the histogram, relative to the rms noise."""
@@ -97,6 +97,6 @@ def find_step_under_noise(values: FloatArray, noise: float) -> float | None:
         & is_in_band
         & (np.abs(ripple_frequency - ripple_frequency[peak_line]) > 2 / value_range)
     )
-    if not is_neighbour.any() or spectrum[peak_line] < LEAST_PEAK_RATIO * float(np.median(spectrum[is_neighbour])):
+    if not is_neighbour.any() or spectrum[peak_line] < LEAST_RIPPLE_RATIO * float(np.median(spectrum[is_neighbour])):
         return None
     return float(1 / ripple_frequency[peak_line])

@@ -109,8 +109,8 @@ def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag_sample
 
 
 def _refine_lag(measured: FloatArray, predicted: FloatArray, lag_samples: float) -> float:
-    """Refine a time shift (samples) by Gauss-Newton steps to a fraction of a sample, without the bias of an
-    interpolated correlation peak."""
+    """Refine a time shift (samples) by Gauss-Newton steps, of at most one sample each, to a fraction of a sample,
+    without the bias of an interpolated correlation peak."""
     for _ in range(REFINEMENT_STEPS):
         shifted = resample_response(predicted, 1.0, -lag_samples)
         slope = np.gradient(shifted, axis=0)

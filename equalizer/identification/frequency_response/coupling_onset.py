@@ -86,23 +86,23 @@ def find_coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = No
     is_near_onset = lines.frequency_hz <= max(
         _HIGHEST_RESAMPLED_RATIO * onset_hz, lines.frequency_hz[2 * rule.neighbours]
     )
-    has_noise = bool(np.isfinite(lines.noise_variance).all())
-    drawn_onsets = (
+    is_noise_known = bool(np.isfinite(lines.noise_variance).all())
+    drawn_onsets_hz = (
         _bootstrap_onsets(
             lines.select_lines(is_near_onset), smoothed_response[is_near_onset], is_above_noise[is_near_onset], rule
         )
-        if has_noise
+        if is_noise_known
         else None
     )
-    interval = (
+    interval_hz = (
         None
-        if drawn_onsets is None
+        if drawn_onsets_hz is None
         else _widen_by_resolution(
-            _compute_bias_corrected_interval(onset_hz, drawn_onsets), lines.frequency_hz, onset_hz
+            _compute_bias_corrected_interval(onset_hz, drawn_onsets_hz), lines.frequency_hz, onset_hz
         )
     )
     return CouplingOnset(
-        onset_hz, interval, bool(onset_hz == lines.frequency_hz[is_above_noise][0]), rule.threshold, rule.sentence
+        onset_hz, interval_hz, bool(onset_hz == lines.frequency_hz[is_above_noise][0]), rule.threshold, rule.sentence
     )
 
 

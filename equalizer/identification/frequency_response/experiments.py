@@ -2,7 +2,8 @@
 
 An experiment is an excitation that is repeated over one or more periods. Spectra are rfft / length without the lines at
 zero and at half the sample rate, so that white noise of variance s² has the expected power s² / length at each line;
-windows are scaled to a mean square of 1 for the same reason. Called by `transfer_estimate` and `identify_recordings`.
+windows are scaled to a mean square of 1 for the same reason. Called by `transfer_estimate`, `noise_floor`,
+`shared_lines`, `identify_recordings`, the diagnosis and the comparison of devices (`analysis.device_change`).
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ TRANSIENT_S = 5.0
 """Assumed length of a transient (s): ten time constants of 0.5 s, the ordinary decay bound of a state-space model
 (`ORDINARY_DECAY_S`), after which e^-10 of it remains."""
 _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
-"""Kinds of segments over which windows are averaged where nothing is periodic."""
+"""Kinds of segments over which windows are averaged where no excitation is periodic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +79,7 @@ def select_instrument_signal(recording: Recording) -> FloatArray:
 def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
     """Collect the whole periods of every periodic broadband segment without the role "test". The first period counts
     only if there is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced
-    (`replaced_share`). Periods with missing samples and periods of less than four samples are left out."""
+    (`replaced_share`). Periods with missing samples and periods of less than four samples (chosen) are left out."""
     experiments: list[Experiment] = []
     single_period_segments, missing_periods = 0, 0
     for recording in recordings:
@@ -114,8 +115,9 @@ def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentS
 
 
 def collect_window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
-    """Collect Hann windows of window_s seconds (at least 8 samples), overlapping by half, over all driven segments
-    without the role "test" or, without segments, the whole recording. Windows with missing samples are left out."""
+    """Collect Hann windows of window_s seconds (at least 8 samples, chosen), overlapping by half, over all driven
+    segments without the role "test" or, without segments, the whole recording. Windows with missing samples are left
+    out."""
     experiments: list[Experiment] = []
     for recording in recordings:
         length = max(8, round(window_s * recording.sample_rate_hz))
@@ -124,7 +126,7 @@ def collect_window_experiments(recordings: Sequence[Recording], window_s: float)
         for segment in _select_driven_segments(recording):
             starts = range(segment.start, segment.stop - length + 1, length // 2)
             complete_starts = [start for start in starts if _has_all_samples(recording, start, length)]
-            # Windows, unlike periods, do not contain the same excitation: each is an experiment of its own.
+            # Windows, unlike periods, do not contain the same excitation: each is a separate experiment.
             experiments += [_make_experiment(recording, [start], length, window) for start in complete_starts]
     remark = f"No periodic excitation: averaged over Hann windows of {window_s:g} s (H1), which blur narrow resonances."
     return ExperimentSet(tuple(experiments), (remark,), periodic=False)

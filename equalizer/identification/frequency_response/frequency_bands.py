@@ -32,10 +32,10 @@ def compute_frequency_bands(
     lowest_hz: float = 1.0,
     highest_hz: float = 500.0,
 ) -> tuple[FrequencyBand, ...]:
-    """Bands in ascending order, from lowest_hz to highest_hz (defaults chosen). coupling_onset_hz: None = no coupling
-    was found. There is no middle band where the onset is None or not below direction_limit_hz, and no low band where
-    the onset is not above lowest_hz. Raises ValueError where direction_limit_hz is not between lowest_hz and
-    highest_hz."""
+    """Divide the range from lowest_hz to highest_hz (defaults chosen) into bands, in ascending order.
+    coupling_onset_hz: None = no coupling was found. There is no middle band where the onset is None or not below
+    direction_limit_hz, and no low band where the onset is not above lowest_hz. Raises ValueError where
+    direction_limit_hz is not between lowest_hz and highest_hz."""
     if not lowest_hz < direction_limit_hz < highest_hz:
         raise ValueError(
             f"direction_limit_hz is {direction_limit_hz:g}; it must lie between {lowest_hz:g} and {highest_hz:g} Hz"
@@ -44,12 +44,12 @@ def compute_frequency_bands(
     edges_hz = (lowest_hz, max(onset_hz, lowest_hz), direction_limit_hz, highest_hz)
     return tuple(
         FrequencyBand(name, low_hz, high_hz, method, reason)
-        for (name, method, reason), low_hz, high_hz in zip(_METHODS, edges_hz[:-1], edges_hz[1:], strict=True)
+        for (name, method, reason), low_hz, high_hz in zip(_BAND_METHODS, edges_hz[:-1], edges_hz[1:], strict=True)
         if low_hz < high_hz
     )
 
 
-_METHODS = (
+_BAND_METHODS = (
     ("low", "closed loop, rigid model", "Feedback is stable, the person acts at these speeds, and axes do not mix."),
     ("middle", "all axes equalized together", "Directions are felt, but the device mixes its axes."),
     ("high", "each axis separately", "Directions are hardly felt, so the axis may be chosen to spare a motor."),

@@ -64,8 +64,8 @@ class _Peak:
 
 
 def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None = None) -> tuple[Resonance, ...]:
-    """Resonances between the first and the last reliable line, in ascending order of frequency; none without a reliable
-    line. response: as estimated, not smoothed.
+    """Find resonances between the first and the last reliable line, in ascending order of frequency; none without a
+    reliable line. response: as estimated, not smoothed.
 
     A peak that no single mode fits is left out; of peaks with the same mode the most prominent is kept. Coupling is
     searched only where there are as many outputs as inputs.
@@ -86,12 +86,12 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
         if same_mode is None:
             resonances.append(resonance)
         elif peak.curve_name not in same_mode.seen_in:
-            resonances[resonances.index(same_mode)] = _add_evidence(same_mode, peak.curve_name)
+            resonances[resonances.index(same_mode)] = _add_curve(same_mode, peak.curve_name)
     return tuple(sorted(resonances, key=lambda resonance: resonance.frequency_hz))
 
 
 def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
-    """Peaks of both curves, in dB, whose prominence is at least that of the settings."""
+    """Find the peaks of both curves, in dB, whose prominence is at least `search.prominence_db`."""
     curves = {GAIN: np.linalg.norm(binned.response, ord=2, axis=(1, 2))}
     if binned.response.shape[1] == binned.response.shape[2]:
         off_axis = binned.response * (1 - np.eye(binned.response.shape[1]))
@@ -106,8 +106,8 @@ def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
 
 
 def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
-    """Fit a mode to a peak; None where there are fewer than six lines or bins within `reach_octaves` of it, where no
-    single mode fits, or where the peak is not distinct from noise."""
+    """Fit a mode to a peak; None where there are fewer than six (chosen) lines or bins within `reach_octaves` of it,
+    where no single mode fits, or where the peak is not distinct from noise."""
     reach_factor = 2**search.reach_octaves
     peak_lines = lines.select_band(peak.frequency_hz / reach_factor, peak.frequency_hz * reach_factor)
     # A hundred points suffice for a single mode: more lines are averaged in bins, which saves time.
@@ -122,7 +122,7 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
     normal_draws = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
     noisy_entries = entries + np.sqrt(noise_variance / 2) * (normal_draws[0] + 1j * normal_draws[1])
     drawn_natural_hz, drawn_damping_ratios = fit_single_mode(binned.frequency_hz, noisy_entries)
-    # Where more than 5 % of the noisy refits find no mode, the peak is not distinct from noise.
+    # Where more than 5 % (chosen) of the noisy refits find no mode, the peak is not distinct from noise.
     if np.isnan(drawn_natural_hz).mean() > 0.05:
         return None
     return Resonance(
@@ -137,7 +137,7 @@ def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearc
 
 
 def _compute_interval(draws: FloatArray) -> tuple[float, float]:
-    """95 % interval of draws (draws,), as the 2.5 % and 97.5 % quantiles; NaN is left out."""
+    """Compute the 95 % interval of draws (draws,), as the 2.5 % and 97.5 % quantiles; NaN is left out."""
     low, high = np.nanquantile(draws, (0.025, 0.975))
     return float(low), float(high)
 
@@ -148,6 +148,6 @@ def _is_same_mode(first: Resonance, second: Resonance) -> bool:
     return abs(first.frequency_hz - second.frequency_hz) < max(first.width_hz, second.width_hz) / 3
 
 
-def _add_evidence(resonance: Resonance, curve: str) -> Resonance:
-    """The resonance with a further curve in `seen_in`, in alphabetical order."""
-    return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, curve))))
+def _add_curve(resonance: Resonance, curve_name: str) -> Resonance:
+    """Add a curve to `seen_in` of the resonance, in alphabetical order."""
+    return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, curve_name))))

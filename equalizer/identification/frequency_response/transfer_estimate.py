@@ -1,9 +1,10 @@
 """Estimate of the frequency responses of all channels from all recordings.
 
-Such an estimate is figure 4 of Wilson, Chan, Salisbury and Niemeyer, "Multi-DOF Equalization of Haptic Devices for
-Accurate Rendering at High Frequencies". Each line uses all experiments whose period contains it, weighted by their
-number of samples; experiments of different periods are combined at the lines that they share (`shared_lines`).
-`estimate_transfer` is the first step of the identification (`state_space.identify` fits a model to its result).
+An example is figure 4 of Wilson, Chan, Salisbury and Niemeyer, "Multi-DOF Equalization of Haptic Devices for Accurate
+Rendering at High Frequencies". Each line uses all experiments whose period contains it, weighted by their number of
+samples; experiments of different periods are combined at the lines that they share (`shared_lines`).
+`estimate_transfer` is the first step of the identification (`state_space.identify` fits a model to its result). Called
+by `identify_recordings`, `study.evaluation.reproduction.reproduce_paper` and `analysis.device_change`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -68,7 +69,7 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
 
 
 def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
-    """Periodic experiments or, where there are none, windows, with remarks on the quality of the estimate."""
+    """Collect periodic experiments or, where there are none, windows, with remarks on the quality of the estimate."""
     experiment_set = collect_periodic_experiments(recordings)
     if not experiment_set.experiments:
         experiment_set = collect_window_experiments(recordings, settings.window_s)
@@ -158,7 +159,8 @@ def _join_groups(
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
-    """Raises TransferEstimateError without any recording, and where sample rate, channels or units differ."""
+    """Check the recordings: raises TransferEstimateError without any, and where sample rate, channels or units
+    differ."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first_recording = recordings[0]
@@ -176,8 +178,8 @@ def _check_compatible(recordings: Sequence[Recording]) -> None:
 
 
 def _refuse_constant_outputs(recordings: Sequence[Recording]) -> None:
-    """Raises TransferEstimateError for an output that is constant in every recording, as of a stuck sensor: its
-    response would consist of rounding errors."""
+    """Raise TransferEstimateError for an output that is constant in every recording, as of a stuck sensor: its response
+    would consist of rounding errors."""
     sample_arrays = [recording.response.samples for recording in recordings]
     constant_outputs = np.all([(samples == samples[:1]).all(axis=0) for samples in sample_arrays], axis=0)
     constant_names = ", ".join(
@@ -190,17 +192,17 @@ def _refuse_constant_outputs(recordings: Sequence[Recording]) -> None:
 
 
 def _describe_channels(signal: Signal) -> str:
-    """Names and units of the channels, for an error message."""
+    """Format names and units of the channels for an error message."""
     return f"{', '.join(signal.channels)} in {_format_unit(signal)}"
 
 
 def _format_unit(signal: Signal) -> str:
-    """The common unit of all channels, or the unit of each, separated by commas."""
+    """Format the common unit of all channels, or the unit of each, separated by commas."""
     return signal.unit if isinstance(signal.unit, str) else ", ".join(signal.unit)
 
 
 def _describe_too_few_experiments(inputs: int, experiment_set: ExperimentSet) -> str:
-    """Error message for fewer independent experiments than inputs at every line."""
+    """Write the error message for fewer independent experiments than inputs at every line."""
     return (
         f"{inputs} inputs need {inputs} independent experiments at each line, but the "
         f"{len(experiment_set.experiments)} that were found are not: at no line do they "

@@ -36,7 +36,7 @@ def estimate_local_noise(command: ComplexArray, response: ComplexArray) -> Float
     window_lines = unknowns + _RESIDUAL_FREEDOM
     if lines < window_lines:
         return np.full(response.shape, np.nan)
-    # A window begins at every line or, of 8000 lines or more, at every k-th: fewer windows take less time.
+    # A window begins at every line or, of 8000 lines or more (chosen), at every k-th: fewer windows take less time.
     starts = np.arange(0, lines - window_lines + 1, max(1, lines // 4000))
     window_indices = starts[:, None] + np.arange(window_lines)
     relative_frequency = np.linspace(-1.0, 1.0, window_lines)
@@ -68,10 +68,10 @@ def estimate_local_noise(command: ComplexArray, response: ComplexArray) -> Float
 
 LEAST_EXCITED_AMPLITUDE = 1e-2
 """Amplitude of a line, relative to the strongest, above which it counts as excited. Heuristic."""
-MOST_LINES = 2000
-"""Largest number of lines of a segment with a transient; of more, every second, third, ... line is used."""
-_SMOOTHED_LINES = 9
-"""Number of lines over which noise and signal power are averaged."""
+MAX_TRANSIENT_LINES = 2000
+"""Largest number of lines of a segment with a transient; of more, every second, third, ... line is used. Chosen."""
+_NOISE_SMOOTHING_LINES = 9
+"""Number of lines over which the noise power and, with a transient, the excitation power are averaged. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,8 +95,9 @@ class SegmentLines:
 
 
 def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
-    """Spectra of a segment with their noise; None where its longest run without gaps has fewer than eight samples, or
-    where it is not excited: the spectrum without the mean is rounding error (below 1e-9 of the largest sample)."""
+    """Compute the spectra of a segment with their noise; None where its longest run without gaps has fewer than eight
+    samples (chosen), or where it is not excited: the spectrum without the mean is rounding error (at most 1e-9 of the
+    largest sample)."""
     starts, length = _find_whole_periods(recording, segment)
     if not starts or length < 8:
         return None
@@ -111,28 +112,28 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
         return None
     command, response = (spectrum.mean(axis=0) for spectrum in spectra)
     if len(starts) > 1:
-        noise = smooth_over_lines(compute_period_variance(spectra[1]), _SMOOTHED_LINES) / len(starts)
+        noise = smooth_over_lines(compute_period_variance(spectra[1]), _NOISE_SMOOTHING_LINES) / len(starts)
     else:
         noise = estimate_local_noise(command, response)
     if transient:  # a line without power between excited lines counts as excited too
-        excitation_norm = np.sqrt(smooth_over_lines(excitation_norm**2, _SMOOTHED_LINES))
+        excitation_norm = np.sqrt(smooth_over_lines(excitation_norm**2, _NOISE_SMOOTHING_LINES))
     frequency_hz = np.arange(1, len(command) + 1) * rate_hz / length
     excited = excitation_norm > LEAST_EXCITED_AMPLITUDE * excitation_norm.max()
     return SegmentLines(frequency_hz, command, response, noise, excited, transient, rate_hz, recording.hold)
 
 
 def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
-    """The excited lines of the band (Hz, ends included; None: all). Periodic segments with the same lines get those
-    that any of them excites; a segment with a transient keeps at most `MOST_LINES`. Segments without such a line
-    are left out."""
+    """Select the excited lines of the band (Hz, ends included; None: all). Periodic segments with the same lines get
+    those that any of them excites; a segment with a transient keeps at most `MAX_TRANSIENT_LINES`. Segments without
+    such a line are left out."""
     low_hz, high_hz = band_hz or (0.0, np.inf)
     selected_segments = []
     for segment in segments:
         shared_excited = [candidate.excited for candidate in segments if have_same_lines(segment, candidate)]
         excited = segment.excited if segment.transient else np.any(shared_excited, axis=0)
         chosen_lines = np.flatnonzero(excited & (segment.frequency_hz >= low_hz) & (segment.frequency_hz <= high_hz))
-        if segment.transient and len(chosen_lines) > MOST_LINES:
-            chosen_lines = chosen_lines[:: -(-len(chosen_lines) // MOST_LINES)]
+        if segment.transient and len(chosen_lines) > MAX_TRANSIENT_LINES:
+            chosen_lines = chosen_lines[:: -(-len(chosen_lines) // MAX_TRANSIENT_LINES)]
         if len(chosen_lines):
             selected_segments.append(_select_lines(segment, chosen_lines))
     return tuple(selected_segments)
@@ -146,7 +147,7 @@ def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:
 
 
 def _select_lines(segment: SegmentLines, chosen_lines: npt.NDArray[np.int64]) -> SegmentLines:
-    """The segment on the lines with these indices only."""
+    """Restrict a segment to the lines with these indices (k,)."""
     return SegmentLines(
         segment.frequency_hz[chosen_lines],
         segment.command[chosen_lines],
@@ -186,7 +187,7 @@ def split_fit_and_test(
 
 
 def _iterate_driven_segments(recording: Recording) -> Iterator[Segment]:
-    """Segments other than rest and free decay; the whole recording where it has no segments."""
+    """Iterate over the segments other than rest and free decay, or the whole recording where it has no segments."""
     if not recording.segments:
         yield Segment(0, len(recording), "noise")
     for segment in recording.segments:
@@ -195,7 +196,7 @@ def _iterate_driven_segments(recording: Recording) -> Iterator[Segment]:
 
 
 def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], int]:
-    """Start samples and common length of the complete periods, without the segment's first period where there are
+    """Find start samples and common length of the complete periods, without the segment's first period where there are
     others; without a complete period, or for a period of fewer than eight samples, start and length of the longest run
     of samples without gaps. Lists no start where every sample is missing."""
     signals = [recording.command.samples, recording.response.samples]
@@ -215,6 +216,7 @@ def _find_whole_periods(recording: Recording, segment: Segment) -> tuple[list[in
 
 
 def _compute_spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
-    """Spectra (periods, lines, channels) of the samples without the mean of each period, one period per start."""
+    """Compute the spectra (periods, lines, channels) of the samples without the mean of each period, one period per
+    start."""
     periods = np.stack([samples[start : start + length] for start in starts])
     return compute_line_spectra(periods - periods.mean(axis=1, keepdims=True))

@@ -27,8 +27,8 @@ LARGEST_SCATTER = 0.25
 """Upper limit of the scatter that counts as noise, relative to a channel's largest response near a line; heuristic.
 Where resonances shift with the level, segments differ more, and without a limit lines with most of the motion would get
 little weight."""
-_SMOOTHED_LINES = 9
-"""Number of lines over which scatter and response are averaged."""
+_SCATTER_SMOOTHING_LINES = 9
+"""Number of lines over which scatter and response are averaged. Chosen."""
 
 
 def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, ...]:
@@ -39,13 +39,13 @@ def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, .
     lines differ between realisations, directions and levels.
     """
     return tuple(
-        _raise_noise(segment, [candidate for candidate in segments if have_same_lines(segment, candidate)])
+        _raise_noise_to_scatter(segment, [candidate for candidate in segments if have_same_lines(segment, candidate)])
         for segment in segments
     )
 
 
-def _raise_noise(segment: SegmentLines, same_line_segments: Sequence[SegmentLines]) -> SegmentLines:
-    """The segment with its noise raised to the scatter of the segments with the same lines; unchanged where they are no
+def _raise_noise_to_scatter(segment: SegmentLines, same_line_segments: Sequence[SegmentLines]) -> SegmentLines:
+    """Raise the noise of a segment to the scatter of the segments with the same lines; unchanged where these are no
     more than the inputs."""
     m = segment.command.shape[1]
     if len(same_line_segments) <= m:
@@ -55,7 +55,7 @@ def _raise_noise(segment: SegmentLines, same_line_segments: Sequence[SegmentLine
         np.abs(segment_lines.response / rms) ** 2
         for segment_lines, rms in zip(same_line_segments, command_rms, strict=True)
     ]
-    largest_scatter = LARGEST_SCATTER**2 * smooth_over_lines(np.max(response_powers, axis=0), _SMOOTHED_LINES)
+    largest_scatter = LARGEST_SCATTER**2 * smooth_over_lines(np.max(response_powers, axis=0), _SCATTER_SMOOTHING_LINES)
     scatter = (
         np.minimum(_estimate_scatter(same_line_segments, command_rms), largest_scatter)
         * _compute_command_rms(segment) ** 2
@@ -64,13 +64,14 @@ def _raise_noise(segment: SegmentLines, same_line_segments: Sequence[SegmentLine
 
 
 def _compute_command_rms(segment_lines: SegmentLines) -> float:
-    """Rms magnitude of the command over lines and inputs, above zero."""
+    """Compute the rms magnitude of the command over lines and inputs, at least 1e-300, so that it can divide."""
     return max(float(np.sqrt(np.mean(np.abs(segment_lines.command) ** 2))), 1e-300)
 
 
 def _estimate_scatter(segments: Sequence[SegmentLines], command_rms: Sequence[float]) -> FloatArray:
-    """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of rms
-    magnitude 1; segments are scaled to it. command_rms: rms magnitude of each segment's command."""
+    """Estimate the scatter (lines, p): residual power of the best linear response at each line, per degree of freedom,
+    for a command of rms magnitude 1; segments are scaled to it. command_rms: rms magnitude of each segment's
+    command."""
     m = segments[0].command.shape[1]
     excitation_scale = np.array([segment.excited / rms for segment, rms in zip(segments, command_rms, strict=True)]).T[
         :, :, None
@@ -84,14 +85,16 @@ def _estimate_scatter(segments: Sequence[SegmentLines], command_rms: Sequence[fl
     residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained_power, 0.0)
     degrees_of_freedom = np.count_nonzero(excitation_scale[:, :, 0], axis=1) - m
     is_usable = has_full_rank & (degrees_of_freedom > 0)
-    smoothed_power = smooth_over_lines(np.where(is_usable[:, None], residual_power, 0.0), _SMOOTHED_LINES)
+    smoothed_power = smooth_over_lines(np.where(is_usable[:, None], residual_power, 0.0), _SCATTER_SMOOTHING_LINES)
     return np.asarray(
         smoothed_power
-        / np.maximum(smooth_over_lines(np.where(is_usable, degrees_of_freedom, 0.0)[:, None], _SMOOTHED_LINES), 1e-12)
+        / np.maximum(
+            smooth_over_lines(np.where(is_usable, degrees_of_freedom, 0.0)[:, None], _SCATTER_SMOOTHING_LINES), 1e-12
+        )
     )
 
 
-HELD_OUT_EVERY = 4
+HELD_OUT_STRIDE = 4
 """One line in this many is held out for cross-validation of structures. Chosen."""
 _LARGEST_TRANSIENT = 1e120
 """Amplitude of a transient's spectrum above which it is not fitted, because squares in the fit would overflow."""
@@ -120,17 +123,17 @@ class LineGroup:
     hold: Hold
 
     def exclude_held_out(self) -> "LineGroup":
-        """The lines that are fitted, without those held out for cross-validation."""
+        """Exclude the lines held out for cross-validation: the fitted lines remain."""
         return self.select_lines(~self.held_out)
 
-    def limit_lines(self, most_lines: int) -> "LineGroup":
-        """The group on at most `most_lines` lines: every second, third, ... line, with held-out lines chosen anew."""
-        stride = -(-len(self.frequency_hz) // most_lines)
+    def limit_lines(self, max_lines: int) -> "LineGroup":
+        """Limit the group to `max_lines` lines: every second, third, ... line, with held-out lines chosen anew."""
+        stride = -(-len(self.frequency_hz) // max_lines)
         thinned_group = self.select_lines(np.arange(len(self.frequency_hz)) % stride == 0)
         return replace(thinned_group, held_out=_select_held_out_lines(len(thinned_group.frequency_hz)))
 
     def select_lines(self, is_chosen: BoolArray) -> "LineGroup":
-        """The group on the lines where the mask `chosen` (lines,) is true."""
+        """Restrict the group to the lines where the mask `is_chosen` (lines,) is true."""
         return LineGroup(
             self.frequency_hz[is_chosen], self.root[is_chosen], self.target[is_chosen], self.weight[is_chosen],
             self.held_out[is_chosen], self.count[is_chosen], self.transient, self.rate_hz, self.hold,
@@ -138,8 +141,8 @@ class LineGroup:
 
 
 def build_line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGroup, ...]:
-    """Weighted groups of the segments; periodic segments with the same lines are compressed into a common group. floor:
-    expected error of a linear model, relative to the response's magnitude."""
+    """Build weighted groups of the segments; periodic segments with the same lines are compressed into a common group.
+    floor: expected error of a linear model, relative to the response's magnitude."""
     groups: list[LineGroup] = []
     for segment in add_scatter_noise(segments):
         weight = _compute_line_weights(segment, floor)
@@ -161,8 +164,8 @@ def build_line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[L
 
 
 def compute_misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[ComplexArray]:
-    """Weighted residuals of each group, (lines, p, rows), after transients were fitted to the lines not held out.
-    Raises numpy.linalg.LinAlgError where the state matrix cannot be diagonalised."""
+    """Compute the weighted residuals of each group, (lines, p, rows), after transients were fitted to the lines not
+    held out. Raises numpy.linalg.LinAlgError where the state matrix cannot be diagonalised."""
     form, misfits = compute_pole_form(model), []
     for group in groups:
         response = compute_sampled_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
@@ -176,8 +179,8 @@ def compute_misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list
 
 
 def compute_transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
-    """Weighted spectra of the free response to each state, (lines, p, columns). form: pole-residue form of the
-    model."""
+    """Compute the weighted spectra of the free response to each state, (lines, p, columns). form: pole-residue form of
+    the model."""
     free_response = compute_free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
@@ -186,7 +189,8 @@ def compute_transient_basis(group: LineGroup, model: MechanicalModel, form: Pole
 
 
 def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
-    """Real parts, then imaginary parts, of all arrays as a real vector; the sum of squares is preserved."""
+    """Stack the real parts, then the imaginary parts, of all arrays in a real vector; the sum of squares is
+    preserved."""
     stacked = np.concatenate([part.ravel() for part in parts])
     return np.concatenate([stacked.real, stacked.imag])
 
@@ -197,8 +201,8 @@ def compute_numerical_jacobian(
     base_residuals: FloatArray,
     upper_bounds: FloatArray,
 ) -> FloatArray:
-    """Jacobian (residuals, unknowns) by forward differences, backward where a step would exceed `upper_bounds`.
-    base_residuals: residuals at `unknowns`."""
+    """Compute the Jacobian (residuals, unknowns) by forward differences, backward where a step would exceed
+    `upper_bounds`. base_residuals: residuals at `unknowns`."""
     columns = np.empty((len(base_residuals), len(unknowns)))
     for index in range(len(unknowns)):
         step = _RELATIVE_STEP * max(1.0, abs(unknowns[index]))
@@ -210,8 +214,8 @@ def compute_numerical_jacobian(
 
 
 def _compute_line_weights(segment: SegmentLines, floor: float) -> FloatArray:
-    """(lines, p): 1 / sqrt(noise + floor² |response|²), with |response|² averaged over five lines; 0 at lines that are
-    not excited. Noise that is not known (NaN) counts as 0."""
+    """Compute the weights (lines, p), 1 / sqrt(noise + floor² |response|²), with |response|² averaged over five lines
+    (chosen); 0 at lines that are not excited. Noise that is not known (NaN) counts as 0."""
     power = np.abs(segment.response) ** 2
     smoothed_power = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
@@ -220,8 +224,8 @@ def _compute_line_weights(segment: SegmentLines, floor: float) -> FloatArray:
 
 
 def _select_held_out_lines(lines: int) -> BoolArray:
-    """(lines,): mask of the lines held out for cross-validation, one in `HELD_OUT_EVERY`."""
-    return np.asarray(np.arange(lines) % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
+    """Select the lines held out for cross-validation, one in `HELD_OUT_STRIDE`; returns a mask (lines,)."""
+    return np.asarray(np.arange(lines) % HELD_OUT_STRIDE == HELD_OUT_STRIDE // 2)
 
 
 def _can_merge(group: LineGroup, existing: LineGroup) -> bool:

@@ -2,7 +2,8 @@
 
 Minimises the sum over lines of |Y(f) - G(f, unknowns) U(f)|² / expected error power (output error; `LineGroup` holds
 the weighted spectra), with SciPy's bounded trust-region reflective method. Held-out lines measure the error of the
-result. Called by `mechanical_fit` and the selection of the order (`mechanical_order`, `modal_order`).
+result. Called by `mechanical_fit`, `mechanical_mode_start` and the selection of the order (`mechanical_order`,
+`modal_order`).
 """
 
 from collections.abc import Sequence
@@ -55,8 +56,8 @@ def refine_unknowns(
 ) -> RefinedFit[StructureT]:
     """Refine unknowns from a start (parameters,), which is first moved within the bounds. band_hz: fitted band, which
     sets the bounds. max_evaluations: limit of the evaluations of the residuals, without those for the Jacobian (default
-    chosen). Raises MechanicalModelError where the start is not a valid model, and numpy.linalg.LinAlgError where the
-    state matrix of the start or of the result cannot be diagonalised."""
+    and stopping tolerances chosen). Raises MechanicalModelError where the start is not a valid model, and
+    numpy.linalg.LinAlgError where the state matrix of the start or of the result cannot be diagonalised."""
     # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
@@ -67,7 +68,7 @@ def refine_unknowns(
     start_residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(start)))
 
     def compute_residuals(unknowns: FloatArray) -> FloatArray:
-        """Real residuals on the fitted lines; 1e6 each where the unknowns are not a valid model."""
+        """Compute the real residuals on the fitted lines; 1e6 each where the unknowns are not a valid model."""
         try:
             residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
@@ -92,7 +93,7 @@ def refine_unknowns(
 
 
 def _sum_held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
-    """Sum of squares of the held-out lines' misfits, and number of misfits in it."""
+    """Sum the squares of the held-out lines' misfits; returns the sum and the number of misfits in it."""
     group_misfits = list(zip(groups, compute_misfits(groups, model), strict=True))
     squares = sum(np.sum(np.abs(misfit[group.held_out]) ** 2) for group, misfit in group_misfits)
     return float(squares), int(sum(group.count[group.held_out].sum() for group in groups))

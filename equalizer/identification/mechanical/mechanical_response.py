@@ -12,7 +12,7 @@ For the last two, a delay multiplies by e^(-s delay). `response[k]` is taken jus
 `signals.recording`.
 
 Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6. Called by
-`mechanical_misfit`, `modal_search` and the computation of starting values.
+`mechanical_misfit`, `modal_search`, `mechanical_free_simulation` and the computation of starting values.
 """
 
 from dataclasses import dataclass
@@ -24,9 +24,10 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LARGEST_INTEGRATOR_STEP = 1e-9
-"""Magnitude of a pole times the sample period below which the pole counts as an integrator (numerically zero)."""
+"""Magnitude of a pole times the sample period below which the pole counts as an integrator (numerically zero).
+Chosen."""
 _LARGEST_GROWTH_EXPONENT = 200.0
-"""Upper limit of the real part of a pole times the sample period; its exponential is still a finite number."""
+"""Upper limit of the real part of a pole times the sample period. Chosen: its exponential is a finite number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +48,8 @@ class PoleForm:
 
 
 def compute_pole_form(model: MechanicalModel) -> PoleForm:
-    """Pole-residue form of a model, by diagonalisation of its state matrix. Raises numpy.linalg.LinAlgError where its
-    state matrix cannot be diagonalised."""
+    """Compute the pole-residue form of a model by diagonalisation of its state matrix. Raises numpy.linalg.LinAlgError
+    where its state matrix cannot be diagonalised."""
     n, m = model.coordinates, model.inputs
     acceleration_gains = np.linalg.solve(
         model.mass, np.concatenate([model.stiffness, model.damping, model.input], axis=1)
@@ -70,8 +71,8 @@ def compute_pole_form(model: MechanicalModel) -> PoleForm:
 def compute_sampled_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold, form: PoleForm | None = None
 ) -> ComplexArray:
-    """Frequency response (lines, p, m), with sensor and delay, of commands reconstructed by `hold`. frequency_hz:
-    (lines,), above zero. form: the model's, if known."""
+    """Compute the frequency response (lines, p, m), with sensor and delay, of commands reconstructed by `hold`.
+    frequency_hz: (lines,), above zero. form: the model's, if known."""
     form = form or compute_pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
     pole_terms, direct = compute_pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
@@ -82,8 +83,8 @@ def compute_sampled_response(
 def compute_free_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, form: PoleForm | None = None
 ) -> ComplexArray:
-    """Spectra (lines, p, states) of the free response to each state, per difference between the state's values at the
-    segment's two ends. form: the model's, if known.
+    """Compute the spectra (lines, p, states) of the free response to each state, per difference between the state's
+    values at the segment's two ends. form: the model's, if known.
 
     The spectrum of a segment is the response to its commands plus a real combination of these (transient, or leakage).
     """
@@ -105,8 +106,8 @@ def _sum_poles(pole_terms: ComplexArray, outputs: ComplexArray, inputs: ComplexA
 
 
 def compute_sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
-    """(lines,): response of the sensor's first-order low-pass y += (1 - exp(-2 pi f / rate)) (x - y), f its bandwidth;
-    1 where the bandwidth is 0, which means no low-pass."""
+    """Compute the response (lines,) of the sensor's first-order low-pass y += (1 - exp(-2 pi f / rate)) (x - y), f its
+    bandwidth; 1 where the bandwidth is 0, which means no low-pass."""
     if not bandwidth_hz:
         return np.ones(len(z), dtype=np.complex128)
     decay = np.exp(-2 * np.pi * bandwidth_hz / rate_hz)
@@ -116,8 +117,8 @@ def compute_sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float
 def _append_input_lag(
     A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, lag_rate: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """State-space matrices A, B, C and D with a first-order lag in front of each input:
-    u' = lag_rate (command - u), lag_rate in 1/s."""
+    """Append a first-order lag in front of each input, u' = lag_rate (command - u), lag_rate in 1/s; returns A, B, C
+    and D."""
     n, m = B.shape
     lagged_A = np.block([[A, B], [np.zeros((m, n)), -lag_rate * np.eye(m)]])
     lagged_B = np.concatenate([np.zeros((n, m)), lag_rate * np.eye(m)])
@@ -127,8 +128,8 @@ def _append_input_lag(
 def compute_pole_responses(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response to a held command of each pole, (lines, poles), and of the direct feedthrough, (lines,), by the formulas
-    of the module docstring. z: (lines,), on the unit circle, none equal to 1."""
+    """Compute the response to a held command of each pole, (lines, poles), and of the direct feedthrough, (lines,), by
+    the formulas of the module docstring. z: (lines,), on the unit circle, none equal to 1."""
     step_s, z_column = 1 / rate_hz, z[:, None]
     # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
     poles = np.minimum(poles.real, _LARGEST_GROWTH_EXPONENT * rate_hz) + 1j * poles.imag
@@ -151,15 +152,15 @@ def compute_pole_responses(
 
 
 def _integrate_exponential(poles: ComplexArray, duration_s: float) -> ComplexArray:
-    """(poles,): integral of e^(p t) over 0 < t < duration_s."""
+    """Integrate e^(p t) over 0 < t < duration_s for each pole, (poles,)."""
     is_small = np.abs(poles) * duration_s < _LARGEST_INTEGRATOR_STEP
     safe_poles = np.where(is_small, 1.0, poles)
     return np.asarray(np.where(is_small, duration_s, np.expm1(safe_poles * duration_s) / safe_poles))
 
 
 def _integrate_ramp(poles: ComplexArray, step_s: float) -> ComplexArray:
-    """(poles,): state after a sample period in which the command rises linearly from 0 to 1. For a small |p| T
-    (below 1e-4) the exact form loses digits by cancellation: a Taylor series replaces it."""
+    """Compute the state (poles,) after a sample period in which the command rises linearly from 0 to 1. For a small |p|
+    T (below 1e-4) the exact form loses digits by cancellation: a Taylor series replaces it."""
     is_small = np.abs(poles) * step_s < 1e-4
     safe_poles = np.where(is_small, 1.0, poles)
     exact = (np.expm1(safe_poles * step_s) - safe_poles * step_s) / (safe_poles**2 * step_s)

@@ -6,7 +6,8 @@ At each spectral line s = j w the command's force u and the motion x of the m dr
 
 which is linear in the entries of the symmetric matrices M (mass), D (damping) and K (stiffness). The sensor's low pass,
 the hold and a trial delay are removed from the measured motion first; the delay with the least residual is kept. The
-matrices are then made positive definite, as the nonlinear fit needs. Called by `mechanical_fit`.
+matrices are then made positive definite, as the nonlinear fit needs. Called by `mechanical_fit` and
+`mechanical_mode_start`.
 """
 
 from collections.abc import Sequence
@@ -22,22 +23,22 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_EIGENVALUE = 0.05
 """Least eigenvalue of the starting mass matrix, relative to the largest magnitude of an eigenvalue. Chosen."""
-_TRIAL_DELAYS = 33
+_TRIAL_DELAY_COUNT = 33
 """Number of trial delays, evenly spaced from zero. Chosen."""
-_MOST_DELAY_CYCLES = 8.0
+_MAX_DELAY_CYCLES = 8.0
 """Longest trial delay, in periods of the highest line of the first segment. Chosen."""
 
 
 def estimate_rigid_start(
     segments: Sequence[SegmentLines], structure: Structure, floor: float
 ) -> tuple[Structure, FloatArray]:
-    """Structure without modes, with signs and mass scale estimated from the data, and its unknowns (parameters,). A
+    """Estimate a structure without modes, its signs and mass scale, and its unknowns (parameters,). A
     negative mass of a single axis means that its sensor is positive against the command: its sign is reversed. The
     delay is estimated where `structure.delayed`. floor: expected error of a linear model, relative to the response's
     magnitude."""
     m = structure.inputs
     if structure.delayed:
-        delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _TRIAL_DELAYS)
+        delays_s = np.linspace(0.0, _MAX_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _TRIAL_DELAY_COUNT)
         delay_solutions = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
         delay_s = float(delays_s[int(np.argmin([residual for _, residual in delay_solutions]))])
     else:
@@ -65,8 +66,8 @@ def estimate_rigid_start(
 def _solve_matrices(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, float]:
-    """Entries of mass, damping and stiffness (lower triangles, row by row), and the weighted residual sum of
-    squares."""
+    """Solve for the entries of mass, damping and stiffness (lower triangles, row by row); also returns the weighted
+    residual sum of squares."""
     rows, target = _build_regression(segments, structure, floor, delay_s)
     solution = solve_scaled(rows, target)
     m = structure.inputs
@@ -76,7 +77,7 @@ def _solve_matrices(
 def _build_regression(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
+    """Build regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
     imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed.
 
     The error is taken as five times `floor` (chosen), plus noise: lines with little noise then do not dominate."""
@@ -89,9 +90,9 @@ def _build_regression(
         s = 2j * np.pi * spectra.frequency_hz
         z = np.exp(s / spectra.rate_hz)
         delay_samples = hold_delay if spectra.hold.value == "zero-order" else 0.0
-        chain = compute_sensor_response(structure.sensor.bandwidth_hz, z, spectra.rate_hz) * z ** (-delay_samples)
-        chain = chain * np.exp(-s * delay_s)
-        motion = spectra.response[:, :m] * np.array(structure.signs) / chain[:, None]
+        sensor_path = compute_sensor_response(structure.sensor.bandwidth_hz, z, spectra.rate_hz) * z ** (-delay_samples)
+        sensor_path = sensor_path * np.exp(-s * delay_s)
+        motion = spectra.response[:, :m] * np.array(structure.signs) / sensor_path[:, None]
         response_norm = np.linalg.norm(spectra.response[:, :m], axis=1)
         noise_ratio = np.sqrt(np.nan_to_num(spectra.noise[:, :m]).sum(axis=1)) / np.maximum(response_norm, 1e-300)
         weight = spectra.excited / (np.linalg.norm(spectra.command, axis=1) * np.hypot(5 * floor, noise_ratio) + 1e-300)
@@ -104,8 +105,10 @@ def _build_regression(
         if spectra.transient:
             # The states at the segment's ends add s, 1, 1 / s, over s^order, times unknown factors.
             for axis in range(m):
-                first = 3 * (m * transient_segments.index(index) + axis)
-                transient_columns[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
+                first_column = 3 * (m * transient_segments.index(index) + axis)
+                transient_columns[:, axis, first_column : first_column + 3] = s[:, None] ** (
+                    np.array([1, 0, -1]) - order
+                )
         block = np.concatenate([np.stack(columns, axis=2), transient_columns], axis=2) * weight[:, None, None]
         blocks.append(block.reshape(-1, block.shape[2]))
         targets.append((spectra.command * weight[:, None]).ravel())
@@ -117,13 +120,13 @@ def _build_regression(
 
 
 def list_triangle_pairs(m: int) -> list[tuple[int, int]]:
-    """Row and column of the m (m + 1) / 2 entries of a lower triangle, row by row."""
+    """List row and column of the m (m + 1) / 2 entries of a lower triangle, row by row."""
     return list(zip(*(indices.tolist() for indices in np.tril_indices(m)), strict=True))
 
 
 def _compute_entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
-    """(lines, m): a symmetric matrix with this entry 1 and all others 0, times the motion (lines, m). pair: its row and
-    column."""
+    """Compute the force (lines, m) of a symmetric matrix with entry `pair` (row, column) 1 and all others 0, times the
+    motion (lines, m)."""
     force = np.zeros_like(motion)
     row, column = pair
     force[:, row] += motion[:, column]
@@ -133,21 +136,21 @@ def _compute_entry_force(motion: ComplexArray, pair: tuple[int, int]) -> Complex
 
 
 def solve_scaled(rows: FloatArray, target: FloatArray) -> FloatArray:
-    """(k,): least-squares solution of rows (n, k) @ x = target (n,), computed with columns of unit length; singular
+    """Solve rows (n, k) @ x = target (n,) for x (k,) by least squares, computed with columns of unit length; singular
     values below 1e-12 of the largest are cut off."""
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(rows / scale, target, rcond=1e-12)[0] / scale)
 
 
 def build_symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
-    """(m, m): symmetric matrix from the m (m + 1) / 2 entries of its lower triangle, row by row."""
+    """Build a symmetric matrix (m, m) from the m (m + 1) / 2 entries of its lower triangle, row by row."""
     lower = np.zeros((m, m))
     lower[np.tril_indices(m)] = entries
     return np.asarray(lower + np.tril(lower, -1).T)
 
 
 def _make_positive(matrix: FloatArray) -> FloatArray:
-    """The symmetric matrix with its eigenvalues raised to at least 0.001 (chosen) of the largest magnitude."""
+    """Raise the eigenvalues of a symmetric matrix to at least 0.001 (chosen) of the largest magnitude."""
     eigenvalues, eigenvectors = np.linalg.eigh(matrix)
     return np.asarray(
         (eigenvectors * np.maximum(eigenvalues, 1e-3 * max(np.abs(eigenvalues).max(), 1e-300))) @ eigenvectors.T

@@ -21,7 +21,7 @@ DRIVEN_SHARE = 0.5
 
 
 def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
-    """The model with an elastic joint (a cable, a belt, a flexible link) behind the m driven axes. model: coordinates
+    """Insert an elastic joint (a cable, a belt, a flexible link) behind the m driven axes. model: coordinates
     of the driven axes, then of oscillators. Result: driven axes, axes beyond the joint, oscillators relative to the
     latter. stiffness: (m, m), N/m or N m/rad, positive definite. loss_s: the joint's damping over its stiffness (s).
 
@@ -56,7 +56,7 @@ _LARGEST_MODE_RATIO = 4.0
 """Largest factor by which a mode's frequency may lie below or above the band."""
 _LARGEST_ROTATION_RAD = 0.3
 """Largest rotation of the sensor, rad."""
-_MOST_DELAY_SAMPLES = 200.0
+_MAX_DELAY_SAMPLES = 200.0
 """Largest delay of the command, samples."""
 _LARGEST_JOINT_LOG = 2.5
 """Bound of the logarithms on the diagonal of the joint stiffness's Cholesky factor, about their value for a resonance
@@ -133,17 +133,17 @@ class Structure:
             if name == "modes" and self.modes:
                 old_modes = unknowns[source].reshape(self.modes, -1)
                 new_modes = np.zeros((destination.modes, (target.stop - target.start) // destination.modes))
-                head = 2 + self.inputs
-                new_modes[: self.modes, :head] = old_modes[:, :head]
-                if old_modes.shape[1] > head:
-                    new_modes[: self.modes, new_modes.shape[1] - (old_modes.shape[1] - head) :] = old_modes[:, head:]
+                split = 2 + self.inputs
+                new_modes[: self.modes, :split] = old_modes[:, :split]
+                if old_modes.shape[1] > split:
+                    new_modes[: self.modes, new_modes.shape[1] - (old_modes.shape[1] - split) :] = old_modes[:, split:]
                 converted[target] = new_modes.ravel()
             elif name != "modes" and source.stop - source.start == target.stop - target.start:
                 converted[target] = unknowns[source]
         return converted
 
     def build_model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
-        """The model in relative coordinates. Raises MechanicalModelError where the mass is not positive definite."""
+        """Build the model in relative coordinates. Raises MechanicalModelError unless the mass is positive definite."""
         m, slices = self.inputs, self.slices
         mass, damping, stiffness = self.compute_axis_matrices(unknowns)
         frequency, ratio, participation, sensor_shapes = self.unpack_oscillators(unknowns)
@@ -168,15 +168,15 @@ class Structure:
         return insert_joint(model, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
     def compute_axis_matrices(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
+        """Compute mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
         m, slices, units = self.inputs, self.slices, self.units
         lower = _unpack_log_triangle(unknowns[slices["mass"]], m)
         stiffness = units[2] * _unpack_square(unknowns[slices["stiffness"]], m) if self.grounded else np.zeros((m, m))
         return units[0] * lower @ lower.T, units[1] * _unpack_square(unknowns[slices["damping"]], m), stiffness
 
     def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds (parameters,): no negative damper or spring on the diagonals, modes near the band,
-        damping ratios 1e-4 to 3, the joint's damping over its stiffness 1e-4 to 1 over speed_scale."""
+        """Compute lower and upper bounds (parameters,): no negative damper or spring on the diagonals, modes near the
+        band, damping ratios 1e-4 to 3, the joint's damping over its stiffness 1e-4 to 1 over speed_scale."""
         lower, upper = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
         slices, diagonal = self.slices, find_diagonal_indices(self.inputs)
         for name in ("damping", "stiffness"):
@@ -187,28 +187,28 @@ class Structure:
             _LARGEST_MASS_LOG,
         )
         if self.joint:
-            first_index = slices["joint"].start + diagonal
+            indices = slices["joint"].start + diagonal
             joint_log = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
-            lower[first_index], upper[first_index] = joint_log - _LARGEST_JOINT_LOG, joint_log + _LARGEST_JOINT_LOG
+            lower[indices], upper[indices] = joint_log - _LARGEST_JOINT_LOG, joint_log + _LARGEST_JOINT_LOG
             lower[slices["joint"].stop - 1], upper[slices["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
         lower[slices["turn"]], upper[slices["turn"]] = -_LARGEST_ROTATION_RAD, _LARGEST_ROTATION_RAD
-        lower[slices["delay"]], upper[slices["delay"]] = 0.0, _MOST_DELAY_SAMPLES
+        lower[slices["delay"]], upper[slices["delay"]] = 0.0, _MAX_DELAY_SAMPLES
         if self.modes:
             mode_size = (slices["modes"].stop - slices["modes"].start) // self.modes
-            first_index = slices["modes"].start + mode_size * np.arange(self.modes)
-            lower[first_index] = np.log(2 * np.pi * band_hz[0] / _LARGEST_MODE_RATIO / self.speed_scale)
-            upper[first_index] = np.log(2 * np.pi * band_hz[1] * _LARGEST_MODE_RATIO / self.speed_scale)
-            lower[first_index + 1], upper[first_index + 1] = np.log(1e-4), np.log(3.0)
+            indices = slices["modes"].start + mode_size * np.arange(self.modes)
+            lower[indices] = np.log(2 * np.pi * band_hz[0] / _LARGEST_MODE_RATIO / self.speed_scale)
+            upper[indices] = np.log(2 * np.pi * band_hz[1] * _LARGEST_MODE_RATIO / self.speed_scale)
+            lower[indices + 1], upper[indices + 1] = np.log(1e-4), np.log(3.0)
         return lower, upper
 
     def unpack_delay_s(self, unknowns: FloatArray) -> float:
-        """Delay of the command (s), not negative: fitted where `delayed`, else that of `actuator`."""
+        """Unpack the delay of the command (s), not negative: fitted where `delayed`, else that of `actuator`."""
         if not self.delayed:
             return self.actuator.delay_s
         return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)
 
     def unpack_oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Frequencies (modes,) in rad/s, damping ratios (modes,), participations (modes, m), shapes (modes, p)."""
+        """Unpack frequencies (modes,), rad/s, damping ratios (modes,), participations (modes, m), shapes (modes, p)."""
         m, p = self.inputs, self.outputs
         rows = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
         root_mass = np.sqrt(self.mass_scale)
@@ -219,21 +219,21 @@ class Structure:
 
 
 def pack_mass(mass: FloatArray) -> FloatArray:
-    """Unknowns of a mass (m, m), positive definite, in units of `mass_scale`: its Cholesky factor, with the logarithm
-    of the diagonal."""
+    """Pack a mass (m, m), positive definite, in units of `mass_scale`, as unknowns: its Cholesky factor, with the
+    logarithm of the diagonal."""
     lower = np.linalg.cholesky(mass)
     np.fill_diagonal(lower, np.log(np.diag(lower)))
     return np.asarray(lower[_list_triangle_indices(len(mass))])
 
 
 def pack_square_root(matrix: FloatArray) -> FloatArray:
-    """Unknowns of a damping or stiffness (m, m), positive definite, in the structure's units: its Cholesky factor, so
+    """Pack a damping or stiffness (m, m), positive definite, in the structure's units: its Cholesky factor, so
     that the matrix stays positive semidefinite (passive)."""
     return np.asarray(np.linalg.cholesky(matrix)[_list_triangle_indices(len(matrix))])
 
 
 def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
-    """Starting unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
+    """Start the unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
     mass = structure.compute_axis_matrices(unknowns)[0]
     m, joint_slice = structure.inputs, structure.slices["joint"]
     reduced_mass = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
@@ -246,26 +246,26 @@ def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float)
 
 
 def remove_mode(structure: Structure, unknowns: FloatArray, mode_index: int) -> tuple[Structure, FloatArray]:
-    """Structure and unknowns without the mode `mode_index`, from 0."""
+    """Remove the mode `mode_index` (from 0); returns the structure and the unknowns without it."""
     mode_slice = structure.slices["modes"]
     rows = np.delete(unknowns[mode_slice].reshape(structure.modes, -1), mode_index, axis=0)
     return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: mode_slice.start], rows.ravel()])
 
 
 def find_diagonal_indices(m: int) -> npt.NDArray[np.intp]:
-    """(m,): indices of the diagonal entries in the row-by-row lower triangle of an m x m matrix."""
+    """Find the indices (m,) of the diagonal entries in the row-by-row lower triangle of an m x m matrix."""
     rows, columns = _list_triangle_indices(m)
     return np.flatnonzero(rows == columns)
 
 
 @cache
 def _list_triangle_indices(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Rows and columns of the lower triangle, row by row. Cached: a fit calls this some ten thousand times."""
+    """List rows and columns of the lower triangle, row by row. Cached: a fit calls this some ten thousand times."""
     return np.tril_indices(m)
 
 
 def _unpack_log_triangle(unknowns: FloatArray, m: int) -> FloatArray:
-    """Cholesky factor (m, m) from its lower triangle, row by row, with the logarithms of its diagonal."""
+    """Unpack a Cholesky factor (m, m) from its lower triangle, row by row, with the logarithms of its diagonal."""
     lower = np.zeros((m, m))
     lower[_list_triangle_indices(m)] = unknowns
     np.fill_diagonal(lower, np.exp(np.diag(lower)))
@@ -273,14 +273,14 @@ def _unpack_log_triangle(unknowns: FloatArray, m: int) -> FloatArray:
 
 
 def _unpack_square(unknowns: FloatArray, m: int) -> FloatArray:
-    """Matrix (m, m) from the lower triangle of its Cholesky factor, row by row."""
+    """Unpack a matrix (m, m) from the lower triangle of its Cholesky factor, row by row."""
     lower = np.zeros((m, m))
     lower[_list_triangle_indices(m)] = unknowns
     return np.asarray(lower @ lower.T)
 
 
 def _compute_rotation(angles: FloatArray, m: int) -> FloatArray:
-    """Rotation (m, m) as the Cayley transform of a skew-symmetric matrix of small angles."""
+    """Compute a rotation (m, m) as the Cayley transform of a skew-symmetric matrix of small angles (rad)."""
     if not len(angles):
         return np.eye(m)
     skew = np.zeros((m, m))
@@ -290,7 +290,7 @@ def _compute_rotation(angles: FloatArray, m: int) -> FloatArray:
 
 
 def _assemble_matrix(driven: FloatArray, coupling: FloatArray | None, diagonal: FloatArray) -> FloatArray:
-    """Matrix of the driven axes (m, m), then the oscillators. diagonal: (modes,), coupling: (modes, m)."""
+    """Assemble a matrix of the driven axes (m, m), then the oscillators. diagonal: (modes,), coupling: (modes, m)."""
     m, n = len(driven), len(driven) + len(diagonal)
     matrix = np.zeros((n, n))
     matrix[:m, :m] = driven

@@ -19,14 +19,14 @@ from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_GRID_FREQUENCIES = 80
+_FREQUENCY_COUNT = 80
 """Number of natural frequencies on the logarithmic search grid. Chosen."""
 _GRID_DAMPING_RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
 """Damping ratios on the search grid; above 1 the mode is overdamped. Heuristic."""
 _LOG_STEP = 1e-6
-"""Step of finite differences: of logarithms, and of the delay in samples."""
-_MOST_DELAY_SAMPLES = 20.0
-"""Largest delay of the command, samples. Chosen."""
+"""Step of finite differences: of logarithms, and of the delay in samples. Chosen."""
+_MAX_SEARCH_DELAY_SAMPLES = 20.0
+"""Largest delay (samples) of the command that the search allows. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ class ModalSearch:
         best_point = max(
             ((self._compute_explained_squares(solution, np.array([log_frequency, np.log(ratio), delay_samples])),
               log_frequency, np.log(ratio))
-            for log_frequency in np.linspace(low_log, high_log, _GRID_FREQUENCIES) for ratio in _GRID_DAMPING_RATIOS),
+            for log_frequency in np.linspace(low_log, high_log, _FREQUENCY_COUNT) for ratio in _GRID_DAMPING_RATIOS),
         )  # fmt: skip
         modes = len(logs) // 2
         return self._refine(
@@ -90,15 +90,15 @@ class ModalSearch:
         )
 
     def _refine(self, start: FloatArray) -> ModeEstimate:
-        """Bounded least squares over the unknowns: logs of w (rad/s), logs of damping ratios, delay (samples). The
-        delay is free only where `fit_delay` and with at least two modes. Bounds (chosen): natural frequencies from a
-        tenth of the lower to twice the upper end of the band, damping ratios 1e-3 to 30."""
+        """Refine the unknowns by bounded least squares: logs of w (rad/s), logs of damping ratios, delay (samples). The
+        delay is free only where `fit_delay` and with at least two modes. Bounds, like the stopping limits, are chosen:
+        natural frequencies from a tenth of the lower to twice the upper end of the band, damping ratios 1e-3 to 30."""
         # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
         from scipy.optimize import least_squares
 
         modes, delay_samples = len(start) // 2, start[-1]
-        low_delay, high_delay = (
-            (0.0, _MOST_DELAY_SAMPLES)
+        low_delay_samples, high_delay_samples = (
+            (0.0, _MAX_SEARCH_DELAY_SAMPLES)
             if self._fit_delay and modes > 1
             else (delay_samples - 1e-9, delay_samples + 1e-9)
         )
@@ -106,7 +106,7 @@ class ModalSearch:
             [np.full(modes, np.log(2 * np.pi * self._band_hz[0] / 10)), np.full(modes, np.log(1e-3))]
         )
         upper = np.concatenate([np.full(modes, np.log(2 * np.pi * self._band_hz[1] * 2)), np.full(modes, np.log(30.0))])
-        lower, upper = np.append(lower, low_delay), np.append(upper, high_delay)
+        lower, upper = np.append(lower, low_delay_samples), np.append(upper, high_delay_samples)
         optimum = least_squares(
             lambda unknowns: self._stack_real(self._solve(unknowns).misfit),
             np.clip(start, lower + 1e-10, upper - 1e-10),
@@ -126,8 +126,8 @@ class ModalSearch:
         )
 
     def _solve(self, unknowns: FloatArray) -> _Solution:
-        """Shapes by linear least squares on the lines not held out, output by output, and residuals on all lines.
-        unknowns: as in `_refine`."""
+        """Solve for the shapes by linear least squares on the lines not held out, output by output, and compute the
+        residuals on all lines. unknowns: as in `_refine`."""
         m, p, modes = self._structure.inputs, self._structure.outputs, len(unknowns) // 2
         mode_responses = [self._compute_mode_responses(group, unknowns) for group in self._groups]
         shapes = np.zeros((modes, p, m))
@@ -160,8 +160,8 @@ class ModalSearch:
         return _Solution(misfit, bases, shapes)
 
     def _compute_jacobian(self, unknowns: FloatArray) -> FloatArray:
-        """Kaufman's approximation: derivative at fixed shapes, by finite differences, with the shapes' span projected
-        out."""
+        """Compute the Jacobian by Kaufman's approximation: derivative at fixed shapes, by finite differences, with the
+        shapes' span projected out."""
         solution = self._solve(unknowns)
         mode_count = len(unknowns) // 2
         columns = []
@@ -189,8 +189,8 @@ class ModalSearch:
         return np.stack(columns, axis=1)
 
     def _compute_explained_squares(self, solution: _Solution, unknowns: FloatArray) -> float:
-        """Fall of the residual sum of squares by a further mode, all shapes free. unknowns: its three, as in
-        `_refine`."""
+        """Compute how much a further mode lowers the residual sum of squares, all shapes free. unknowns: (3,), of the
+        further mode, as in `_refine`."""
         responses = [self._compute_mode_responses(group, unknowns)[:, 0] for group in self._groups]
         explained_squares = 0.0
         for output, basis in enumerate(solution.bases):
@@ -213,7 +213,7 @@ class ModalSearch:
         return explained_squares
 
     def _project_out(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
-        """Component of a change of the residuals that no change of the shapes can compensate, output by output."""
+        """Project out of a change of the residuals what a change of the shapes can compensate, output by output."""
         projected_columns = []
         for output, basis in enumerate(bases):
             column = _concatenate_real_imaginary(
@@ -228,7 +228,8 @@ class ModalSearch:
         return np.concatenate(projected_columns)
 
     def _stack_real(self, misfit: Sequence[ComplexArray]) -> FloatArray:
-        """Residuals on the lines not held out as a real vector, output by output, in the rows' order of the bases."""
+        """Stack the residuals on the lines not held out in a real vector, output by output, in the rows' order of the
+        bases."""
         return np.concatenate(
             [
                 _concatenate_real_imaginary(
@@ -244,8 +245,8 @@ class ModalSearch:
         )
 
     def _compute_mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
-        """(lines, modes): responses of modes of unit mass by partial fractions, sampled exactly, with delay and sensor.
-        A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
+        """Compute the responses (lines, modes) of modes of unit mass by partial fractions, sampled exactly, with delay
+        and sensor. A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
         modes = len(unknowns) // 2
         natural_rad_s, ratio = np.exp(unknowns[:modes]), np.exp(unknowns[modes : 2 * modes])
         delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz
@@ -262,5 +263,5 @@ class ModalSearch:
 
 
 def _concatenate_real_imaginary(values: ComplexArray) -> FloatArray:
-    """Real parts, then imaginary parts, along the first dimension."""
+    """Concatenate the real parts and the imaginary parts along the first dimension."""
     return np.concatenate([values.real, values.imag])

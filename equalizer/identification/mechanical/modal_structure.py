@@ -57,7 +57,7 @@ class ModalStructure:
         return self.modes
 
     def build_model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
-        """The model in modal coordinates normalised to unit modal mass. unknowns: (parameters,), mode by mode."""
+        """Build the model in modal coordinates normalised to unit modal mass. unknowns: (parameters,), mode by mode."""
         mode_rows = unknowns.reshape(self.modes, -1)
         natural_rad_s, damping_ratio = self.speed_scale * np.exp(mode_rows[:, 0]), np.exp(mode_rows[:, 1])
         return MechanicalModel(
@@ -74,7 +74,8 @@ class ModalStructure:
         )
 
     def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds (parameters,) of the unknowns, for a fit in this band; shapes are unbounded."""
+        """Compute lower and upper bounds (parameters,) of the unknowns, for a fit in this band; shapes are
+        unbounded."""
         lower = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
         upper = -lower
         lower[:, 0] = np.log(2 * np.pi * band_hz[0] / _BAND_MARGIN / self.speed_scale)
@@ -101,9 +102,9 @@ def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> F
 
 
 def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
-    """The model in coordinates of component-mode synthesis: first the driven axes, then the remaining modes with those
-    axes held (Craig and Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's axis
-    independently."""
+    """Transform the model to coordinates of component-mode synthesis: first the driven axes, then the remaining modes
+    with those axes held (Craig and Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's
+    axis independently."""
     B = model.input
     m, n = B.shape[1], model.coordinates
     left_vectors, singular_values, right_vectors = np.linalg.svd(B)

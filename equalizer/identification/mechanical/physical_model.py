@@ -27,9 +27,9 @@ AnyFit = RefinedFit[Structure] | RefinedFit[ModalStructure]
 
 
 def make_physical_model(fit: AnyFit, name: str) -> MechanicalModel:
-    """Mechanical model of a fit with its tolerance, in absolute coordinates, in which oscillators have no inertial
-    coupling with the driven axes; a fit with modes is converted by `to_driven_axes`. Raises numpy.linalg.LinAlgError
-    where such modes do not move every driven axis independently."""
+    """Make the mechanical model of a fit with its tolerance, in absolute coordinates, in which oscillators have no
+    inertial coupling with the driven axes; a fit with modes is converted by `to_driven_axes`. Raises
+    numpy.linalg.LinAlgError where such modes do not move every driven axis independently."""
     model = fit.structure.build_model(fit.unknowns, name)
     if isinstance(fit.structure, ModalStructure):
         model = to_driven_axes(model)
@@ -50,8 +50,8 @@ def estimate_tolerance(fit: AnyFit) -> Tolerance:
 
 
 def _estimate_oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
-    """Tolerance of a structure of oscillators: the covariance of the unknowns, propagated to the values at the axes by
-    their Jacobian. The unknowns of the modes are log frequencies: their deviations are relative."""
+    """Estimate the tolerance of a structure of oscillators: the covariance of the unknowns, propagated to the values at
+    the axes by their Jacobian. The unknowns of the modes are log frequencies: their deviations are relative."""
     axis_values = _list_axis_values(structure, fit.unknowns)
     jacobian = compute_numerical_jacobian(
         lambda unknowns: _list_axis_values(structure, unknowns),
@@ -61,8 +61,8 @@ def _estimate_oscillator_tolerance(structure: Structure, fit: AnyFit) -> Toleran
     )
     covariance = _compute_covariance(fit)
     deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian), 0.0))
-    deviations, values = deviations.reshape(3, -1).max(axis=1), axis_values.reshape(3, -1).max(axis=1)
-    mass, damping, stiffness = np.maximum(deviations, LEAST_RELATIVE_TOLERANCE * values).tolist()
+    deviations, largest_values = deviations.reshape(3, -1).max(axis=1), axis_values.reshape(3, -1).max(axis=1)
+    mass, damping, stiffness = np.maximum(deviations, LEAST_RELATIVE_TOLERANCE * largest_values).tolist()
     mode_tolerance = None
     if structure.modes:
         mode_deviations = np.sqrt(np.diag(covariance)[structure.slices["modes"]]).reshape(structure.modes, -1)
@@ -71,13 +71,13 @@ def _estimate_oscillator_tolerance(structure: Structure, fit: AnyFit) -> Toleran
 
 
 def _list_axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
-    """(3 m,): mass, then damping to the ground, then stiffness to the ground, each at all m driven axes."""
+    """List the values (3 m,) at the m driven axes: masses, then dampings and stiffnesses to the ground."""
     return np.concatenate([np.diag(part) for part in structure.compute_axis_matrices(unknowns)])
 
 
 def _compute_covariance(fit: AnyFit) -> FloatArray:
-    """Covariance of the unknowns (parameters, parameters). Columns of the Jacobian are scaled to length 1; the
-    pseudo-inverse truncates directions that the data do not determine (singular values of J'J below 1e-10 of the
+    """Compute the covariance of the unknowns (parameters, parameters). Columns of the Jacobian are scaled to length 1;
+    the pseudo-inverse truncates directions that the data do not determine (singular values of J'J below 1e-10 of the
     largest)."""
     jacobian = fit.jacobian
     column_norms = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
@@ -87,7 +87,7 @@ def _compute_covariance(fit: AnyFit) -> FloatArray:
 
 
 def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
-    """The model with absolute positions z of the oscillators in place of their relative modal coordinates
+    """Convert to a model with absolute positions z of the oscillators in place of their relative modal coordinates
     e = |L| (z - hᵀ x), where L is the participation, h = L / |L| the direction, and |L|² the mass of an oscillator.
     Unchanged without oscillators, and where a participation is too small to divide by: |L| below 1e-6 of the root of
     the largest mass. m: number of driven axes. joint: whether the oscillators are on the axes beyond a joint."""

@@ -63,8 +63,9 @@ def fit_rigid_body(
 ) -> RigidBody:
     """Fit a rigid body to two recordings of the same device, at a stronger and a weaker level of the excitation, and
     compute the equivalent damping of friction from their difference (limited to 0 to `LARGEST_REMOVED_SHARE` of the
-    damping). fit: that of the whole band, whose tolerances are kept where they are wider. settings: of `fit`. Raises
-    MechanicalFitRefused where a recording does not determine a rigid body, ValueError where one has no segments."""
+    damping; r - 1 counts as at least 0.001). fit: that of the whole band, whose tolerances are kept where they are
+    wider. settings: of `fit`. Raises MechanicalFitRefused where a recording does not determine a rigid body, ValueError
+    where one has no segments."""
     low_hz, high_hz = fit.band_hz
     up_to_hz = min(high_hz, low_hz * 2**RIGID_OCTAVES)
     rigid_settings = replace(
@@ -98,17 +99,19 @@ def fit_rigid_body(
 
 
 def remove_friction_damping(model: MechanicalModel, friction_damping: FloatArray) -> MechanicalModel:
-    """The model without friction's equivalent damping. friction_damping: (m,), N s/m at each driven axis."""
+    """Subtract friction's equivalent damping from the model. friction_damping: (m,), N s/m at each driven axis."""
     driven_axes = compute_driven_axes(model)
     return replace(model, damping=model.damping - (driven_axes * friction_damping) @ driven_axes.T)
 
 
 def _extract_axis_parameters(model: MechanicalModel) -> FloatArray:
-    """(3, m): mass, damping and stiffness at each driven axis, which are the first m coordinates of a fitted model."""
+    """Extract mass, damping and stiffness (3, m) at each driven axis, which are the first m coordinates of a fitted
+    model."""
     matrices: Sequence[FloatArray] = (model.mass, model.damping, model.stiffness)
     return np.array([np.diag(matrix)[: model.inputs] for matrix in matrices])
 
 
 def _find_largest_amplitude(recording: Recording) -> float:
-    """Largest amplitude of a recording's segments, in the command's unit. Raises ValueError without segments."""
+    """Find the largest amplitude of a recording's segments, in the command's unit. Raises ValueError without
+    segments."""
     return max(segment.amplitude for segment in recording.segments)

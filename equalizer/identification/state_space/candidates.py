@@ -4,7 +4,8 @@ The cost as a function of poles and output shapes has many local minima. Two sub
 models without iteration, each for several horizons (`identify` calls them): frequency-domain identification on a warped
 frequency axis (`warped_subspace`), and canonical variate analysis of time records (`canonical_variate`). Each start is
 refined by maximum likelihood (`refinement`), first on lines averaged in bins, where the cost is smooth and cheap, then,
-in a narrow band, on all lines. Equations and references are in these modules. Called by `identify` and `relaxed_poles`.
+in a narrow band, on all lines. Equations and references are in these modules. Called by `identify`, `relaxed_poles` and
+`order_report`.
 """
 
 from collections.abc import Sequence
@@ -46,8 +47,8 @@ Heuristic."""
 GAIN_POINTS = 2000
 """Number of frequencies from 0 to half the sample rate over which `compute_outside_gain` takes the largest gain.
 Chosen."""
-MOST_BIN_STEPS, MOST_LINE_STEPS = (60, 20, 20), 4
-"""Largest number of Levenberg-Marquardt steps: in each of three passes on averaged lines, and at the end on all lines
+MAX_BIN_STEPS, MAX_LINE_STEPS = (60, 20, 20), 4
+"""Largest numbers of Levenberg-Marquardt steps: in each of three passes on averaged lines, and at the end on all lines
 of a narrow band. Heuristic."""
 
 
@@ -80,14 +81,15 @@ class Candidate:
 
 
 def estimate_subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
-    """Starting models by frequency-domain subspace identification, one per entry of `settings.longer_horizons`. Raises
-    numpy.linalg.LinAlgError where the order has more parameters than the lines determine."""
+    """Estimate starting models by frequency-domain subspace identification, one per entry of
+    `settings.longer_horizons`. Raises numpy.linalg.LinAlgError where the order has more parameters than the lines
+    determine."""
     return tuple(estimate_subspace_start(lines, settings, extra_rows) for extra_rows in settings.longer_horizons)
 
 
 def estimate_subspace_start(lines: WeightedLines, settings: IdentificationSettings, extra_rows: int) -> Start:
-    """Starting model by frequency-domain subspace identification with a warped frequency axis. extra_rows: block rows
-    beyond the shortest useful horizon."""
+    """Estimate a starting model by frequency-domain subspace identification with a warped frequency axis. extra_rows:
+    block rows beyond the shortest useful horizon."""
     radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
     horizon = choose_horizon(settings.order, lines.response.shape[1]) + extra_rows
     subspace = estimate_subspace(lines, horizon, settings.centre_hz)
@@ -97,8 +99,8 @@ def estimate_subspace_start(lines: WeightedLines, settings: IdentificationSettin
 def estimate_record_starts(
     recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
 ) -> tuple[Start, ...]:
-    """Starting models by canonical variate analysis of time records, one per horizon that has enough rows and samples;
-    none where the band is too wide for decimation by 2 or more."""
+    """Estimate starting models by canonical variate analysis of time records, one per horizon that has enough rows and
+    samples; none where the band is too wide for decimation by 2 or more."""
     decimation_factor = choose_decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
     if decimation_factor < 2:
         return ()
@@ -115,7 +117,7 @@ def estimate_record_starts(
 
 
 def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
-    """Candidate from a starting model: B and D by linear least squares, then refined as in `refine_candidate`."""
+    """Complete a starting model by B and D (linear least squares), and refine it as in `refine_candidate`."""
     radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
     return refine_candidate(start.name, complete_form(start.form, lines), lines, settings, radius)
 
@@ -125,10 +127,10 @@ def refine_candidate(
 ) -> Candidate:
     """Refine a model on bins, formed anew about the result of each pass, then on all lines if the band is narrow.
     radius: largest magnitude of a pole."""
-    for steps in MOST_BIN_STEPS:
+    for steps in MAX_BIN_STEPS:
         fitted = refine_form(fitted.form, average_about_model(fitted, lines, settings), radius, steps)
     if not settings.wide:
-        fitted = refine_form(fitted.form, lines, radius, MOST_LINE_STEPS)
+        fitted = refine_form(fitted.form, lines, radius, MAX_LINE_STEPS)
     cost = lines.compute_cost(fitted.compute_response(lines.z)) / lines.response.size
     return Candidate(name, fitted, cost, compute_outside_gain(fitted, lines), radius)
 
@@ -142,8 +144,8 @@ def average_about_model(fitted: FittedForm, lines: WeightedLines, settings: Iden
 
 
 def compute_outside_gain(fitted: FittedForm, lines: WeightedLines) -> float:
-    """Largest gain at `GAIN_POINTS` frequencies from 0 to half the sample rate over the largest on the lines. The gain
-    is the largest singular value of the response matrix."""
+    """Compute the largest gain at `GAIN_POINTS` frequencies from 0 to half the sample rate over the largest on the
+    lines. The gain is the largest singular value of the response matrix."""
     unit_circle = np.exp(1j * np.linspace(0, np.pi, GAIN_POINTS))
     return float(
         _find_largest_gain(fitted.compute_response(unit_circle)) / _find_largest_gain(fitted.compute_response(lines.z))
@@ -151,8 +153,8 @@ def compute_outside_gain(fitted: FittedForm, lines: WeightedLines) -> float:
 
 
 def choose_best(candidates: Sequence[Candidate]) -> Candidate:
-    """The candidate of lowest cost among those with acceptable gain outside the band; if none is acceptable, the
-    candidate with the smallest gain outside the band. Raises ValueError for an empty sequence."""
+    """Choose the candidate of lowest cost among those with acceptable gain outside the band; if none is acceptable,
+    that with the smallest gain outside the band. Raises ValueError for an empty sequence."""
     acceptable = [candidate for candidate in candidates if candidate.has_acceptable_gain]
     return (
         min(acceptable, key=lambda candidate: candidate.cost)
@@ -162,5 +164,5 @@ def choose_best(candidates: Sequence[Candidate]) -> Candidate:
 
 
 def _find_largest_gain(response: ComplexArray) -> float:
-    """Largest singular value of a response (lines, outputs, inputs), over all lines."""
+    """Find the largest singular value of a response (lines, outputs, inputs) over all lines."""
     return float(np.linalg.norm(response, ord=2, axis=(1, 2)).max())

@@ -29,8 +29,8 @@ _UNDRIVEN_SEGMENT_KINDS = ("rest", "free")
 
 
 def choose_decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
-    """Largest decimation factor that leaves `LEAST_RATE_OVER_BAND` samples or more per period of high_hz; 1 where none
-    does."""
+    """Choose the largest decimation factor that leaves `LEAST_RATE_OVER_BAND` samples or more per period of high_hz; 1
+    where none does."""
     return max(1, int(sample_rate_hz / (LEAST_RATE_OVER_BAND * high_hz)))
 
 
@@ -86,13 +86,13 @@ def estimate_observability(records: Sequence[FloatArray], inputs: int, horizon: 
 
 
 def _compute_qr_triangle(rows: FloatArray) -> FloatArray:
-    """Triangular factor R of the QR decomposition; R'R equals rows' rows."""
+    """Compute the triangular factor R of the QR decomposition of rows (n, k); R'R equals rows' rows."""
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
 def _stack_past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArray:
-    """(instants, 2 horizon m + 2 horizon p): future commands, then past commands and responses, then future responses,
-    with one row per sampling instant."""
+    """Stack the data matrix (instants, 2 horizon m + 2 horizon p): future commands, then past commands and responses,
+    then future responses, with one row per sampling instant."""
     windows = np.lib.stride_tricks.sliding_window_view(record, 2 * horizon, axis=0).transpose(0, 2, 1)
     past, future = windows[:, :horizon], windows[:, horizon:]
     instants = len(windows)
@@ -108,10 +108,10 @@ def _stack_past_and_future(record: FloatArray, inputs: int, horizon: int) -> Flo
 def estimate_poles_and_shapes(
     extended_observability: FloatArray, outputs: int, order: int, decimation_factor: int, radius: float
 ) -> ModalForm:
-    """Modal form of a model of this order at the full rate. The poles are the eigenvalues of the matrix A that shifts
-    the observability matrix by one sample, in least squares. A pole of the decimated records becomes its factor-th
-    root. extended_observability: result of `estimate_observability`; decimation_factor: of the records; radius:
-    largest magnitude of a pole at the full rate."""
+    """Estimate the modal form of a model of this order at the full rate. The poles are the eigenvalues of the matrix A
+    that shifts the observability matrix by one sample, in least squares. A pole of the decimated records becomes its
+    factor-th root. extended_observability: result of `estimate_observability`; decimation_factor: of the records;
+    radius: largest magnitude of a pole at the full rate."""
     observability = extended_observability[:, :order]
     eigenvalues, eigenvectors = np.linalg.eig(
         np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0]

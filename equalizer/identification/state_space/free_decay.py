@@ -2,7 +2,7 @@
 
 A period of N samples that begins in the state x_0 and ends in x_N contains, in addition to the periodic response, the
 free decay C A^t (I - A^N)^-1 (x_0 - x_N), t = 0 ... N - 1. In periods shorter than about ten time constants it does not
-die out, and would bias the estimate of the frequency response. The states are simulated from rest. Called by
+vanish, and would bias the estimate of the frequency response. The states are simulated from rest. Called by
 `identify_recordings`.
 """
 
@@ -52,7 +52,7 @@ def subtract_free_decay(recordings: Sequence[Recording], slow_modes: SlowModes) 
 
 
 def _subtract_from_periods(recording: Recording, slow_modes: SlowModes) -> Recording:
-    """`subtract_free_decay` for one recording."""
+    """Subtract the free decay from every period of a recording, as `subtract_free_decay` states."""
     command_samples, response_samples = recording.command.samples, np.array(recording.response.samples)
     states: dict[int, FloatArray] = {}
     periods = [
@@ -81,7 +81,7 @@ def _subtract_from_periods(recording: Recording, slow_modes: SlowModes) -> Recor
 def _compute_free_decay(
     slow_modes: SlowModes, start_state: FloatArray, end_state: FloatArray, sample_count: int
 ) -> FloatArray:
-    """Free decay (sample_count, p) within a period that starts and ends in the given states, (n,) each."""
+    """Compute the free decay (sample_count, p) within a period that starts and ends in the given states, (n,) each."""
     period_transition = np.linalg.matrix_power(slow_modes.A, sample_count)
     x = np.linalg.solve(np.eye(len(slow_modes.A)) - period_transition, start_state - end_state)
     decay = np.empty((sample_count, len(slow_modes.C)))

@@ -72,7 +72,7 @@ class _SegmentComparison:
 
 
 def _iterate_test_segments(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, Segment]]:
-    """Segments with the role "test", each with its recording."""
+    """Iterate over the segments with the role "test", each with its recording."""
     for recording in recordings:
         for segment in recording.segments:
             if segment.role == "test":
@@ -111,22 +111,22 @@ def _compare_segment(model: IdentifiedModel, recording: Recording, segment: Segm
 
 
 def _count_run_in_samples(model: IdentifiedModel) -> int:
-    """Length of the run-in in samples; `MIN_RUN_IN_S` alone counts where the spectral radius is 0, or 1 and more."""
+    """Count the samples of the run-in; `MIN_RUN_IN_S` alone counts where the spectral radius is 0, or 1 and more."""
     spectral_radius = model.spectral_radius
     time_constant_samples = -1 / np.log(spectral_radius) if 0 < spectral_radius < 1 else 0.0
     return round(max(MIN_RUN_IN_S * model.sample_rate_hz, MIN_RUN_IN_TIME_CONSTANTS * time_constant_samples))
 
 
 def _find_first_compared_sample(segment: Segment) -> int:
-    """First compared sample: start of the last complete period, when the transient has decayed; without periods, start
-    of the segment."""
+    """Find the first compared sample: start of the last complete period, when the transient has decayed; without
+    periods, start of the segment."""
     period_count = (segment.stop - segment.start) // segment.period if segment.period else 0
     return segment.stop - segment.period if period_count >= 1 else segment.start
 
 
 def _compute_band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> ComplexArray:
-    """(lines, p): Fourier transform of samples (n, p) at the lines within the band, ends included. Raises ValueError
-    where no line lies in it."""
+    """Compute the Fourier transform (lines, p) of samples (n, p) at the lines within the band, ends included. Raises
+    ValueError where no line lies in it."""
     line_hz = np.fft.rfftfreq(len(samples), 1 / rate_hz)
     in_band = (line_hz >= band_hz[0]) & (line_hz <= band_hz[1])
     if not in_band.any():
@@ -135,12 +135,12 @@ def _compute_band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[f
 
 
 def _compute_power(spectrum: ComplexArray) -> float:
-    """Sum of squared magnitudes."""
+    """Compute the sum of the squared magnitudes of a spectrum (lines, p)."""
     return float((np.abs(spectrum) ** 2).sum())
 
 
 def _check_compatible(model: IdentifiedModel, recording: Recording) -> None:
-    """Raises ValueError where sample rate or numbers of channels differ from the model's."""
+    """Check a recording: raises ValueError where sample rate or numbers of channels differ from the model's."""
     if recording.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
             f"a recording at {recording.sample_rate_hz:g} Hz cannot test a model at {model.sample_rate_hz:g}"

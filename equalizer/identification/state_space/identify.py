@@ -128,7 +128,7 @@ def identify(
     report_progress = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = require_lines(responses, settings)
-    _refuse_foreign_records(records, responses[0])
+    _refuse_mismatched_records(records, responses[0])
 
     if initial is not None:
         refit = RelaxedFit(refine_and_tighten(initial, lines, settings), is_bound_binding=False)
@@ -159,7 +159,7 @@ def _search(
     for start_index, start in enumerate(starts):
         report_progress(start_index / len(starts))
         candidates.append(refine_start(start, lines, settings))
-    candidates += _search_spare_horizons(choose_best(candidates), lines, settings)
+    candidates += _refine_spare_starts(choose_best(candidates), lines, settings)
     report_progress(1.0)
     return candidates
 
@@ -167,8 +167,8 @@ def _search(
 def _make_starts(
     lines: WeightedLines, settings: IdentificationSettings, records: tuple[Recording, ...]
 ) -> tuple[Start, ...]:
-    """Starting models from the lines and from the time records. Raises IdentificationRefused for an order with more
-    parameters than the lines determine."""
+    """Make starting models from the lines and from the time records. Raises IdentificationRefused for an order with
+    more parameters than the lines determine."""
     try:
         return (*estimate_subspace_starts(lines, settings), *estimate_record_starts(records, lines, settings))
     except np.linalg.LinAlgError as problem:
@@ -179,11 +179,11 @@ def _make_starts(
         ) from problem
 
 
-def _search_spare_horizons(
+def _refine_spare_starts(
     best_so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings
 ) -> list[Candidate]:
-    """Further candidates of a wide band, one per entry of `spare_horizons`, until the residual of one is within
-    noise."""
+    """Refine further starting models of a wide band, one per entry of `spare_horizons`, until the cost of one is at
+    most `UNEXPLAINED_COST`."""
     candidates: list[Candidate] = []
     for extra_rows in settings.spare_horizons if settings.wide else ():
         if choose_best([best_so_far, *candidates]).cost <= UNEXPLAINED_COST:
@@ -199,7 +199,7 @@ def _assess_model(
     response: FrequencyResponse,
     settings: IdentificationSettings,
 ) -> Identified:
-    """Result for the fitted model: cost, errors in the band, misfit, scatter of the bootstrap draws, and remarks."""
+    """Assess the fitted model: cost, errors in the band, misfit, scatter of the bootstrap draws, and remarks."""
     chosen = relaxed_fit.candidate
     low_hz, high_hz = settings.band_hz
     p, m = lines.response.shape[1:]
@@ -231,8 +231,8 @@ def _assess_model(
     )
 
 
-def _refuse_foreign_records(records: tuple[Recording, ...], response: FrequencyResponse) -> None:
-    """Raises IdentificationRefused for a record whose sample rate or channels differ from those of the response."""
+def _refuse_mismatched_records(records: tuple[Recording, ...], response: FrequencyResponse) -> None:
+    """Raise IdentificationRefused for a record whose sample rate or channels differ from those of the response."""
     for record in records:
         record_format = (record.sample_rate_hz, record.command.channels, record.response.channels)
         if record_format != (response.sample_rate_hz, response.input_channels, response.output_channels):
@@ -245,7 +245,7 @@ def _refuse_foreign_records(records: tuple[Recording, ...], response: FrequencyR
 
 
 def write_outside_gain_remark(chosen: Candidate) -> list[str]:
-    """Remark on a large gain outside the band; empty where the gain is acceptable."""
+    """Write a remark on a large gain outside the band; empty where the gain is acceptable."""
     if chosen.has_acceptable_gain:
         return []
     return [
@@ -262,7 +262,7 @@ def _make_model(
     settings: IdentificationSettings,
     relaxed_poles: tuple[SlowPole, ...],
 ) -> IdentifiedModel:
-    """The model to store, with bootstrap draws of its parameters (if requested) and its provenance."""
+    """Make the model to store, with bootstrap draws of its parameters (if requested) and its provenance."""
     fitted = chosen.fitted
     samples = None
     if settings.draws:

@@ -24,8 +24,8 @@ from equalizer.signals.recording import Recording
 DISTURBING_DECAY_S = 1.0
 """Time constant (s) above which the transient at the start of an excitation disturbs the estimate, which leaves out the
 first 5 s (`experiments.TRANSIENT_S`). Chosen: after five time constants less than 1 % remains."""
-MOST_ROUNDS = 8
-"""Most repetitions in which slow transients are subtracted and the model is refined. Chosen."""
+MAX_ROUNDS = 8
+"""Largest number of repetitions in which slow transients are subtracted and the model is refined. Chosen."""
 SETTLED_DECAY_CHANGE = 1e-4
 """Relative change of the slowest decay between rounds below which no further round is made. Chosen."""
 SMOOTHED_REMARK = (
@@ -68,7 +68,7 @@ def identify_recordings(
     result = _fit_estimate(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
     if has_repeats and result.fitted is result.estimate:
         return result
-    return _add_causes(result, settings, has_repeats)
+    return _add_misfit_causes(result, settings, has_repeats)
 
 
 def _fit_estimate(
@@ -90,7 +90,7 @@ def _fit_estimate(
     return _fit_smoothed(estimate, recordings, settings, identified, lambda share: report_progress(0.5 + share / 2))
 
 
-def _add_causes(
+def _add_misfit_causes(
     result: IdentifiedRecordings, settings: IdentificationSettings, has_repeats: bool
 ) -> IdentifiedRecordings:
     """Add the causes of the misfit, judged on the lines themselves: residuals of local averages are always smooth,
@@ -122,13 +122,13 @@ def _remove_transients(
     settings: IdentificationSettings,
 ) -> tuple[FrequencyResponse, Identified]:
     """Subtract the free decay of slow poles from the recordings, and identify again, until the slowest decay changes by
-    less than `SETTLED_DECAY_CHANGE`, or `MOST_ROUNDS` are done."""
+    less than `SETTLED_DECAY_CHANGE`, or `MAX_ROUNDS` are done."""
     radius, settings_without_draws = (
         compute_pole_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz),
         replace(settings, draws=0),
     )
     rounds = 0
-    while (slow_modes := extract_slow_modes(identified, radius)) is not None and rounds < MOST_ROUNDS:
+    while (slow_modes := extract_slow_modes(identified, radius)) is not None and rounds < MAX_ROUNDS:
         previous_decay_s, rounds = identified.slowest_decay_s, rounds + 1
         estimate = estimate_transfer(subtract_free_decay(recordings, slow_modes))
         identified = identify(estimate, settings_without_draws, initial=identified.chosen)

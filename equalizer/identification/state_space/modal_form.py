@@ -2,7 +2,7 @@
 
 A complex pair (b < 0) becomes two real poles (b > 0) continuously, so that a gradient-based fit can pass from a pair to
 two real poles. The order is even, because a block has two poles. Used by the starting models (`canonical_variate`,
-`warped_subspace`) and by `refinement`.
+`warped_subspace`), `candidates` and `refinement`.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class ModalForm:
         return np.concatenate([self.a + root, self.a - root])
 
     def compute_state_outputs(self, z: ComplexArray) -> ComplexArray:
-        """C (zI - A)^-1, shape (lines, p, n). z: (lines,)."""
+        """Compute C (zI - A)^-1, shape (lines, p, n). z: (lines,)."""
         offset = z[:, None] - self.a
         inverse_denominator = 1 / (offset**2 - self.b)
         first, second = self.C[:, ::2], self.C[:, 1::2]
@@ -50,7 +50,7 @@ class ModalForm:
         return state_outputs
 
     def compute_state_responses(self, z: ComplexArray, B: FloatArray) -> ComplexArray:
-        """(zI - A)^-1 B, shape (lines, n, m). z: (lines,), B: (n, m)."""
+        """Compute (zI - A)^-1 B, shape (lines, n, m). z: (lines,), B: (n, m)."""
         offset = (z[:, None] - self.a)[:, :, None]
         inverse_denominator = 1 / (offset**2 - self.b[:, None])
         state_responses = np.empty((len(z), *B.shape), dtype=np.complex128)
@@ -67,8 +67,8 @@ def compute_modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
 
 
 def from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
-    """The real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n), output of
-    each pole's mode. Raises ValueError where the number of real poles is odd or a conjugate is missing."""
+    """Make the real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n),
+    output of each pole's mode. Raises ValueError where the number of real poles is odd or a conjugate is missing."""
     upper_poles = np.flatnonzero(poles.imag > 0)
     real_poles = np.flatnonzero(poles.imag == 0)
     real_poles = real_poles[np.argsort(poles[real_poles].real)]

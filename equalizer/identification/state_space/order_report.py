@@ -34,9 +34,9 @@ class OrderRow:
     """Rms error on held-out lines relative to the rms response (`WeightedLines.compute_relative_error`); noise
     included."""
     multiply_adds_per_tick: int
-    """Multiplications for one step of the state and one output, with poles in blocks of two."""
+    """Number of multiplications for one step of the state and the outputs, with poles in blocks of two."""
     dense_multiply_adds_per_tick: int
-    """The same with a full state matrix."""
+    """Number of multiplications with a full state matrix."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,30 +100,30 @@ def compare_orders(
 
 
 def count_products(order: int, outputs: int, inputs: int) -> int:
-    """Multiplications per tick with poles in blocks of two, as `modal_form` makes them: three per block for A, and all
-    of B, C and D."""
+    """Count the multiplications per tick with poles in blocks of two, as `modal_form` makes them: three per block for
+    A, and all of B, C and D."""
     return 3 * order // 2 + order * (outputs + inputs) + outputs * inputs
 
 
 def count_dense_products(order: int, outputs: int, inputs: int) -> int:
-    """Multiplications per tick with full matrices A, B, C and D."""
+    """Count the multiplications per tick with full matrices A, B, C and D."""
     return order**2 + order * (outputs + inputs) + outputs * inputs
 
 
 def _mask_lines(response: FrequencyResponse, first_line: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Mask (lines,) of every second line, from the line with the index `first_line` (0 or 1) on."""
+    """Make the mask (lines,) of every second line, from the line with the index `first_line` (0 or 1) on."""
     return np.asarray(np.arange(len(response)) % 2 == first_line)
 
 
 def _compute_relative_noise(lines: WeightedLines) -> float:
-    """Rms noise of the lines relative to the rms response, as in `WeightedLines.compute_relative_error`."""
+    """Compute the rms noise of the lines relative to the rms response, as in `WeightedLines.compute_relative_error`."""
     return float(np.sqrt((1 / lines.weight**2).sum() / (np.abs(lines.response) ** 2).sum()))
 
 
 def _suggest_order(line_costs: Sequence[FloatArray]) -> int:
-    """Index of the order by the one-standard-error rule. line_costs: of each order, rising, the squared error (lines,)
-    over the noise variance; differences are taken line by line, so that noise common to both orders cancels. The
-    standard error is that of their mean over the lines."""
+    """Suggest the index of an order by the one-standard-error rule. line_costs: of each order, rising, the squared
+    error (lines,) over the noise variance; differences are taken line by line, so that noise common to both orders
+    cancels. The standard error is that of their mean over the lines."""
     best_index = int(np.argmin([costs.mean() for costs in line_costs]))
     for index, costs in enumerate(line_costs):
         cost_increase = costs - line_costs[best_index]

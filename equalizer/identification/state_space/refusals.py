@@ -28,14 +28,14 @@ class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user r
 
 
 def require_lines(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> WeightedLines:
-    """The lines of the band and its margin, weighted. Raises IdentificationRefused under the conditions of the module
-    docstring."""
+    """Select and weight the lines of the band and its margin. Raises IdentificationRefused under the conditions of the
+    module docstring."""
     _refuse_mixed_responses(responses)
-    high, rate = settings.band_hz[1], responses[0].sample_rate_hz
-    if high >= rate / 2:
+    high_hz, rate_hz = settings.band_hz[1], responses[0].sample_rate_hz
+    if high_hz >= rate_hz / 2:
         raise IdentificationRefused(
-            f"the band ends at {high:g} Hz, but at {rate:g} samples per second nothing is known "
-            f"from {rate / 2:g} Hz on; choose a lower end or record faster"
+            f"the band ends at {high_hz:g} Hz, but at {rate_hz:g} samples per second nothing is known "
+            f"from {rate_hz / 2:g} Hz on; choose a lower end or record faster"
         )
     _refuse_unexcited_inputs(responses, settings)
     _refuse_zero_outputs(responses, settings)
@@ -47,42 +47,42 @@ def require_lines(responses: Sequence[FrequencyResponse], settings: Identificati
 
 
 def _refuse_mixed_responses(responses: Sequence[FrequencyResponse]) -> None:
-    """Raises IdentificationRefused without any response, and where sample rate, channels or units differ."""
+    """Raise IdentificationRefused without any response, and where sample rate, channels or units differ."""
     if not responses:
         raise IdentificationRefused("no frequency response was given; estimate one from a recorded sweep first")
-    first = responses[0]
-    for other in responses[1:]:
+    first_response = responses[0]
+    for compared_response in responses[1:]:
         for name in ("sample_rate_hz", "input_channels", "output_channels", "input_unit", "output_unit"):
-            if getattr(other, name) != getattr(first, name):
+            if getattr(compared_response, name) != getattr(first_response, name):
                 raise IdentificationRefused(
-                    f"the records differ in {name} ({getattr(first, name)} and {getattr(other, name)}); identify each "
-                    "separately or convert one"
+                    f"the records differ in {name} ({getattr(first_response, name)} and "
+                    f"{getattr(compared_response, name)}); identify each separately or convert one"
                 )
 
 
 def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    """Raises IdentificationRefused where the response to some inputs, but not to all, is not finite at any line of the
+    """Raise IdentificationRefused where the response to some inputs, but not to all, is not finite at any line of the
     band."""
     has_response = [
         np.isfinite(estimate.select_band(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses
     ]
-    undetermined = ~np.any(has_response, axis=0)
+    is_undetermined = ~np.any(has_response, axis=0)
     names = ", ".join(
-        name for name, is_missing in zip(responses[0].input_channels, undetermined, strict=True) if is_missing
+        name for name, is_missing in zip(responses[0].input_channels, is_undetermined, strict=True) if is_missing
     )
-    if names and not undetermined.all():
+    if names and not is_undetermined.all():
         raise IdentificationRefused(
-            f"the response to {names} is not determined: as many experiments as inputs are needed, {len(undetermined)} "
-            "here; record one sweep per input"
+            f"the response to {names} is not determined: as many experiments as inputs are needed, "
+            f"{len(is_undetermined)} here; record one sweep per input"
         )
 
 
 def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    """Raises IdentificationRefused where an output is zero at all lines of the band."""
-    in_band = [np.nan_to_num(estimate.select_band(*settings.band_hz).response) for estimate in responses]
-    zero_outputs = ~np.any([(response != 0).any(axis=(0, 2)) for response in in_band], axis=0)
+    """Raise IdentificationRefused where an output is zero at all lines of the band."""
+    band_responses = [np.nan_to_num(estimate.select_band(*settings.band_hz).response) for estimate in responses]
+    zero_outputs = ~np.any([(response != 0).any(axis=(0, 2)) for response in band_responses], axis=0)
     names = ", ".join(name for name, is_zero in zip(responses[0].output_channels, zero_outputs, strict=True) if is_zero)
-    if names and any(len(response) for response in in_band):
+    if names and any(len(response) for response in band_responses):
         raise IdentificationRefused(
             f"there is no signal from {names}, not even noise: check the sensor and record again"
         )
@@ -91,24 +91,25 @@ def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: Ident
 def _refuse_empty_band(
     responses: Sequence[FrequencyResponse], lines: WeightedLines, settings: IdentificationSettings
 ) -> None:
-    """Raises IdentificationRefused without any line to fit, and for a gap (`_refuse_gap`)."""
-    low, high = settings.band_hz
-    measured_count = sum(len(estimate.select_band(low, high)) for estimate in responses)
+    """Raise IdentificationRefused without any line to fit, and for a gap (`_refuse_gap`); the message suggests a sweep
+    with the margins stated there."""
+    low_hz, high_hz = settings.band_hz
+    measured_count = sum(len(estimate.select_band(low_hz, high_hz)) for estimate in responses)
     if not len(lines):
         reasons = "; ".join(dict.fromkeys(remark for estimate in responses for remark in estimate.remarks))
-        finding = "none of its lines is reliable" if measured_count else "no line was excited there"
+        problem = "none of its lines is reliable" if measured_count else "no line was excited there"
         raise IdentificationRefused(
-            f"no data in {low:g} to {high:g} Hz: {finding}{f' ({reasons})' if reasons else ''}; "
-            f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz"
+            f"no data in {low_hz:g} to {high_hz:g} Hz: {problem}{f' ({reasons})' if reasons else ''}; "
+            f"record a sweep from {low_hz / 1.1:.3g} to {high_hz * 1.06:.3g} Hz"
         )
     _refuse_gap(lines, settings)
 
 
 def _refuse_gap(lines: WeightedLines, settings: IdentificationSettings) -> None:
-    """Raises IdentificationRefused for a gap wider than `LARGEST_GAP_OCTAVES` and `LARGEST_GAP_SPACINGS`, in which the
-    data do not determine the model. The message suggests a sweep with margins of 10 % below and 6 % above."""
-    low, high = settings.band_hz
-    edges_hz = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
+    """Raise IdentificationRefused for a gap wider than `LARGEST_GAP_OCTAVES` and `LARGEST_GAP_SPACINGS`, in which the
+    data do not determine the model. The message suggests a sweep with margins of 10 % below and 6 % above (chosen)."""
+    low_hz, high_hz = settings.band_hz
+    edges_hz = np.clip(np.concatenate([[low_hz], lines.frequency_hz, [high_hz]]), low_hz, high_hz)
     gap_octaves, gap_hz = np.diff(np.log2(edges_hz)), np.diff(edges_hz)
     median_spacing_hz = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
     widest_index = int(np.argmax(gap_octaves))
@@ -118,37 +119,39 @@ def _refuse_gap(lines: WeightedLines, settings: IdentificationSettings) -> None:
     ):
         return
     below_hz, above_hz = edges_hz[widest_index], edges_hz[widest_index + 1]
-    covered_low_hz, covered_high_hz = max((low, below_hz), (above_hz, high), key=lambda side: float(side[1] / side[0]))
+    covered_low_hz, covered_high_hz = max(
+        (low_hz, below_hz), (above_hz, high_hz), key=lambda side: float(side[1] / side[0])
+    )
     raise IdentificationRefused(
-        f"between {below_hz:.3g} and {above_hz:.3g} Hz no line can be used, but the band is {low:g} to {high:g} Hz; "
-        f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz, or choose a band that the lines cover "
+        f"between {below_hz:.3g} and {above_hz:.3g} Hz no line can be used, but the band is {low_hz:g} to {high_hz:g} "
+        f"Hz; record a sweep from {low_hz / 1.1:.3g} to {high_hz * 1.06:.3g} Hz, or choose a band that the lines cover "
         f"({covered_low_hz:.3g} to {covered_high_hz:.3g} Hz)"
     )
 
 
 def _refuse_noise(lines: WeightedLines, settings: IdentificationSettings) -> None:
-    """Raises IdentificationRefused where the median line does not exceed its noise by `LEAST_SIGNAL_TO_NOISE`."""
+    """Raise IdentificationRefused where the median line does not exceed its noise by `LEAST_SIGNAL_TO_NOISE`."""
     strongest_ratios = (lines.weight * np.abs(lines.response)).max(axis=(1, 2))
     median_ratio = float(np.median(strongest_ratios))
     if median_ratio < LEAST_SIGNAL_TO_NOISE * np.sqrt(np.log(lines.response[0].size) + 1):
-        low, high = settings.band_hz
+        low_hz, high_hz = settings.band_hz
         raise IdentificationRefused(
-            f"the band {low:g} to {high:g} Hz contains only noise: its typical line is {median_ratio:.1f} times the "
-            "noise; excite it more strongly or for longer (twice the time gives 3 dB)"
+            f"the band {low_hz:g} to {high_hz:g} Hz contains only noise: its typical line is {median_ratio:.1f} times "
+            "the noise; excite it more strongly or for longer (twice the time gives 3 dB)"
         )
 
 
 def _refuse_too_high_an_order(lines: WeightedLines, settings: IdentificationSettings) -> None:
-    """Raises IdentificationRefused for fewer lines than the unknowns, or the subspace method's block rows, need."""
+    """Raise IdentificationRefused for fewer lines than the unknowns, or the subspace method's block rows, need."""
     p, m = lines.response.shape[1:]
     n = settings.order
     unknowns = n * (p + m) + p * m
     block_rows = choose_horizon(n, p) + max(settings.longer_horizons)
-    minimum = max(-(-unknowns // (p * m)), -(-block_rows * (p + m) // (2 * m)))
-    if len(lines) < minimum:
+    least_line_count = max(-(-unknowns // (p * m)), -(-block_rows * (p + m) // (2 * m)))
+    if len(lines) < least_line_count:
         spacing_hz = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / max(len(lines) - 1, 1)
         advice = f", or record longer periods (now {1 / spacing_hz:.3g} s)" if spacing_hz > 0 else ""
         raise IdentificationRefused(
-            f"order {n} has {unknowns} unknowns and needs at least {minimum} lines, but the band holds {len(lines)}; "
-            f"choose a lower order{advice}"
+            f"order {n} has {unknowns} unknowns and needs at least {least_line_count} lines, but the band holds "
+            f"{len(lines)}; choose a lower order{advice}"
         )

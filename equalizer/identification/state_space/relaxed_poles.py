@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from equalizer.identification.state_space.candidates import (
-    MOST_BIN_STEPS,
+    MAX_BIN_STEPS,
     Candidate,
     average_about_model,
     choose_best,
@@ -138,7 +138,7 @@ def _is_bound_binding(
     bins = average_about_model(chosen.fitted, lines, settings)
     pole_radii = np.where(is_pole_at_bound, limit_radius, chosen.radius)
     relaxed_cost = bins.compute_cost(
-        refine_form(chosen.fitted.form, bins, pole_radii, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+        refine_form(chosen.fitted.form, bins, pole_radii, MAX_BIN_STEPS[-1]).compute_response(bins.z)
     )
     if not _exceeds_noise(
         bins.compute_cost(chosen.fitted.compute_response(bins.z)) - relaxed_cost, relaxed_cost, bins, len(lines)
@@ -146,7 +146,7 @@ def _is_bound_binding(
         return False
     # A fall of the cost that further steps achieve with the bound, too, is not counted.
     bounded_cost = bins.compute_cost(
-        refine_form(chosen.fitted.form, bins, chosen.radius, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+        refine_form(chosen.fitted.form, bins, chosen.radius, MAX_BIN_STEPS[-1]).compute_response(bins.z)
     )
     return _exceeds_noise(bounded_cost - relaxed_cost, relaxed_cost, bins, len(lines))
 

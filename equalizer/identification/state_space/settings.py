@@ -1,7 +1,7 @@
 """Settings of the identification of a state-space model (`identify`): band, order, bound of the time constants, search.
 
-Defaults without a stated reason are heuristic. Read by `identify` and the modules that it calls; set by the workflows
-`identify_model` and `report_identification`.
+Defaults without a stated reason are heuristic. Read by `identify`, `identify_recordings` and `order_report` with the
+modules that they call; set by the workflows `identify_model` and `report_identification`.
 """
 
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ class IdentificationSettings:
     `longer_horizons`, and a negative margin or number of draws."""
 
     band_hz: tuple[float, float] = (5.0, 35.0)
+    """Lower and upper end (Hz) of the band that the model must reproduce."""
     order: int = 26
     """Number of states; even, because poles are fitted in pairs."""
     longest_decay_s: float | None = None

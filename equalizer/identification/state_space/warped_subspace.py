@@ -5,7 +5,8 @@ bilinear (all-pass) map zeta = (z - c) / (1 - c z) warps the frequency axis, so 
 quarter turn of the unit circle; and block rows are whitened before their singular values are compared. With p outputs
 and powers zeta^q, q < horizon, the rows zeta^q G are projected onto the complement of the input's rows; the left
 singular vectors of the result span the extended observability matrix, whose shift structure gives the poles. The
-horizon is short, because the noise of a long horizon hides the order. Called by `candidates` and `order_report`.
+horizon is short, because with a long horizon the noise covers the singular values that show the order. Called by
+`candidates` and `order_report`; `refusals` reads the horizon.
 """
 
 from dataclasses import dataclass
@@ -34,12 +35,12 @@ class Subspace:
 
 
 def choose_horizon(order: int, outputs: int) -> int:
-    """Number of block rows: as many as the order needs, and three more (chosen) to average noise."""
+    """Choose the number of block rows: as many as the order needs, and three more (chosen) to average noise."""
     return -(-order // outputs) + 3
 
 
 def compute_warp_coefficient(centre_hz: float, sample_rate_hz: float) -> float:
-    """c of the map zeta = (z - c) / (1 - c z) that puts centre_hz at a quarter turn of the unit circle."""
+    """Compute c of the map zeta = (z - c) / (1 - c z) that puts centre_hz at a quarter turn of the unit circle."""
     half_angle = np.pi * centre_hz / sample_rate_hz
     return float((1 - np.tan(half_angle)) / (1 + np.tan(half_angle)))
 
@@ -53,9 +54,9 @@ def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> S
     p, m = lines.response.shape[1:]
     # The noise is modelled as a factor per output times a factor per line and input, so that dividing by both gives
     # all entries equal noise.
-    deviation = 1 / lines.weight
-    output_deviation = np.exp(np.log(deviation).mean(axis=(0, 2)))
-    column_deviation = np.exp(np.log(deviation / output_deviation[:, None]).mean(axis=1))
+    noise_sd = 1 / lines.weight
+    output_deviation = np.exp(np.log(noise_sd).mean(axis=(0, 2)))
+    column_deviation = np.exp(np.log(noise_sd / output_deviation[:, None]).mean(axis=1))
     scaled_response = lines.response / output_deviation[:, None] / column_deviation[:, None, :]
     input_rows = np.einsum("lq,lj,jk->qklj", powers, 1 / column_deviation, np.eye(m)).reshape(horizon * m, -1)
     output_rows = np.einsum("lq,lij->qilj", powers, scaled_response).reshape(horizon * p, -1)
@@ -67,8 +68,8 @@ def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> S
 
 
 def _project_out_inputs(input_rows: ComplexArray, output_rows: ComplexArray) -> FloatArray:
-    """(horizon p, horizon p): the outputs' rows with the span of the inputs' rows projected out, compressed by an LQ
-    decomposition of real and imaginary parts."""
+    """Project the span of the inputs' rows out of the outputs' rows; returns the result (horizon p, horizon p),
+    compressed by an LQ decomposition of real and imaginary parts."""
     rows = np.concatenate([input_rows, output_rows])
     real_rows = np.concatenate([rows.real, rows.imag], axis=1)
     triangle = np.asarray(np.linalg.qr(real_rows.T, mode="r"))
@@ -76,8 +77,9 @@ def _project_out_inputs(input_rows: ComplexArray, output_rows: ComplexArray) -> 
 
 
 def extract_poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:
-    """Poles in the z plane (all within the radius) and output shapes of a model of this order, from the strongest
-    directions: least-squares solution of the shift equation, then the inverse map z = (zeta + c) / (1 + c zeta)."""
+    """Extract the poles in the z plane (all within the radius) and output shapes of a model of this order from the
+    strongest directions: least-squares solution of the shift equation, then the inverse map z = (zeta + c) / (1 + c
+    zeta)."""
     observability = subspace.directions[:, :order]
     p, c = subspace.outputs, subspace.warp
     output_norms = np.linalg.norm(observability.reshape(-1, p, order), axis=(0, 2))

@@ -50,6 +50,6 @@ class BandedForces:
         """(N, p), m/s²: predicted acceleration due to all forces."""
         return self.predicted[0] + self.predicted[1] + self.predicted[2]
 
-    def find_reference_rows(self, samples: int) -> slice:
-        """Slice of the rows that correspond to the reference acceleration. samples: number of its rows."""
-        return slice(self.latency_samples, self.latency_samples + samples)
+    def find_reference_rows(self, row_count: int) -> slice:
+        """Find the rows that correspond to the reference acceleration, as a slice. row_count: number of its rows."""
+        return slice(self.latency_samples, self.latency_samples + row_count)

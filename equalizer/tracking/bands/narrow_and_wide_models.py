@@ -4,7 +4,7 @@ Low band, below the narrow model's band: a rigid model fitted to the narrow mode
 model. High, above it: the wide model's response along one direction. Forces are played from the first to the last row
 of the reference; those of the low and the high band before and after it (run-in and run-out) are cut off. The middle
 band is then solved again for the reference minus the narrow model's response to the cut forces. Called by
-`study.workflows.equalizer.equalize_trajectory`.
+`equalize_trajectory` and `playback_models` of `study.workflows.equalizer`.
 """
 
 from dataclasses import dataclass
@@ -53,12 +53,16 @@ class TwoModels:
     wide: IdentifiedModel
 
     def __post_init__(self) -> None:
-        (low_hz, high_hz), (lowest_hz, highest_hz) = self.narrow.band_hz, self.wide.band_hz
-        if not (lowest_hz <= high_hz and highest_hz >= LEAST_REACH * high_hz and low_hz > 2 * BAND_MARGIN_HZ):
+        (narrow_low_hz, narrow_high_hz), (wide_low_hz, wide_high_hz) = self.narrow.band_hz, self.wide.band_hz
+        if not (
+            wide_low_hz <= narrow_high_hz
+            and wide_high_hz >= LEAST_REACH * narrow_high_hz
+            and narrow_low_hz > 2 * BAND_MARGIN_HZ
+        ):
             raise ValueError(
-                f"bands of {low_hz:g} to {high_hz:g} Hz and {lowest_hz:g} to {highest_hz:g} Hz cannot be combined: the "
-                f"wider one must begin at {high_hz:g} Hz or below and reach {LEAST_REACH * high_hz:g} Hz or more, the "
-                f"narrower one begin above {2 * BAND_MARGIN_HZ:g} Hz"
+                f"bands of {narrow_low_hz:g} to {narrow_high_hz:g} Hz and {wide_low_hz:g} to {wide_high_hz:g} Hz "
+                f"cannot be combined: the wider one must begin at {narrow_high_hz:g} Hz or below and reach "
+                f"{LEAST_REACH * narrow_high_hz:g} Hz or more, the narrower one begin above {2 * BAND_MARGIN_HZ:g} Hz"
             )
         conditions = [[model.provenance.get(key) for key in ("hand", "input")] for model in (self.narrow, self.wide)]
         if conditions[0] != conditions[1] and None not in conditions[0] + conditions[1]:
@@ -133,8 +137,8 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
 
 
 def make_banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
-    """Equalizer in three bands, split by linear-phase filters BAND_MARGIN_HZ beyond the narrow model's band on either
-    side. weight: R = weight I, of |u|². Raises ValueError for a weight outside 1e-3 to 1e-2."""
+    """Make the equalizer in three bands, split by linear-phase filters BAND_MARGIN_HZ beyond the narrow model's band on
+    either side. weight: R = weight I, of |u|², (m/s² per N)². Raises ValueError for a weight outside 1e-3 to 1e-2."""
     low_hz, high_hz = models.narrow.band_hz
     edges = BandEdges(low_hz - BAND_MARGIN_HZ, high_hz + BAND_MARGIN_HZ)
     return BandedEqualizer(
@@ -175,8 +179,8 @@ def compute_level_error(
 
 
 def _remove_above_band(reference: FloatArray, wide: IdentifiedModel) -> FloatArray:
-    """The reference acceleration without frequencies above the wide band; unchanged where that band ends within twice
-    BAND_MARGIN_HZ of half the sample rate."""
+    """Remove frequencies above the wide band from the reference acceleration; unchanged where that band ends within
+    twice BAND_MARGIN_HZ of half the sample rate."""
     edge_hz = wide.band_hz[1] + BAND_MARGIN_HZ
     if edge_hz + BAND_MARGIN_HZ >= wide.sample_rate_hz / 2:
         return reference
@@ -193,7 +197,7 @@ def _predict_bands(
 ) -> BandPredictions:
     """Predicted errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
     one. reference: (n, axes), without frequencies above the wide band."""
-    edges, rows, band_hz = (
+    edges, rows, middle_band_hz = (
         equalizer.split.edges,
         banded_forces.find_reference_rows(len(reference)),
         models.narrow.band_hz,
@@ -203,13 +207,13 @@ def _predict_bands(
         simulate_from_rest(problem, banded_forces.total_forces)[rows],
         simulate_from_rest(problem, banded_forces.total_forces[rows]),
     )
-    upper_hz = band_hz[1] + 2 * BAND_MARGIN_HZ, models.wide.band_hz[1]
+    high_band_hz = middle_band_hz[1] + 2 * BAND_MARGIN_HZ, models.wide.band_hz[1]
     high_response = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
     return BandPredictions(
         edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
-        cut_error=compute_band_error(reference, cut_response, rate_hz, band_hz),
-        uncut_error=compute_band_error(reference, full_response, rate_hz, band_hz),
-        level_error=compute_level_error(reference, high_response, rate_hz, upper_hz),
+        cut_error=compute_band_error(reference, cut_response, rate_hz, middle_band_hz),
+        uncut_error=compute_band_error(reference, full_response, rate_hz, middle_band_hz),
+        level_error=compute_level_error(reference, high_response, rate_hz, high_band_hz),
         direction=()
         if banded_forces.high is None
         else tuple(float(component) for component in banded_forces.high.direction),
@@ -218,7 +222,7 @@ def _predict_bands(
 
 
 def _describe_conditions(model: IdentifiedModel) -> str:
-    """Text of the conditions of the identification, from the model's provenance."""
+    """Describe the conditions of the identification, from the model's provenance."""
     hand_condition = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
     spring_condition = "with" if model.provenance.get("input") == "excitation" else "without"
     return f"{hand_condition} and {spring_condition} the spring in it"

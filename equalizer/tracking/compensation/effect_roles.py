@@ -10,7 +10,7 @@ from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
-from equalizer.tracking.compensation.law_compensation import explain_law_not_compensated
+from equalizer.tracking.compensation.law_compensation import SENSOR_ERROR, explain_law_not_compensated
 
 IN_MODEL_REASON = "it is linear, so the identified model has it; compensating it again would count it twice"
 """Reason for linear effects that the identified model contains."""
@@ -33,14 +33,12 @@ REASONS_NOT_COMPENSATED = {
     "force_nonlinearity": "the identified model contains the gain at the level of its identification",
     "slew_limit": "the device cannot change its force faster",
 }
-"""Reasons by name of the effect, for effects of mechanism and actuator that are not compensated."""
-SENSOR_REASON = (
-    "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
-)
-"""Reason for all effects of the sensor but its lag."""
+"""Reasons by name of the effect, for effects of mechanism and actuator that are not compensated. The reason for effects
+of the sensor other than its lag is `SENSOR_ERROR`."""
+
 SCALING_REASON = "in the identified model as far as it is linear; used to scale what is added"
 TIMING_REASON = "in the identified model; used to send what is added ahead of time"
-"""Reasons for the effects of `SCALING_EFFECTS` and of `TIMING_EFFECTS`; what is added are the compensating forces."""
+"""Reasons for the effects of `SCALING_EFFECTS` and of `TIMING_EFFECTS`, which act on the compensating forces."""
 
 SCALING_EFFECTS, TIMING_EFFECTS = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
 """Effects that scale the added forces, and effects that determine by how much they are advanced (`compute_lead_s`)."""
@@ -60,15 +58,15 @@ def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx"
     if kind in TIMING_EFFECTS:
         return TIMING_REASON
     if EFFECTS_BY_NAME[kind].place == "sensor":
-        return SENSOR_REASON
+        return SENSOR_ERROR
     return REASONS_NOT_COMPENSATED[kind]
 
 
 def compute_lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
     """Compute the delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the
-    time constant 1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f; an
-    effect `sensor_lag` replaces the sensor's corner. The identified model includes this delay; forces that are added to
-    the model's forces must be advanced by it."""
+    time constant 1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f (0: no
+    low pass); an effect `sensor_lag` replaces the sensor's corner. The identified model includes this delay; forces
+    that are added to the model's forces must be advanced by it."""
     corners_hz = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
     delay_s = 0.5 / sample_rate_hz + physics.actuator.delay_s
     for effect in physics.effects:

@@ -3,8 +3,9 @@
 Each law F(parameters, x, v, slip_mps) takes the position x (m), the velocity v (m/s), (N,) each, and the speed (m/s)
 below which a change of sign is smoothed: sign(v) becomes tanh(v / slip_mps), with slip_mps above zero. It returns the
 force (N) that must be added to the command: the effect's own force with the opposite sign. For rotations the units are
-rad, rad/s and N m. Called by `effect_compensation` (feedforward) and `subtract_effects`. Reference for describing
-functions: Gelb and Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design (1968).
+rad, rad/s and N m. Called by `effect_compensation` (feedforward) and `subtract_effects`; `effect_roles` reads which
+effects have a law. Reference for describing functions: Gelb and Vander Velde, Multiple-Input Describing Functions and
+Nonlinear System Design (1968).
 """
 
 from collections.abc import Callable, Mapping
@@ -107,42 +108,44 @@ LAWS: dict[str, ForceLaw] = {
 
 
 def compute_equivalent_impedance(
-    law: ForceLaw, parameters: Mapping[str, float], frequency_hz: FloatArray, speed_m_s: FloatArray, slip_share: float
+    law: ForceLaw, parameters: Mapping[str, float], frequency_hz: FloatArray, speed_mps: FloatArray, slip_share: float
 ) -> ComplexArray:
-    """Sinusoidal describing function (lines,), N s/m: complex ratio of force to velocity at the fundamental, for
-    velocity amplitudes `speed_m_s` (lines,), above zero. From the second of two cycles, in which the presliding
+    """Compute the describing function (lines,), N s/m: complex ratio of force to velocity at the fundamental, for
+    velocity amplitudes `speed_mps` (lines,), m/s, above zero. From the second of two cycles, in which the presliding
     deflection is periodic. slip_share: slip speed over velocity amplitude.
     """
     line_indices = np.unique(
         np.linspace(0, len(frequency_hz) - 1, min(MOST_EVALUATED_LINES, len(frequency_hz))).round().astype(int)
     )
-    angle = 2 * np.pi * np.arange(2 * SAMPLES_PER_CYCLE) / SAMPLES_PER_CYCLE
+    phase_rad = 2 * np.pi * np.arange(2 * SAMPLES_PER_CYCLE) / SAMPLES_PER_CYCLE
     impedance = np.empty(len(line_indices), dtype=np.complex128)
     for index, line_index in enumerate(line_indices):
-        v = speed_m_s[line_index] * np.sin(angle)
-        x = -speed_m_s[line_index] / (2 * np.pi * frequency_hz[line_index]) * np.cos(angle)
-        force = law(parameters, x, v, slip_share * speed_m_s[line_index])[SAMPLES_PER_CYCLE:]
+        v = speed_mps[line_index] * np.sin(phase_rad)
+        x = -speed_mps[line_index] / (2 * np.pi * frequency_hz[line_index]) * np.cos(phase_rad)
+        force = law(parameters, x, v, slip_share * speed_mps[line_index])[SAMPLES_PER_CYCLE:]
         # sin is -i / 2 of the positive line, so that a force along the velocity gives a positive real part.
-        impedance[index] = 2j * np.mean(force * np.exp(-1j * angle[SAMPLES_PER_CYCLE:])) / speed_m_s[line_index]
-    chosen_hz = frequency_hz[line_indices]
+        impedance[index] = 2j * np.mean(force * np.exp(-1j * phase_rad[SAMPLES_PER_CYCLE:])) / speed_mps[line_index]
+    evaluated_hz = frequency_hz[line_indices]
     return np.asarray(
-        np.interp(frequency_hz, chosen_hz, impedance.real) + 1j * np.interp(frequency_hz, chosen_hz, impedance.imag),
+        np.interp(frequency_hz, evaluated_hz, impedance.real)
+        + 1j * np.interp(frequency_hz, evaluated_hz, impedance.imag),
         dtype=np.complex128,
     )
 
 
 def apply_deadband(parameters: Mapping[str, float], command: FloatArray) -> FloatArray:
-    """Force (N) at the output of a dead band for a command u (N): 0 where |u| <= width, else u - (1 - jump) width
-    sgn(u)."""
+    """Compute the force (N) at the output of a dead band for commands u (N): 0 where |u| <= width, else u - (1 - jump)
+    width sgn(u), with the parameters width (N) and jump (share of the width, 0 where not given)."""
     width, jump = parameters["width"], parameters.get("jump", 0.0)
     is_outside = np.abs(command) > width
     return np.asarray(np.where(is_outside, command - (1.0 - jump) * width * np.sign(command), 0.0))
 
 
 def compute_deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
-    """Describing function of a dead band: share of a sinusoid's fundamental that passes. With s = width / amplitude it
-    is 1 - 2/pi (arcsin s + s sqrt(1 - s^2)) of the dead zone, and 4/pi jump s sqrt(1 - s^2) of the jump (relay with
-    dead zone; Gelb and Vander Velde, 1968, chapter 2)."""
+    """Compute the describing function of a dead band: the share of a sinusoid's fundamental that passes, 0 for an
+    amplitude (N, above zero) up to the width. With s = width / amplitude it is 1 - 2/pi (arcsin s + s sqrt(1 - s^2)) of
+    the dead zone, and 4/pi jump s sqrt(1 - s^2) of the jump (relay with dead zone; Gelb and Vander Velde, 1968,
+    chapter 2)."""
     relative_width = parameters["width"] / amplitude
     if relative_width >= 1.0:
         return 0.0

@@ -64,16 +64,18 @@ def explain_law_not_compensated(law: Law, axis_letters: tuple[str, ...]) -> str:
 def compute_compensating_force(
     law: Law, axis_letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip_mps: float
 ) -> FloatArray:
-    """(N,), in the unit of the command: the force to be added to the command, which cancels the force of the law along
-    a motion. axis_letters: letters of the axes, in the order of the motion's columns; slip_mps: speed (m/s) below which
-    a change of sign of a velocity is smoothed, because a force that jumps cannot be played; rate_hz: sample rate of the
-    motion."""
-    columns = {
-        prefix + letter: column[:, axis]
+    """Compute the force (N,), in the unit of the command, that is added to the command and cancels the force of the law
+    along a motion. axis_letters: letters of the axes, in the order of the motion's columns; slip_mps: speed (m/s) below
+    which a change of sign of a velocity is smoothed, because a force that jumps cannot be played; rate_hz: sample rate
+    of the motion."""
+    signals = {
+        prefix + letter: motion_samples[:, axis]
         for axis, letter in enumerate(axis_letters)
-        for prefix, column in zip(MOTION_PREFIXES, (motion.position, motion.velocity, motion.acceleration), strict=True)
+        for prefix, motion_samples in zip(
+            MOTION_PREFIXES, (motion.position, motion.velocity, motion.acceleration), strict=True
+        )
     }
-    return -evaluate(_smooth_signs(law, slip_mps), columns, rate_hz)
+    return -evaluate(_smooth_signs(law, slip_mps), signals, rate_hz)
 
 
 def make_single_axis_law(law: Law, axis_letters: tuple[str, ...], axis: int) -> ForceLaw:
@@ -110,8 +112,8 @@ def compute_linear_share(law: Law, amplitude: float) -> float:
 
 
 def invert_command_map(law: Law, intended_forces: FloatArray, slip_n: float) -> FloatArray:
-    """(N,): the commands that a command map turns into the intended forces `intended_forces` (N,). slip_n: force below
-    which the command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended
+    """Compute the commands (N,) that a command map turns into the intended forces (N,). slip_n: force below which the
+    command crosses a dead band smoothly, because a command that jumps cannot be played; 0 if all intended
     forces are 0.
 
     By linear interpolation in a table, whose range is doubled until the map reaches all intended forces. Where the map
@@ -134,8 +136,9 @@ def invert_command_map(law: Law, intended_forces: FloatArray, slip_n: float) -> 
 
 
 def _tabulate_to(law: Law, intended_forces: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Commands and forces, (TABLE_SIZE,) each, over the smallest range in which the map reaches the intended forces;
-    over the first range where it never does. Raises ValueError where the map decreases in the first range."""
+    """Tabulate commands and forces, (TABLE_SIZE,) each, over the smallest of the doubled ranges in which the map
+    reaches the intended forces; over the first range where it reaches them in none. Raises ValueError where the map
+    decreases in the first range."""
     first_range = FIRST_RANGE_RATIO * max(float(np.abs(intended_forces).max()), np.finfo(np.float64).tiny)
     tables = (_tabulate(law, first_range * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
     first_table = next(tables)

@@ -17,8 +17,8 @@ beginning. Chosen."""
 
 
 def filter_to_band(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """Part of samples (N, channels) within the band (Hz), in their unit. The samples must begin and end
-    at zero, because a jump at the ends of the zero-padded record rings into it; noise may begin and end anywhere."""
+    """Filter samples (N, channels) to the band (Hz). The samples must begin and end at zero, because a jump at the ends
+    of the zero-padded record rings into it; noise may begin and end anywhere."""
     padded_length = find_padded_length(len(samples), sample_rate_hz)
     spectrum = np.fft.rfft(samples, padded_length, axis=0)
     gain = compute_band_gain(np.asarray(np.fft.rfftfreq(padded_length, 1 / sample_rate_hz), dtype=np.float64), band_hz)
@@ -27,7 +27,8 @@ def filter_to_band(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[fl
 
 
 def compute_band_gain(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatArray:
-    """Gain of the band pass, (lines,): 1 in the band, 0 outside its edges. A band from 0 Hz has no lower edge."""
+    """Compute the gain of the band pass, (lines,): 1 in the band, 0 outside its edges. A band from 0 Hz has no lower
+    edge."""
     low_hz, high_hz = band_hz
     lower_edge = (
         np.ones_like(frequency_hz)
@@ -39,6 +40,6 @@ def compute_band_gain(frequency_hz: FloatArray, band_hz: tuple[float, float]) ->
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * edge_position))
 
 
-def find_padded_length(samples: int, sample_rate_hz: float) -> int:
-    """Number of samples after `PADDING_S` of zeros is appended."""
-    return samples + round(PADDING_S * sample_rate_hz)
+def find_padded_length(sample_count: int, sample_rate_hz: float) -> int:
+    """Compute the number of samples of a record of `sample_count` samples after `PADDING_S` of zeros is appended."""
+    return sample_count + round(PADDING_S * sample_rate_hz)

@@ -35,7 +35,7 @@ class Equalizer(Protocol):
 
 
 class Identity:
-    """No equalizer: the reference force is the commanded force, as in the published study. Implements `Equalizer`."""
+    """No equalizer: the reference force is the commanded force. Implements `Equalizer`."""
 
     name = "none (commanded force)"
     takes = "force"

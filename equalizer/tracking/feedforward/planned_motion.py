@@ -31,18 +31,18 @@ def integrate_motion(
     zero: a constant acceleration has no bounded motion."""
     if band_hz[0] <= 0:
         raise ValueError(f"the band begins at {band_hz[0]:g} Hz; a motion about a resting place needs more than 0 Hz")
-    length = find_padded_length(len(acceleration), sample_rate_hz)
-    lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64)
+    padded_length = find_padded_length(len(acceleration), sample_rate_hz)
+    lines_hz = np.asarray(np.fft.rfftfreq(padded_length, 1 / sample_rate_hz), dtype=np.float64)
     s = 2j * np.pi * lines_hz
     gain = compute_band_gain(lines_hz, band_hz) * np.exp(s * lead_s)
     s[0] = 1.0  # any finite value: the band has no gain there
-    spectrum = np.fft.rfft(acceleration, length, axis=0) * gain[:, np.newaxis]
+    spectrum = np.fft.rfft(acceleration, padded_length, axis=0) * gain[:, np.newaxis]
 
-    def integrate(integrations: int) -> FloatArray:
+    def integrate(integration_count: int) -> FloatArray:
         """(N, p): the acceleration in the band, integrated this number of times."""
-        motion_rows: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** integrations, length, axis=0)[
+        motion: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** integration_count, padded_length, axis=0)[
             : len(acceleration)
         ]
-        return motion_rows
+        return motion
 
     return PlannedMotion(integrate(2), integrate(1), integrate(0))

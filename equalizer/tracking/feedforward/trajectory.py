@@ -2,7 +2,8 @@
 
 A table has a header, the time in its first column (s) and constant time steps. Its header determines its kind:
 accelerations of three axes, forces of three axes, or a transient along a single direction. Called by
-`study.store.formats.trajectory_file`, which reads and writes the files.
+`study.store.formats.trajectory_file`, which reads and writes the files, by `study.workflows.equalizer`, which computes
+and plays the forces, and by `study.workflows.files`, which recognises and documents the tables.
 """
 
 import csv
@@ -63,11 +64,12 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         kind = self.kind
-        actual = (self.signal.quantity, self.signal.unit, self.signal.channels)
-        if actual != (kind.quantity, kind.unit, kind.header[1:]):
+        actual_kind = (self.signal.quantity, self.signal.unit, self.signal.channels)
+        if actual_kind != (kind.quantity, kind.unit, kind.header[1:]):
             raise ValueError(
                 f"a table of {kind.name} holds {kind.quantity} in {kind.unit}, channels "
-                f"{', '.join(kind.header[1:])}, not {actual[0]} in {actual[1]}, channels {', '.join(actual[2])}"
+                f"{', '.join(kind.header[1:])}, not {actual_kind[0]} in {actual_kind[1]}, channels "
+                f"{', '.join(actual_kind[2])}"
             )
 
 
@@ -83,10 +85,10 @@ def parse_trajectory(text: str) -> Trajectory:
     if kind is None:
         allowed_headers = " or ".join(",".join(kind.header) for kind in TABLE_KINDS)
         raise TableError((f"line 1 reads '{','.join(header)}'; allowed is {allowed_headers}",))
-    table = _read_numbers(rows[1:], kind)
-    rate_hz = _find_rate_hz(table[:, 0])
-    signal = Signal(table[:, 1:], rate_hz, kind.quantity, kind.unit, kind.header[1:])
-    return Trajectory(signal, float(table[0, 0]))
+    values_by_row = _read_numbers(rows[1:], kind)
+    rate_hz = _find_rate_hz(values_by_row[:, 0])
+    signal = Signal(values_by_row[:, 1:], rate_hz, kind.quantity, kind.unit, kind.header[1:])
+    return Trajectory(signal, float(values_by_row[0, 0]))
 
 
 def format_trajectory_csv(trajectory: Trajectory) -> str:
@@ -115,15 +117,15 @@ def require_rate(trajectory: Trajectory, model_rate_hz: float) -> None:
 def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
     """Read the numbers of the rows after the header, (n, columns), n >= 2. Raises TableError for fewer rows, and for
     invalid ones with at most six sentences."""
-    width = len(kind.header)
+    column_count = len(kind.header)
     rows_of_values, problems = [], []
     for line, row in enumerate(rows, start=2):
         try:
             values = [float(field) for field in row]
         except ValueError:
             values = [np.nan]
-        if len(row) != width:
-            problems.append(f"line {line} has {len(row)} fields, but the header names {width}")
+        if len(row) != column_count:
+            problems.append(f"line {line} has {len(row)} fields, but the header names {column_count}")
         elif not np.isfinite(values).all():
             problems.append(f"line {line} reads '{','.join(row)}'; every field must be a number")
         else:
@@ -142,15 +144,16 @@ def _find_rate_hz(time_s: FloatArray) -> float:
     steps_s = np.diff(time_s)
     mean_step_s = float(time_s[-1] - time_s[0]) / len(steps_s)
     if mean_step_s <= 0 or (steps_s <= 0).any():
-        row = int(np.argmax(steps_s <= 0))
-        raise TableError((f"time_s does not grow at row {row + 2} (line {row + 3})",))
+        row_index = int(np.argmax(steps_s <= 0))
+        raise TableError((f"time_s does not grow at row {row_index + 2} (line {row_index + 3})",))
     deviation = np.abs(steps_s / mean_step_s - 1)
     if (deviation > STEP_TOLERANCE).any():
-        row = int(np.argmax(deviation > STEP_TOLERANCE))
+        row_index = int(np.argmax(deviation > STEP_TOLERANCE))
         raise TableError(
             (
-                f"time_s is not at a constant rate: the step to row {row + 2} (line {row + 3}) is {steps_s[row]:g} s, "
-                f"the mean step {mean_step_s:g} s; allowed is 1 % (write more digits, or resample)",
+                f"time_s is not at a constant rate: the step to row {row_index + 2} (line {row_index + 3}) is "
+                f"{steps_s[row_index]:g} s, the mean step {mean_step_s:g} s; allowed is 1 % (write more digits, or "
+                "resample)",
             )
         )
     rate_hz = 1 / mean_step_s

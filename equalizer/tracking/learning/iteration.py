@@ -2,14 +2,15 @@
 
     u <- u + beta L(band(r - y)),        beta = min(beta_0 / (1 + setbacks), 1 - (noise / residual)²)
 
-with forces u, reference motion r, measured motion y and the inverse L of the model; the survey by Bristow, Tharayil and
-Alleyne that `convergence` cites describes the method. The second bound of beta is the share of the error power that is
-not noise: nearly 1 for a large error and small near the noise floor. With a fixed gain noise would be learned, and good
+with forces u, reference motion r, measured motion y and the inverse L of the model (method: Bristow, Tharayil and
+Alleyne, IEEE Control Systems 26 (2006), 96). The second bound of beta is the share of the error power that is not
+noise: nearly 1 for a large error and small near the noise floor. With a fixed gain noise would be learned, and good
 initial forces would get worse. A setback is a repeat that increased the error; the best forces are kept.
 
 Corrections are faded to zero at both ends of the record. An inverse that cannot act before the first row would respond
 to an error there with an impulse; a handle held by static friction would not move, and the impulse would grow with
-every repeat. Called by `study.workflows.equalizer.repeat_playback`, which plays the forces between the steps.
+every repeat. Called by `study.workflows.equalizer.repeat_playback`, which plays the forces between the steps;
+`find_largest_share` is also called by `effect_compensation` and `repeat_trajectory`.
 """
 
 from collections.abc import Callable
@@ -104,9 +105,9 @@ class Repetition:
     @property
     def limits(self) -> str:
         """Text of the limits of force and slew rate, for remarks; empty without limits."""
-        cap_text = [] if self.cap_n is None else [f"the force within {self.cap_n:g} N"]
+        cap_texts = [] if self.cap_n is None else [f"the force within {self.cap_n:g} N"]
         return " and ".join(
-            [*cap_text, *([] if self.slew_n_per_s is None else [f"its change within {self.slew_n_per_s:.4g} N/s"])]
+            [*cap_texts, *([] if self.slew_n_per_s is None else [f"its change within {self.slew_n_per_s:.4g} N/s"])]
         )
 
 
@@ -156,8 +157,9 @@ class IterationState:
 
 
 def start_iteration(repetition: Repetition, initial_forces: FloatArray | None = None) -> IterationState:
-    """State before the first play. initial_forces: (N, m), N; None = the model's inverse of the reference motion.
-    Raises ValueError where the initial forces exceed the cap, or the reference motion has no part in the band."""
+    """Make the state before the first play. initial_forces: (N, m), N; None = the model's inverse of the reference
+    motion. Raises ValueError where the initial forces exceed the cap, or the reference motion has no part in the
+    band."""
     if repetition.level == 0:
         low_hz, high_hz = repetition.band_hz
         raise ValueError(
@@ -179,10 +181,10 @@ def start_iteration(repetition: Repetition, initial_forces: FloatArray | None = 
 
 
 def update_forces(state: IterationState, measured: FloatArray) -> IterationState:
-    """State after a play: the forces corrected by the measured error, and the verdict. measured: (N, p), the response
-    to `state.forces`. Without a known noise floor the first call leaves the forces unchanged, because the same forces
-    have to be played twice. Raises ValueError for another shape, for values that are not finite, and where the verdict
-    was to stop."""
+    """Correct the forces by the measured error of a play, and decide whether to continue. measured: (N, p), the
+    response to `state.forces`. Without a known noise floor the first call leaves the forces unchanged, because the same
+    forces have to be played twice. Raises ValueError for another shape, for values that are not finite, and where the
+    verdict was to stop."""
     repetition = state.repetition
     if state.verdict is not Verdict.CONTINUE:
         raise ValueError(f"this iteration is over: {state.verdict.value}")
@@ -192,27 +194,27 @@ def update_forces(state: IterationState, measured: FloatArray) -> IterationState
             f"{repetition.reference.shape}"
         )
     if state.noise_floor is not None:
-        return _judge_measurement(state, measured, state.noise_floor, plays=1)
+        return _judge_measurement(state, measured, state.noise_floor, play_count=1)
     if state.first_measured is None:
         return replace(state, first_measured=measured)
     play_noise = estimate_repeat_noise(np.stack([state.first_measured, measured]), repetition)
     mean_measured = (state.first_measured + measured) / 2
     return _judge_measurement(
-        replace(state, noise_floor=play_noise, first_measured=None), mean_measured, play_noise, plays=2
+        replace(state, noise_floor=play_noise, first_measured=None), mean_measured, play_noise, play_count=2
     )
 
 
 def estimate_repeat_noise(measured: FloatArray, repetition: Repetition) -> float:
-    """Noise of a single play: rms in the band of the deviations from the mean of several plays of the same forces
-    (sample standard deviation). measured: (plays, N, p), at least two plays."""
+    """Estimate the noise of a single play: rms in the band of the deviations from the mean of several plays of the same
+    forces (sample standard deviation). measured: (plays, N, p), at least two plays."""
     deviations = measured - measured.mean(axis=0)
     sum_of_squares = sum(float(np.sum(repetition.extract_band(deviation) ** 2)) for deviation in deviations)
     return float(np.sqrt(sum_of_squares / ((len(measured) - 1) * measured[0].size)))
 
 
 def estimate_rest_noise(rest_record: FloatArray, repetition: Repetition) -> float:
-    """Noise of a play: rms in the band of a record (n, p) during which no force was commanded; the mean is removed
-    first. Called by `study.workflows.equalizer.repeat_playback`."""
+    """Estimate the noise of a play: rms in the band of a record (n, p) during which no force was commanded; the mean is
+    removed first."""
     return rms(repetition.extract_band(rest_record - rest_record.mean(axis=0)))
 
 
@@ -221,12 +223,14 @@ def rms(samples: FloatArray) -> float:
     return float(np.sqrt(np.mean(samples**2)))
 
 
-def _judge_measurement(state: IterationState, measured: FloatArray, play_noise: float, plays: int) -> IterationState:
-    """State after a measurement, which is the mean of `plays` plays: a stop, or corrected forces. play_noise: noise
-    floor of a single play, rms in the band."""
+def _judge_measurement(
+    state: IterationState, measured: FloatArray, play_noise: float, play_count: int
+) -> IterationState:
+    """Decide after a measurement, the mean of `play_count` plays, whether to stop or to correct the forces. play_noise:
+    noise floor of a single play, rms in the band."""
     repetition = state.repetition
     error = repetition.extract_band(repetition.reference - measured)
-    residual, noise = repetition.compute_residual(error), play_noise / np.sqrt(plays)
+    residual, mean_noise = repetition.compute_residual(error), play_noise / np.sqrt(play_count)
     setbacks = state.setbacks + (residual > state.residuals[-1] if state.residuals else 0)
     state = replace(state, residuals=(*state.residuals, residual), setbacks=setbacks)
     is_diverging = residual > DIVERGENCE_RATIO * state.best_residual
@@ -237,12 +241,12 @@ def _judge_measurement(state: IterationState, measured: FloatArray, play_noise: 
         base_forces, error_to_correct = state.best_forces, state.best_error
     # Residual and noise power are both measured, each with the relative variance 2 / (degrees of freedom); the ratio
     # of both then has the relative standard deviation sqrt(4 / (degrees of freedom)).
-    noise_limit = noise * np.sqrt(1 + SIGNIFICANCE_SIGMA * np.sqrt(4 / repetition.degrees_of_freedom))
+    noise_limit = mean_noise * np.sqrt(1 + SIGNIFICANCE_SIGMA * np.sqrt(4 / repetition.degrees_of_freedom))
     if residual <= noise_limit:
         return _finish(state, Verdict.AT_FLOOR)
     if is_diverging:
         return _finish(state, Verdict.DIVERGING)
-    signal_share = max(0.0, 1 - (noise / repetition.compute_residual(error_to_correct)) ** 2)
+    signal_share = max(0.0, 1 - (mean_noise / repetition.compute_residual(error_to_correct)) ** 2)
     gain = min(repetition.first_gain / (1 + setbacks), signal_share)
     if gain < LOWEST_GAIN:
         return _finish(state, Verdict.BEST_KEPT)
@@ -278,9 +282,9 @@ def fade_ends(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
 
 
 def find_largest_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:
-    """Largest factor s, up to 1, with which no row of forces + s correction has a norm above `cap`. Both (N, m), in the
-    unit of the cap. A row of the forces above the cap counts as at the cap: the correction may not increase its
-    norm."""
+    """Find the largest factor s, up to 1, with which no row of forces + s correction has a norm above `cap`. Both (N,
+    m), in the unit of the cap. A row of the forces above the cap counts as at the cap: the correction may not increase
+    its norm."""
     squared_correction = np.sum(correction**2, axis=1)
     correction_times_force = np.sum(forces * correction, axis=1)
     headroom = np.maximum(cap**2 - np.sum(forces**2, axis=1), 0.0)

@@ -25,9 +25,9 @@ def make_inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> Inver
     """Make the inverse of a model by finite-horizon LQR tracking, from rest and with a free final state, for any record
     length. weight: R = weight I, of |u|², (m/s² per N)²; default as in `TrackingWeights`."""
 
-    def make_inverse_of_length(rows: int) -> InverseOperator:
-        """Inverse operator for records of `rows` rows."""
-        gains = compute_stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
+    def make_inverse_of_length(row_count: int) -> InverseOperator:
+        """Make the inverse operator for records of `row_count` rows."""
+        gains = compute_stored_gains(make_tracking_problem(model, TrackingWeights(weight)), row_count)
         return lambda reference: track(gains, reference).forces
 
     return make_inverse_of_length

@@ -104,8 +104,8 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
             f"a direction has shape {direction_rows.shape[1:]}; this transient takes {transient.direction_shape}"
         )
     n, m = problem.order, problem.inputs
-    workspace = np.zeros(2 * n + m + problem.outputs)
-    workspace[:n] = problem.make_state(start_state.x)
+    work_array = np.zeros(2 * n + m + problem.outputs)
+    work_array[:n] = problem.make_state(start_state.x)
     outputs = np.empty((len(direction_rows), m + problem.outputs))
     flat_directions = np.ascontiguousarray(direction_rows.reshape(len(direction_rows), -1))
     lqr_kernel.simulate_ticks(
@@ -113,11 +113,11 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
         transient.K[start_state.tick :],
         transient.g[start_state.tick :],
         flat_directions,
-        workspace,
+        work_array,
         outputs,
     )
     return TurningResult(
-        outputs[:, :m], outputs[:, m:], LiveState(start_state.tick + len(direction_rows), workspace[:n])
+        outputs[:, :m], outputs[:, m:], LiveState(start_state.tick + len(direction_rows), work_array[:n])
     )
 
 

@@ -32,7 +32,7 @@ class TrackingLoss:
     reference."""
 
     error_free: float
-    """Error of the optimal forces without a cap."""
+    """Error of the optimal forces free of a cap."""
     error_capped: float
     """Error of the returned forces."""
     error_clipped: float
@@ -120,41 +120,43 @@ def track_under_cap(
         np.zeros((len(r), problem.inputs)) if already_planned is None else np.asarray(already_planned, dtype=np.float64)
     )
     if fixed_forces.shape != (len(r), problem.inputs):
-        raise TrackingError(f"already has shape {fixed_forces.shape}; these forces have ({len(r)}, {problem.inputs})")
+        raise TrackingError(
+            f"the other forces have shape {fixed_forces.shape}; it must be ({len(r)}, {problem.inputs})"
+        )
     peaks = find_force_peaks(fixed_forces, require_cap(cap_n))
     if not peaks.is_under_cap:
         raise TrackingError(
             f"the other forces alone reach {peaks.peak_n:.3g} N at row {peaks.peak_row}, above the cap of {cap_n:g} "
             "N; lower them, or raise the cap"
         )
-    capped = _CappedProblem(problem, r, fixed_forces, cap_n)
+    capped_problem = _CappedProblem(problem, r, fixed_forces, cap_n)
     unconstrained = track(compute_stored_gains(problem, len(r)), r)
     if find_force_peaks(unconstrained.forces + fixed_forces, cap_n).is_under_cap:
-        return _make_result(capped, unconstrained.forces, unconstrained.forces, 0.0, 0)
+        return _make_result(capped_problem, unconstrained.forces, unconstrained.forces, 0.0, 0)
     return _make_result(
-        capped,
+        capped_problem,
         unconstrained.forces,
-        *_alternate_directions(capped, unconstrained.forces, settings or CapSettings()),
+        *_alternate_directions(capped_problem, unconstrained.forces, settings or CapSettings()),
     )
 
 
 def _alternate_directions(
-    capped: _CappedProblem, initial_forces: FloatArray, settings: CapSettings
+    capped_problem: _CappedProblem, initial_forces: FloatArray, settings: CapSettings
 ) -> tuple[FloatArray, float, int]:
     """Solve by ADMM with over-relaxation, in Boyd's notation: u from tracking, z projected on the cap, scaled
     multipliers λ / (2 penalty). Returns the best z, its relative duality gap and the number of rounds. Raises
     TrackingError where the gap is not reached."""
-    penalty = _choose_initial_penalty(capped.problem)
-    gains = _compute_penalised_gains(capped.problem, len(capped.reference), penalty)
-    z, scaled_multipliers = capped.project(initial_forces), np.zeros_like(initial_forces)
-    best_forces, best_cost, cost_bound = z, capped.compute_cost(z), -np.inf
+    penalty = _choose_initial_penalty(capped_problem.problem)
+    gains = _compute_penalised_gains(capped_problem.problem, len(capped_problem.reference), penalty)
+    z, scaled_multipliers = capped_problem.project(initial_forces), np.zeros_like(initial_forces)
+    best_forces, best_cost, cost_bound = z, capped_problem.compute_cost(z), -np.inf
     for round_count in range(1, settings.rounds + 1):
-        u = track(gains, np.hstack((capped.reference, z - scaled_multipliers))).forces
-        cost_bound = max(cost_bound, capped.compute_lower_bound(u, 2 * penalty * (u - z + scaled_multipliers)))
+        u = track(gains, np.hstack((capped_problem.reference, z - scaled_multipliers))).forces
+        cost_bound = max(cost_bound, capped_problem.compute_lower_bound(u, 2 * penalty * (u - z + scaled_multipliers)))
         relaxed_forces = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
-        previous_z, z = z, capped.project(relaxed_forces + scaled_multipliers)
+        previous_z, z = z, capped_problem.project(relaxed_forces + scaled_multipliers)
         scaled_multipliers = scaled_multipliers + relaxed_forces - z
-        cost = capped.compute_cost(z)
+        cost = capped_problem.compute_cost(z)
         if cost < best_cost:
             best_forces, best_cost = z, cost
         gap = max(0.0, (best_cost - cost_bound) / best_cost)
@@ -163,10 +165,10 @@ def _alternate_directions(
         factor = _compute_penalty_factor(u - z, z - previous_z) if round_count % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
             penalty, scaled_multipliers = penalty * factor, scaled_multipliers / factor
-            gains = _compute_penalised_gains(capped.problem, len(capped.reference), penalty)
+            gains = _compute_penalised_gains(capped_problem.problem, len(capped_problem.reference), penalty)
     raise TrackingError(
-        f"after {settings.rounds} rounds the forces under the cap of {capped.cap_n:g} N are only known to be within "
-        f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
+        f"after {settings.rounds} rounds the forces under the cap of {capped_problem.cap_n:g} N are only known to be "
+        f"within {gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
     )
 
 
@@ -207,26 +209,30 @@ def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArra
 
 
 def _make_result(
-    capped: _CappedProblem, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
+    capped_problem: _CappedProblem, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
 ) -> CappedForces:
     """Result for `forces` (N, m), with the loss against the forces `unconstrained` (N, m). gap, rounds: as in
     `TrackingLoss`."""
-    p, reference_norm = capped.problem.outputs, float(np.linalg.norm(capped.reference)) or 1.0
+    p, reference_norm = capped_problem.problem.outputs, float(np.linalg.norm(capped_problem.reference)) or 1.0
 
     def compute_error(tested_forces: FloatArray) -> float:
         """Relative rms tracking error of forces (N, m); the absolute norm for a reference of zeros."""
         return (
-            float(np.linalg.norm(_simulate_outputs(capped.problem, tested_forces)[:, :p] - capped.reference))
+            float(
+                np.linalg.norm(
+                    _simulate_outputs(capped_problem.problem, tested_forces)[:, :p] - capped_problem.reference
+                )
+            )
             / reference_norm
         )
 
     loss = TrackingLoss(
         compute_error(unconstrained),
         compute_error(forces),
-        compute_error(capped.project(unconstrained)),
-        capped.compute_cost(unconstrained),
-        capped.compute_cost(forces),
+        compute_error(capped_problem.project(unconstrained)),
+        capped_problem.compute_cost(unconstrained),
+        capped_problem.compute_cost(forces),
         gap,
         rounds,
     )
-    return CappedForces(forces, _simulate_outputs(capped.problem, forces)[:, :p], loss)
+    return CappedForces(forces, _simulate_outputs(capped_problem.problem, forces)[:, :p], loss)

@@ -109,11 +109,11 @@ def _compute_deviation(problem: TrackingProblem, basis: RotationBasis, recording
 def _compute_relative_error(deviation: FloatArray, normal: FloatArray) -> float:
     """sqrt(n' S n) for the normal scaled to unit length; a value below zero by rounding counts as zero. Raises
     TrackingError for another shape, for zero and for values that are not finite."""
-    unit_normal = np.asarray(normal, dtype=np.float64)
-    normal_length = float(np.linalg.norm(unit_normal))
-    if unit_normal.shape != deviation.shape[:1] or not (np.isfinite(normal_length) and normal_length > 0):
+    normal_vector = np.asarray(normal, dtype=np.float64)
+    normal_length = float(np.linalg.norm(normal_vector))
+    if normal_vector.shape != deviation.shape[:1] or not (np.isfinite(normal_length) and normal_length > 0):
         raise TrackingError(
-            f"a normal must be {len(deviation)} finite numbers, not all zero; it is {unit_normal.tolist()}"
+            f"a normal must be {len(deviation)} finite numbers, not all zero; it is {normal_vector.tolist()}"
         )
-    unit_normal = unit_normal / normal_length
-    return float(np.sqrt(max(0.0, float(unit_normal @ deviation @ unit_normal))))
+    normal_vector = normal_vector / normal_length
+    return float(np.sqrt(max(0.0, float(normal_vector @ deviation @ normal_vector))))

@@ -35,10 +35,10 @@ class PreviewTracker:
     def __len__(self) -> int:
         return int(self.preview_gains.shape[0])
 
-    def step(self, x: FloatArray, previewed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Force (m,), N, of this sample, and the state (n,) at the next. x: (n,), the present state; previewed: (M, p),
-        m/s², the present sample first."""
-        force = np.einsum("jmp,jp->m", self.preview_gains, previewed) - self.K @ x
+    def step(self, x: FloatArray, previewed_reference: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compute the force (m,), N, of this sample, and the state (n,) at the next. x: (n,), the present state;
+        previewed_reference: (M, p), m/s², the present sample first."""
+        force = np.einsum("jmp,jp->m", self.preview_gains, previewed_reference) - self.K @ x
         return force, self.problem.A @ x + self.problem.B @ force
 
 
@@ -60,12 +60,12 @@ def make_preview_tracker(problem: TrackingProblem, preview_samples: int) -> Prev
         raise TrackingError(f"the preview is {preview_samples} samples; the present one at least must be known")
     gains = compute_stationary_gains(problem)
     K, H_inverse = gains.K[0], gains.H_inverse[0]
-    closed_loop, linear_cost = _close_loop(problem, K)
+    closed_loop, costate_factor = _close_loop(problem, K)
     preview_gains = np.empty((preview_samples, problem.inputs, problem.outputs))
     preview_gains[0] = H_inverse @ problem.linear_cost[:, problem.order :].T
     for j in range(1, preview_samples):
-        preview_gains[j] = H_inverse @ problem.B.T @ linear_cost
-        linear_cost = closed_loop.T @ linear_cost
+        preview_gains[j] = H_inverse @ problem.B.T @ costate_factor
+        costate_factor = closed_loop.T @ costate_factor
     return PreviewTracker(problem, K, copy_read_only(preview_gains))
 
 
@@ -100,8 +100,8 @@ def compute_preview_loss(problem: TrackingProblem, preview_samples: int) -> Prev
 
 
 def _close_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Closed loop A - B K, (n, n), and (C - D K)' Q of the tracked outputs, (n, p), the factor of the reference in the
-    costate v."""
+    """Compute the closed loop A - B K, (n, n), and (C - D K)' Q of the tracked outputs, (n, p), the factor of the
+    reference in the costate v."""
     n = problem.order
     return problem.A - problem.B @ K, (problem.linear_cost[:, :n] - problem.linear_cost[:, n:] @ K).T
 
@@ -121,17 +121,17 @@ def _compute_full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexA
     """(lines, m, p): frequency response of the feedforward with unlimited preview; the sum over all future samples is a
     geometric series. z: (lines,), points of the unit circle."""
     gains = compute_stationary_gains(problem)
-    closed_loop, linear_cost = _close_loop(problem, gains.K[0])
+    closed_loop, costate_factor = _close_loop(problem, gains.K[0])
     advance = z[:, np.newaxis, np.newaxis]
     costate = advance * np.linalg.solve(
-        np.eye(problem.order) - advance * closed_loop.T, linear_cost.astype(complex)[np.newaxis]
+        np.eye(problem.order) - advance * closed_loop.T, costate_factor.astype(complex)[np.newaxis]
     )
     present_gain = problem.linear_cost[:, problem.order :].T
     return np.asarray(gains.H_inverse[0] @ (present_gain + problem.B.T @ costate))
 
 
 def _compute_relative_error(delivered: ComplexArray) -> float:
-    """Rms over lines and axes of delivered - I. delivered: (lines, p, p), response from reference to delivered
-    acceleration."""
+    """Compute the rms over lines and axes of delivered - I. delivered: (lines, p, p), response from reference to
+    delivered acceleration."""
     p = delivered.shape[-1]
     return float(np.sqrt(np.mean(np.sum(np.abs(delivered - np.eye(p)) ** 2, axis=(1, 2))) / p))

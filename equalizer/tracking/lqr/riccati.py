@@ -10,8 +10,8 @@ times the W of `lqr`:
     [ S B   S A ]
 
 P therefore has no negative eigenvalue, even where the forces can cancel the whole cost. `riccati_kernel` updates P
-itself, compiled: faster, but less accurate; `lqr.compute_stored_gains` tries it first. `preview` uses the stationary
-gains.
+itself, compiled: faster, but less accurate. `lqr.compute_stored_gains` runs that kernel first, and this recursion where
+the kernel is not accurate enough; `preview` calls `compute_stationary_gains`.
 """
 
 from dataclasses import dataclass
@@ -108,7 +108,8 @@ def compute_stationary_gains(problem: TrackingProblem) -> Gains:
 
 def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
     """Return P_N, (n, n), made exactly symmetric; zeros for None. Raises TrackingError for another shape, values that
-    are not finite, asymmetry and a negative eigenvalue."""
+    are not finite, asymmetry beyond rounding (1e-9, relative) and an eigenvalue below zero by more than
+    `EIGENVALUE_TOLERANCE`."""
     n = problem.order
     if terminal_weight is None:
         return np.zeros((n, n))
@@ -127,11 +128,11 @@ def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArra
 
 
 def _factorize(weight: FloatArray) -> FloatArray:
-    """F with F'F = weight, a symmetric matrix, by its eigenvalues; those below zero are rounding errors and count as
+    """Factorize a symmetric matrix, F'F = weight, by its eigenvalues; those below zero are rounding errors and count as
     zero. The weight is scaled to a unit diagonal first: the states of a model differ in unit and size, and rounding
     errors of a large weight must not hide a small weight."""
-    diagonal = np.sqrt(np.maximum(np.diag(weight), 0.0))
-    scale = np.where(diagonal > 0, diagonal, 1.0)
+    diagonal_root = np.sqrt(np.maximum(np.diag(weight), 0.0))
+    scale = np.where(diagonal_root > 0, diagonal_root, 1.0)
     eigenvalues, eigenvectors = np.linalg.eigh(weight / np.outer(scale, scale))
     factor: FloatArray = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * eigenvectors.T * scale
     return factor

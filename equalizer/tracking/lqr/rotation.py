@@ -3,8 +3,8 @@
 The forces are linear in the trajectory r, and R r = sum over i, j of R_ij (e_i r_j), with the unit vectors e_i. The
 solutions for the trajectories e_i r_j, component j of r played along axis i, are stored: nine on three axes. Their sum
 with the weights R_ij is the solution for the rotation R. A recording along a single direction needs only three. All
-start from rest, because the free response of an initial motion does not rotate. Called by `contact`; for a direction
-that changes during the playback see `changing_direction`.
+start from rest, because the free response of an initial motion does not rotate. Called by `contact` (normals) and
+`changing_direction`, which is for a direction that changes during the playback.
 """
 
 from dataclasses import dataclass
@@ -39,14 +39,14 @@ class RotationBasis:
         """(N, p), m/s²: the model's response to the forces of a direction. Raises TrackingError for another shape."""
         return self._combine(self.stored_responses, direction, self.direction_shape[0])
 
-    def _combine(self, stored: FloatArray, direction: FloatArray, columns: int) -> FloatArray:
-        """(N, columns): stored solutions, weighted by the elements of the direction and added. Raises TrackingError for
-        another shape of the direction."""
+    def _combine(self, stored_solutions: FloatArray, direction: FloatArray, column_count: int) -> FloatArray:
+        """Add the stored solutions (directions, N * column_count), weighted by the elements of the direction; returns
+        (N, column_count). Raises TrackingError for another shape of the direction."""
         weights = np.asarray(direction, dtype=np.float64)
         if weights.shape != self.direction_shape:
             raise TrackingError(f"a direction has shape {weights.shape}; this basis takes {self.direction_shape}")
-        combined: FloatArray = np.dot(weights.reshape(-1), stored)
-        return combined.reshape(-1, columns)
+        combined: FloatArray = np.dot(weights.reshape(-1), stored_solutions)
+        return combined.reshape(-1, column_count)
 
 
 def compute_rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:

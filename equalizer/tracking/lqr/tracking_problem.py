@@ -6,8 +6,8 @@ A device without acceleration response to a constant force has zeros near z = 1:
 drift at low frequencies, below the identified band. The force weight R penalises forces at all frequencies, the
 low-frequency weight only there: it penalises w, a first-order low pass of each force,
 w_{k+1} = a w_k + (1 - a) u_k, as a further output with zero reference (frequency-dependent weights by augmenting the
-plant: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, chapter 9). Solved by `lqr` and its sibling
-modules.
+plant: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, chapter 9). Called by `lqr`, by the other
+modules of this package and by the equalizers, which make a problem and pass it to `lqr`.
 """
 
 from dataclasses import dataclass
@@ -143,10 +143,10 @@ def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> T
     if weights.low_frequency_weight > 0:
         # A first-order low pass per force; its output is w_{k+1}, which includes the force of this sample.
         a = float(np.exp(-2 * np.pi * weights.low_frequency_hz / model.sample_rate_hz))
-        unit = np.eye(m)
-        A, B = block_diag(A, a * unit), np.vstack((B, (1 - a) * unit))
-        C, D = block_diag(C, a * unit), np.vstack((D, (1 - a) * unit))
-        Q = block_diag(Q, weights.low_frequency_weight * unit)
+        identity = np.eye(m)
+        A, B = block_diag(A, a * identity), np.vstack((B, (1 - a) * identity))
+        C, D = block_diag(C, a * identity), np.vstack((D, (1 - a) * identity))
+        Q = block_diag(Q, weights.low_frequency_weight * identity)
     R = weights.weight * np.eye(m)
     return TrackingProblem(A, B, C, D, Q, R, p, model.sample_rate_hz, model.band_hz)
 

@@ -2,7 +2,7 @@
 
 The forces are computed by this package, for both parts of the controller (`make_realtime_controller`): the transient,
 with directions that change at each tick, and the stream, with noise as reference acceleration. All forces are below the
-cap. Called by `study.workflows.equalizer.controller.export_controller`.
+cap. Called by `study.workflows.equalizer.controller.export_controller`; `c_source` there writes them as C.
 """
 
 from dataclasses import dataclass
@@ -52,10 +52,10 @@ def compute_controller_cases(controller: RealtimeController, seed: int = 1) -> C
     `TICKS_AFTER` more. Raises TrackingError where transient or stream give no force, so that nothing could be
     compared."""
     generator, p = np.random.default_rng(seed), controller.problem.outputs
-    ticks = max(len(controller.transient), len(controller.tracker)) + TICKS_AFTER
-    rotations = np.cumsum(generator.standard_normal((ticks, p, p)), axis=0)
+    tick_count = max(len(controller.transient), len(controller.tracker)) + TICKS_AFTER
+    rotations = np.cumsum(generator.standard_normal((tick_count, p, p)), axis=0)
     rotations *= _compute_cap_factor(play(controller.transient, rotations).forces, controller.cap_n, "transient")
-    reference = generator.standard_normal((ticks, p))
+    reference = generator.standard_normal((tick_count, p))
     reference *= _compute_cap_factor(controller.simulate_stream(reference)[1].forces, controller.cap_n, "stream")
     bands, stream_result = controller.simulate_stream(reference)
     transient_forces = play(controller.transient, rotations).forces

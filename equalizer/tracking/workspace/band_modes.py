@@ -3,8 +3,7 @@
 A model of order 26 of a device with four resonances in the band has more than four pole pairs there: several pairs may
 describe a single resonance, or the noise of the measurement. The model's poles therefore only give start values: a pole
 pair with residues for each resonance, and a smooth remainder with free coefficients, are fitted together to the model's
-response. Called by `modal_interpolation`, which interpolates the
-resonances between places after `mode_matching`.
+response. Called by `modal_interpolation`, which interpolates the resonances between places after `mode_matching`.
 """
 
 from dataclasses import dataclass
@@ -87,8 +86,8 @@ class BandLines:
 
 
 def compute_band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> BandLines:
-    """The model's response on a logarithmic grid of LINES_PER_OCTAVE, over the band (Hz) and half of BAND_MARGIN on
-    either side, but at most 0.49 of the sample rate."""
+    """Compute the model's response on a logarithmic grid of LINES_PER_OCTAVE, over the band (Hz) and half of
+    BAND_MARGIN on either side, but at most 0.49 of the sample rate, just below half of it."""
     low_hz, high_hz = band_hz
     widened_band_hz = (
         low_hz * (1 - BAND_MARGIN / 2),
@@ -107,32 +106,33 @@ def compute_band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> 
 
 
 def find_band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tuple[BandMode, ...]:
-    """Resonances in the band (Hz) by rising frequency. All are fitted together; those that fail `_is_resonance` are
-    removed and the fit is repeated until all pass. Empty without any."""
+    """Find the resonances in the band (Hz), by rising frequency. All are fitted together; those that fail
+    `_is_resonance` are removed and the fit is repeated until all pass. Empty without any."""
     lines = compute_band_lines(model, band_hz)
-    starts = _find_start_values(model, band_hz)
-    while len(starts):
-        fitted_parameters, residues = _fit_modes(lines, starts, model.sample_rate_hz)
+    start_values = _find_start_values(model, band_hz)
+    while len(start_values):
+        frequencies_and_dampings, residues = _fit_modes(lines, start_values, model.sample_rate_hz)
         modes = [
             _make_mode(lines, frequency_and_damping, residue, model.sample_rate_hz)
-            for frequency_and_damping, residue in zip(fitted_parameters, residues, strict=True)
+            for frequency_and_damping, residue in zip(frequencies_and_dampings, residues, strict=True)
         ]
         is_resonance = np.array(
-            [_is_resonance(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)]
+            [_is_resonance(mode, start_value, band_hz) for mode, start_value in zip(modes, start_values, strict=True)]
         )
         if is_resonance.all():
             return tuple(sorted(modes, key=lambda mode: mode.natural_hz))
-        starts = starts[is_resonance]
+        start_values = start_values[is_resonance]
     return ()
 
 
 def _find_start_values(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
-    """(modes, 2): natural frequency (Hz) and damping ratio of the model's poles in and near the band, by rising
-    frequency. Poles nearer to each other than half their bandwidth (damping ratio times frequency) are merged, weighted
-    by their modal gain."""
+    """Find natural frequency (Hz) and damping ratio of the model's poles in and near the band, (modes, 2), by rising
+    frequency. Neighbours that are nearer than half the larger of their bandwidths (damping ratio times frequency) are
+    merged, weighted by their modal gain."""
     poles, mode_shapes = np.linalg.eig(model.A)
     modal_inputs = np.linalg.solve(mode_shapes, model.B.astype(complex))
     modal_gain = np.linalg.norm(model.C @ mode_shapes, axis=0) * np.linalg.norm(modal_inputs, axis=1)
+    # A pole with an imaginary part of at most 1e-9 is real up to rounding; of a conjugate pair one pole is kept.
     has_positive_imaginary = poles.imag > 1e-9
     continuous_poles = np.log(poles[has_positive_imaginary]) * model.sample_rate_hz
     natural_hz, damping_ratio = (
@@ -163,11 +163,11 @@ def _find_start_values(model: IdentifiedModel, band_hz: tuple[float, float]) -> 
     return np.array([(mode_hz, damping) for mode_hz, damping, _ in merged_modes], dtype=np.float64).reshape(-1, 2)
 
 
-def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
+def _fit_modes(lines: BandLines, start_values: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
     """Fit by variable projection (Golub and Pereyra 1973): natural frequencies and damping ratios are searched by least
     squares, residues and remainder follow linearly. The misfit is relative to the norm of the response at each line.
-    starts: as returned by `_find_start_values`. Returns natural frequencies (Hz) and damping ratios (modes, 2), and
-    residues (modes, p, m)."""
+    start_values: as returned by `_find_start_values`. Returns natural frequencies (Hz) and damping ratios (modes, 2),
+    and residues (modes, p, m)."""
     response_norm = lines.response_norm[:, None]
     target = _stack_real_and_imaginary((lines.response.reshape(len(response_norm), -1)) / response_norm)
     remainder_basis = lines.smooth_basis / response_norm
@@ -194,24 +194,25 @@ def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[Fl
         orthonormal = np.linalg.qr(compute_basis(log_parameters))[0]
         return np.asarray(target - orthonormal @ (orthonormal.T @ target)).ravel()
 
-    # A lower limit of the damping ratio keeps the first values of spurious poles off the unit circle, an upper limit of
-    # 0.95 in `compute_basis` keeps the poles complex; a mode near it is no resonance (`MAX_DAMPING_RATIO`).
-    log_start = np.log(np.maximum(starts, [0.0, 1e-3]))
+    # A lower limit of the damping ratio, 1e-3, keeps the first values of spurious poles off the unit circle; an upper
+    # limit of 0.95, in `compute_basis` and `_make_mode`, keeps the poles complex: a mode near it is no resonance
+    # (`MAX_DAMPING_RATIO`). Steps are scaled to 1 % of a parameter; 400 evaluations bound the time, converged or not.
+    log_start = np.log(np.maximum(start_values, [0.0, 1e-3]))
     solution = least_squares(compute_residual, log_start.ravel(), method="lm", x_scale=0.01, max_nfev=400)
     coefficients = np.linalg.lstsq(compute_basis(solution.x), target, rcond=None)[0]
-    mode_count, response_shape = len(starts), lines.response.shape[1:]
+    mode_count, response_shape = len(start_values), lines.response.shape[1:]
     residues = (coefficients[:mode_count] + 1j * coefficients[mode_count : 2 * mode_count]).reshape(
         mode_count, *response_shape
     )
     return np.exp(solution.x.reshape(-1, 2)), residues
 
 
-def _is_resonance(mode: BandMode, start: FloatArray, band_hz: tuple[float, float]) -> bool:
+def _is_resonance(mode: BandMode, start_value: FloatArray, band_hz: tuple[float, float]) -> bool:
     """Whether a fitted mode is a resonance: near its start value (natural frequency, damping ratio), weakly damped, in
     the band (Hz) or its margin, and large enough in the response."""
     low_hz, high_hz = band_hz
     return bool(
-        abs(mode.natural_hz / start[0] - 1) < MAX_FREQUENCY_CHANGE
+        abs(mode.natural_hz / start_value[0] - 1) < MAX_FREQUENCY_CHANGE
         and mode.damping_ratio < MAX_DAMPING_RATIO
         and low_hz * (1 - BAND_MARGIN) < mode.natural_hz < high_hz * (1 + BAND_MARGIN)
         and mode.share >= MIN_SHARE

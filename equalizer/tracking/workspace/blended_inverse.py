@@ -12,8 +12,8 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 
 def blend_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
-    """All models with the weights of linear interpolation at a place (m), none negative, sum 1. A single model without
-    a place is used everywhere, with a remark; a place outside the hull of the models also gets a remark."""
+    """Weight all models by linear interpolation at a place (m); no weight is negative, their sum is 1. A single model
+    without a place is used everywhere, with a remark; a place outside the hull of the models also gets a remark."""
     if len(workspace) == 1 and workspace.models[0].place_m is None:
         return ModelsAtPlace(
             place_m, workspace.models, (1.0,), ("the only model does not say where it was identified",)

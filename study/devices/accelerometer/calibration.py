@@ -55,23 +55,23 @@ class Calibration:
         return float((cross_terms / main_sensitivity[:, None]).max())
 
 
-def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
+def calibrate(position_samples: tuple[FloatArray, ...]) -> Calibration:
     """Fit bias and sensitivity matrix by least squares to six positions under gravity, and compute the noise.
-    positions: raw samples (n, 3), n >= 2, at rest in each of `POSITIONS`.
+    position_samples: raw samples (n, 3), n >= 2, at rest in each of `POSITIONS`.
 
     Raises ValueError for missing positions or samples, for a position whose residual exceeds `MAX_RESIDUAL_G` (the
     message names it), and for a channel that hardly responds to gravity.
     """
-    if len(positions) != len(POSITIONS) or any(len(samples) < 2 for samples in positions):
+    if len(position_samples) != len(POSITIONS) or any(len(samples) < 2 for samples in position_samples):
         raise ValueError(f"{len(POSITIONS)} positions are needed, each with two samples or more")
-    mean_readings = np.array([np.mean(samples, axis=0) for samples in positions])
+    mean_readings = np.array([np.mean(samples, axis=0) for samples in position_samples])
     design_matrix = np.hstack((GRAVITY_MPS2 * UP_DIRECTIONS, np.ones((len(UP_DIRECTIONS), 1))))
-    fitted_rows = np.linalg.lstsq(design_matrix, mean_readings, rcond=None)[0]
-    sensitivity, bias = fitted_rows[:3].T, fitted_rows[3]
+    solution = np.linalg.lstsq(design_matrix, mean_readings, rcond=None)[0]
+    sensitivity, bias = solution[:3].T, solution[3]
     largest_sensitivity = float(np.linalg.norm(sensitivity, 2))
     if not largest_sensitivity > 0:
         raise ValueError("no channel responds to gravity: check the wiring")
-    residuals_g = np.linalg.norm(mean_readings - design_matrix @ fitted_rows, axis=1) / (
+    residuals_g = np.linalg.norm(mean_readings - design_matrix @ solution, axis=1) / (
         largest_sensitivity * GRAVITY_MPS2
     )
     worst_position = int(np.argmax(residuals_g))
@@ -81,6 +81,6 @@ def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
         )
     if np.linalg.cond(sensitivity) > MAX_CONDITION_NUMBER:
         raise ValueError("a channel hardly responds to gravity: check its wiring")
-    deviations = np.concatenate([samples - np.mean(samples, axis=0) for samples in positions])
+    deviations = np.concatenate([samples - np.mean(samples, axis=0) for samples in position_samples])
     noise_mps2 = np.linalg.solve(sensitivity, deviations.T).T.std(axis=0)
     return Calibration(bias, sensitivity, noise_mps2, float(residuals_g.max()))

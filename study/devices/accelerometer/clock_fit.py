@@ -63,9 +63,12 @@ def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
     at_host_s = float(
         arrival_times_s[0] + excess_delay_s[start_index] + (device_times_s[start_index] - device_times_s[0])
     )
-    fit = ClockFit(float(device_times_s[start_index]), at_host_s, 1.0 + slope, 0.0)
+    preliminary_fit = ClockFit(float(device_times_s[start_index]), at_host_s, 1.0 + slope, 0.0)
     return ClockFit(
-        fit.at_device_s, at_host_s, fit.rate, float((arrival_times_s - fit.to_host_s(device_times_s)).max())
+        preliminary_fit.at_device_s,
+        at_host_s,
+        preliminary_fit.rate,
+        float((arrival_times_s - preliminary_fit.to_host_s(device_times_s)).max()),
     )
 
 

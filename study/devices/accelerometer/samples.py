@@ -1,7 +1,7 @@
 """Raw samples of an accelerometer: sequence numbers, times by the sensor's clock, counts of received and lost packets.
 
 `SampleSource` is the interface of a serial line (`serial_reader`) and of a data-acquisition device (`sources`); all
-further processing is the same for both. Used by `sensor`, `history` and `six_positions`.
+further processing is the same for both. `parser` makes `Samples`; `sensor`, `history` and `six_positions` use them.
 """
 
 from dataclasses import dataclass

@@ -34,7 +34,7 @@ RANGE_G = 3.0
 """Guaranteed range of the ADXL335, in g (data sheet: ±3 g minimum); beyond it, a channel counts as clipped."""
 
 
-def calibrate_on_table(path: str, baud: int, await_position: AwaitPosition, rest_s: float | None = None) -> str:
+def calibrate_in_six_positions(path: str, baud: int, await_position: AwaitPosition, rest_s: float | None = None) -> str:
     """Record all positions and return the [accelerometer] table, as TOML. path: port of the sensor, as in `sources`;
     baud: rate of a serial line (bit/s); rest_s: time per position (s), None = `REST_S`.
 

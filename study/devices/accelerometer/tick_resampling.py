@@ -30,7 +30,7 @@ lower rate, 80 dB down from half of it on."""
 
 LONGEST_GAP_PERIODS = 2.5
 """Longest accepted gap between two samples, in periods of the lower rate: at least one lost sample is tolerated. Ticks
-near a longer gap get NaN."""
+near a longer gap get NaN. Chosen."""
 
 SHORTEST_FIT_S = 1.0
 """Shortest time span of arrivals (s) to which a clock is fitted: over this time a delay of 0.1 ms is an error of 100
@@ -38,7 +38,7 @@ ppm in its rate. Chosen."""
 
 ARRIVALS_PER_S = 50.0
 """Largest number of arrivals per second to which the clock is fitted: the least delayed arrival of each interval,
-because a delay contains no information about the clock."""
+because a delay contains no information about the clock. Chosen."""
 
 CHUNK_TICKS = 4096
 """Approximate number of ticks that are resampled in a single array operation, which limits the memory needed.
@@ -57,21 +57,21 @@ class ResampledValues:
 
 
 def fit_and_resample(
-    interval: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_hz: float
+    arrived_samples: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_hz: float
 ) -> ResampledValues:
-    """Fit the clock and resample to the ticks. values: (n, channels), of the n samples of `interval`; tick_s: (k,),
-    times at which the ticks were due (s), rising by 1 / rate_hz. Samples between two restarts of the board are left out
-    where their arrivals span less than `SHORTEST_FIT_S`."""
-    host_s = np.full(len(interval.device_s), np.nan)
+    """Fit the clock and resample to the ticks. values: (n, channels), of the n samples of `arrived_samples`; tick_s:
+    (k,), times at which the ticks were due (s), rising by 1 / rate_hz. Samples between two restarts of the board are
+    left out where their arrivals span less than `SHORTEST_FIT_S`."""
+    host_s = np.full(len(arrived_samples.device_s), np.nan)
     main_fit: ClockFit | None = None
     largest_count = 0
-    for restarts in np.unique(interval.last_restarts):
-        is_arrival, is_sample = interval.last_restarts == restarts, interval.restarts == restarts
-        device_s, arrived_s = interval.last_device_s[is_arrival], interval.arrived_s[is_arrival]
+    for restarts in np.unique(arrived_samples.last_restarts):
+        is_arrival, is_sample = arrived_samples.last_restarts == restarts, arrived_samples.restarts == restarts
+        device_s, arrived_s = arrived_samples.last_device_s[is_arrival], arrived_samples.arrived_s[is_arrival]
         if device_s[-1] - device_s[0] < SHORTEST_FIT_S:
             continue
         fit = fit_clock(*_select_least_delayed(device_s, arrived_s))
-        host_s[is_sample] = fit.to_host_s(interval.device_s[is_sample])
+        host_s[is_sample] = fit.to_host_s(arrived_samples.device_s[is_sample])
         if is_sample.sum() > largest_count:
             main_fit, largest_count = fit, int(is_sample.sum())
     has_host_time = np.isfinite(host_s)
@@ -96,26 +96,26 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     spacing_s = np.gradient(sample_s)
     # Right half of a Kaiser window of 4097 points, fine enough for linear interpolation at each distance from the tick.
     window = np.kaiser(4097, KAISER_BETA)[2048:]
-    # The filter covers 2 half_s / period_s samples on average; the tenth more allows for an irregular spacing.
+    # The filter covers 2 half_length_s / period_s samples on average; the tenth more allows for an irregular spacing.
     offsets = np.arange(-1, 2 + int(np.ceil(2.2 * half_length_s / period_s)))
     for tick_chunk in np.array_split(np.flatnonzero(is_covered), max(1, len(tick_s) // CHUNK_TICKS)):
-        first_sample = np.searchsorted(sample_s, tick_s[tick_chunk] - half_length_s)
-        sample_index = (first_sample[:, None] + offsets).clip(0, len(sample_s) - 1)
-        distance_s = sample_s[sample_index] - tick_s[tick_chunk, None]
-        is_outside = (np.abs(distance_s) >= half_length_s) | (first_sample[:, None] + offsets != sample_index)
+        first_indices = np.searchsorted(sample_s, tick_s[tick_chunk] - half_length_s)
+        sample_indices = (first_indices[:, None] + offsets).clip(0, len(sample_s) - 1)
+        distance_s = sample_s[sample_indices] - tick_s[tick_chunk, None]
+        is_outside = (np.abs(distance_s) >= half_length_s) | (first_indices[:, None] + offsets != sample_indices)
         weights = np.sinc(2 * CORNER_RATIO * lower_rate_hz * distance_s)
         weights *= (
             np.interp(np.abs(distance_s), np.linspace(0.0, half_length_s, len(window)), window)
-            * spacing_s[sample_index]
+            * spacing_s[sample_indices]
         )
         weights[is_outside] = 0.0
-        resampled[tick_chunk] = np.einsum("kn,knc->kc", weights, values[sample_index]) / weights.sum(axis=1)[:, None]
+        resampled[tick_chunk] = np.einsum("kn,knc->kc", weights, values[sample_indices]) / weights.sum(axis=1)[:, None]
     return resampled
 
 
 def _has_no_gap(sample_s: FloatArray, tick_s: FloatArray, half_length_s: float, longest_gap_s: float) -> np.ndarray:
-    """Whether the samples within half_s (s) of each tick have no gap longer than longest_s (s), (k,); the distance of
-    the first or last sample from the end of that interval counts as a gap."""
+    """Whether the samples within half_length_s (s) of each tick have no gap longer than longest_gap_s (s), (k,); the
+    distance of the first or last sample from the end of that interval counts as a gap."""
     in_range = (tick_s - half_length_s >= sample_s[0] - longest_gap_s) & (
         tick_s + half_length_s <= sample_s[-1] + longest_gap_s
     )

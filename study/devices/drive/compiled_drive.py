@@ -58,8 +58,11 @@ own."""
 SENSE_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE)
 """Signature of the compiled half `sense` of a rig, as in `study.devices.rig.CompiledIo`; that of `write` follows."""
 WRITE_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, VECTOR_TYPE)
-SENSE, WRITE = types.FunctionType(SENSE_SIGNATURE), types.FunctionType(WRITE_SIGNATURE)
-TICK, PUBLISH, RECORD_MISSED = map(types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISSED_TICKS_SIGNATURE))
+SENSE_TYPE, WRITE_TYPE = types.FunctionType(SENSE_SIGNATURE), types.FunctionType(WRITE_SIGNATURE)
+TICK_TYPE, PUBLISH_TYPE, RECORD_MISSED_TYPE = map(
+    types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISSED_TICKS_SIGNATURE)
+)
+"""numba types of pointers to the compiled functions: those of a rig above, those of `govern` here."""
 _RIG_TYPE = types.Tuple((CALLS, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
 """Types of the grouped arguments of `_run_tick`. _RIG_TYPE: the rig's calls, cells and samples; _GOVERNOR_TYPE: the
 governor's arrays (`CompiledTicks`); _LOOP_STATE_TYPE: cells of the loop, last reading, ring of newest readings."""
@@ -67,9 +70,13 @@ _GOVERNOR_TYPE = types.Tuple(  # type: ignore[no-untyped-call]
     (VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE)
 )
 _LOOP_STATE_TYPE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
-_RUN_DUE_SIGNATURE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG_TYPE, _GOVERNOR_TYPE, _LOOP_STATE_TYPE, types.int64)
+_RUN_DUE_SIGNATURE = types.int64(
+    SENSE_TYPE, WRITE_TYPE, TICK_TYPE, PUBLISH_TYPE, _RIG_TYPE, _GOVERNOR_TYPE, _LOOP_STATE_TYPE, types.int64
+)
 """Signature of the entry point `run_due`; that of `attend` follows."""
-_ATTEND_SIGNATURE = types.int64(SENSE, WRITE, TICK, PUBLISH, RECORD_MISSED, _RIG_TYPE, _GOVERNOR_TYPE, _LOOP_STATE_TYPE)
+_ATTEND_SIGNATURE = types.int64(
+    SENSE_TYPE, WRITE_TYPE, TICK_TYPE, PUBLISH_TYPE, RECORD_MISSED_TYPE, _RIG_TYPE, _GOVERNOR_TYPE, _LOOP_STATE_TYPE
+)
 
 
 @njit_inline
@@ -170,8 +177,8 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any, ticks: int
     ) -> int:
-        """Run at most `ticks` ticks without waiting, fewer if the force is permanently off before or a tick fails.
-        Returns `RUNNING`, `FINISHED`, or the driver's error code."""
+        """Run at most `ticks` ticks without waiting, fewer if the force is permanently off before, a tick fails or the
+        rig is gone. Returns `RUNNING`, `FINISHED`, or the driver's error code."""
         _ = sources_fingerprint
         return_code = RUNNING
         for _tick_number in range(ticks):
@@ -184,8 +191,9 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     def attend(  # noqa: PLR0913 - as above
         sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
     ) -> int:
-        """Run ticks as they become due, until the force is permanently off, a tick fails, or the thread is needed for
-        other work. To be called only where the address at `study.devices.native.SLEEP` is not 0.
+        """Run ticks as they become due, until the force is permanently off, a tick fails or is too late, or the thread
+        is needed for other work. Returns the return code of the last turn, `RUNNING` if there was none. To be called
+        only where the address at `study.devices.native.SLEEP` is not 0.
 
         After an error code (above zero) the caller has to count the lateness of that tick.
         """

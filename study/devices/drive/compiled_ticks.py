@@ -9,13 +9,13 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.drive.compiled_drive import (
-    PUBLISH,
+    PUBLISH_TYPE,
     READING_COUNT,
     READING_ROWS,
-    RECORD_MISSED,
-    SENSE,
-    TICK,
-    WRITE,
+    RECORD_MISSED_TYPE,
+    SENSE_TYPE,
+    TICK_TYPE,
+    WRITE_TYPE,
     attend,
     run_due,
 )
@@ -32,9 +32,9 @@ def get_compiled_io(rig: Rig) -> CompiledIo | None:
     return compiled_io if isinstance(compiled_io, CompiledIo) else None
 
 
-GOVERNOR_POINTERS = FunctionPointer(govern.tick, TICK), FunctionPointer(govern.publish, PUBLISH)
+GOVERNOR_POINTERS = FunctionPointer(govern.tick, TICK_TYPE), FunctionPointer(govern.publish, PUBLISH_TYPE)
 """Function pointers of the governor's parts of a tick, which are the same for every rig; looked up once."""
-RECORD_MISSED_POINTER = FunctionPointer(govern.record_missed_ticks, RECORD_MISSED)
+RECORD_MISSED_POINTER = FunctionPointer(govern.record_missed_ticks, RECORD_MISSED_TYPE)
 """Function pointer of the governor's function that records missed ticks."""
 
 
@@ -47,8 +47,8 @@ class CompiledTicks:
         self._compiled_io = compiled_io
         self._governor = governor
         self._pointers = (
-            FunctionPointer(compiled_io.sense, SENSE),
-            FunctionPointer(compiled_io.write, WRITE),
+            FunctionPointer(compiled_io.sense, SENSE_TYPE),
+            FunctionPointer(compiled_io.write, WRITE_TYPE),
             *GOVERNOR_POINTERS,
         )
         self._rig_arrays = compiled_io.calls, compiled_io.cells, compiled_io.samples

@@ -27,13 +27,13 @@ def make_stimulus_recording(
     ring, the content of the ring. The recording is None where fewer rows were recorded. own_clock_sensor: an
     accelerometer with its own clock, if any."""
     rows, loop = governor.copy_rows(), governor.steady
-    loop_rows = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
-    recorded_rows = len(rows) // loop_rows * loop_rows
-    rows, health = _insert_acceleration(rows[len(rows) - recorded_rows :], governor, info, own_clock_sensor)
-    if not recorded_rows:
+    loop_row_count = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
+    kept_row_count = len(rows) // loop_row_count * loop_row_count
+    rows, health = _insert_acceleration(rows[len(rows) - kept_row_count :], governor, info, own_clock_sensor)
+    if not kept_row_count:
         return PlaybackResult(recording=None, health=health)
     amplitude_n = float(np.linalg.norm(loop, axis=1).max())
-    segment = Segment(start=0, stop=recorded_rows, kind="sine", amplitude=amplitude_n, period=len(loop))
+    segment = Segment(start=0, stop=kept_row_count, kind="sine", amplitude=amplitude_n, period=len(loop))
     return _make_result(rows, health, info, (segment,))
 
 

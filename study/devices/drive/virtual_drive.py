@@ -21,7 +21,7 @@ class VirtualDrive:
         self._started_s = 0.0
         self._completed_ticks = 0
         self._closed = False
-        clock.listen(self._run_due_ticks)
+        clock.add_listener(self._run_due_ticks)
 
     def start(self, begin_stimulus: Callable[[], None]) -> bool:
         """Call `begin_stimulus`, which prepares the governor; from then on ticks fall due. Returns False, without
@@ -50,7 +50,7 @@ class VirtualDrive:
         """Run no more ticks when the clock advances."""
         if not self._closed:
             self._closed = True
-            self._clock.forget(self._run_due_ticks)
+            self._clock.remove_listener(self._run_due_ticks)
 
     def _run_due_ticks(self, now_s: float) -> None:
         """Run the ticks that have become due by now_s (s)."""
@@ -62,5 +62,5 @@ class VirtualDrive:
 
 def count_due_ticks(elapsed_s: float, rate_hz: float) -> int:
     """Count the ticks that are due elapsed_s (s) after the start. rate_hz: ticks per second. A time less than 1e-6 of a
-    tick before a tick counts as that tick, because of rounding."""
+    tick before a tick counts as that tick, because of rounding (as `compiled_drive.TICK_TOLERANCE`)."""
     return int(elapsed_s * rate_hz + 1e-6)

@@ -26,9 +26,11 @@ class Acceptance:
     """Content of acceptance.json: the accepted device, operator and date, and what was measured."""
 
     device: str
+    """Name of the device (`DeviceInfo.name`)."""
     details: str
     """Serial number, firmware and SDK. A change of any of them voids the acceptance."""
     operator: str
+    """Name of the operator who accepted it."""
     accepted_on: str
     """ISO 8601 date."""
     force_n: float

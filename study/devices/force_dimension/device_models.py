@@ -1,7 +1,8 @@
 """Device models of Force Dimension that can be opened (omega.3 to sigma.7), with their constants.
 
-Used by the driver of this folder, and by `study.devices.opening` and `rigs_by_name`, which look a model up by the name
-in `--device`. Imports no large package, because the command line reads the names at every start.
+Used by the driver of this folder, by `study.devices.opening` and `rigs_by_name`, which look a model up by the name in
+`--device`, and by `study.devices.replay.replay_rig`. Imports no large package, because the command line reads the names
+at every start.
 """
 
 from dataclasses import dataclass

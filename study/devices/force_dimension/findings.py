@@ -13,7 +13,7 @@ from study.devices.drive.real_time_class import check_real_time_rights
 from study.devices.force_dimension.connect import CALIBRATION_ADVICE, load_library, make_ready, open_model
 from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import Handle
-from study.devices.force_dimension.lab import LabSettings, locate_lab_file, read_lab
+from study.devices.force_dimension.lab import LabSettings, locate_lab_file, read_lab_settings
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.open_rig import read_info
 from study.devices.force_dimension.usb import PERMISSION_ADVICE, find_usb_devices
@@ -47,7 +47,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
     rights are made in any case, that of the accelerometer where the lab file can be read. name: a key of `MODELS`.
     A `DeviceError` becomes a finding; the device is disconnected and braked afterwards."""
     try:
-        lab = read_lab()
+        lab = read_lab_settings()
     except DeviceError as error:
         return (_make_failed_finding("Driver", error), *_check_usb(), check_real_time_rights())
     try:

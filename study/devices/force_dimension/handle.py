@@ -1,4 +1,5 @@
-"""An opened device: the vendor library's functions for its number, with values in place of pointers.
+"""An opened device (a software handle, not the grip in the hand): the vendor library's functions for its number, with
+values in place of pointers.
 
 Opened by `connect.open_model`. `rig` uses it outside the compiled ticks; the constants are also those of `tick_io` and
 `loop_cells`. The functions are those of Force Dimension's DHD (SDK 3.17.5).
@@ -109,7 +110,7 @@ class Handle:
         return self._read_vector("dhdGetForce")
 
     def _read_vector(self, function_name: str) -> tuple[float, float, float]:
-        """Call a function of the library that writes three numbers x, y and z. function: its name."""
+        """Call a function of the library that writes three numbers x, y and z."""
         x, y, z = c_double(), c_double(), c_double()
         self.library.call(function_name, byref(x), byref(y), byref(z), self.number)
         return x.value, y.value, z.value

@@ -82,7 +82,7 @@ def locate_lab_file() -> Path:
     return Path(environment_path) if environment_path else Path.home() / ".config" / "hapteq" / "device.toml"
 
 
-def read_lab() -> LabSettings:
+def read_lab_settings() -> LabSettings:
     """Read the laboratory's settings; all are None where the file does not exist. Raises `DeviceError` for a file that
     cannot be read or is not valid."""
     path = locate_lab_file()
@@ -107,7 +107,7 @@ def write_sensor_table(sensor_table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
     previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written, or the new
     content is not valid."""
-    read_lab()
+    read_lab_settings()
     path = locate_lab_file()
     try:
         previous_text = path.read_text("utf-8") if path.exists() else ""

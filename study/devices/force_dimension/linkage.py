@@ -19,7 +19,7 @@ from study.devices.device import DeviceInfo
 from study.devices.force_dimension.connect import CALIBRATION_ADVICE, load_library, make_device_error, open_model
 from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import Handle
-from study.devices.force_dimension.lab import read_lab
+from study.devices.force_dimension.lab import read_lab_settings
 from study.devices.force_dimension.library import GEOMETRY_ERROR, LibraryError
 from study.devices.force_dimension.open_rig import read_info
 from study.errors import DeviceError
@@ -109,15 +109,15 @@ class VendorLinkage:
         self._library.call("dhdDeltaPositionToEncoder", x, y, z, *map(byref, encoder_counts), self._number)
         return encoder_counts
 
-    def _compute_joint_angles(self, counts: list[c_int]) -> FloatArray:
+    def _compute_joint_angles(self, encoder_counts: list[c_int]) -> FloatArray:
         """Compute the joint angles (3,), rad, of encoder counts."""
-        return self._read_position("dhdDeltaEncodersToJointAngles", *counts)
+        return self._convert_encoder_counts("dhdDeltaEncodersToJointAngles", *encoder_counts)
 
     def _read_linkage(self, position_m: FloatArray) -> LinkageReading | None:
         """Compute the reading at a position (3,), m; None where the position of its encoder counts differs by more than
         `REACH_TOLERANCE_M`. The holding force is NaN where the Jacobian is not finite."""
         encoder_counts = self._compute_encoder_counts(position_m)
-        encoder_position_m = self._read_position("dhdDeltaEncoderToPosition", *encoder_counts)
+        encoder_position_m = self._convert_encoder_counts("dhdDeltaEncoderToPosition", *encoder_counts)
         if not float(np.linalg.norm(encoder_position_m - position_m)) <= REACH_TOLERANCE_M:
             return None
         base_angles = self._compute_joint_angles(encoder_counts)
@@ -143,11 +143,11 @@ class VendorLinkage:
             np.array(position_m), base_angles, jacobian, np.array(inertia_values).reshape(6, 6)[:3, :3], gravity_force_n
         )
 
-    def _read_position(self, function_name: str, *counts: c_int) -> FloatArray:
-        """Call a function of the library that computes three numbers from three encoder counts: a position (m) or joint
-        angles (rad). name: that of the function."""
+    def _convert_encoder_counts(self, function_name: str, *encoder_counts: c_int) -> FloatArray:
+        """Convert three encoder counts by the library's function `function_name`, which computes three numbers: a
+        position (m) or joint angles (rad). Returns them, (3,)."""
         values = [c_double() for _ in range(3)]
-        self._library.call(function_name, *counts, *map(byref, values), self._number)
+        self._library.call(function_name, *encoder_counts, *map(byref, values), self._number)
         return np.array([value.value for value in values])
 
 
@@ -158,7 +158,7 @@ def open_vendor_linkage(name: str) -> Iterator[VendorLinkage]:
     model, library = MODELS[name], load_library()
     handle = open_model(library, model)
     try:
-        info = read_info(handle, library, model, read_lab().effective_mass_kg)
+        info = read_info(handle, library, model, read_lab_settings().effective_mass_kg)
         library.call("dhdEnableExpertMode")
         if not handle.read_status().calibrated:
             raise DeviceError(

@@ -19,7 +19,7 @@ WINDOWS_FOLDERS = (("LOCALAPPDATA", "Force Dimension"), ("ProgramFiles", "Force 
 
 @dataclass(frozen=True, slots=True)
 class Computer:
-    """Facts about a computer that determine where the vendor's library is searched."""
+    """Properties of a computer that determine in which folders the vendor's library is searched."""
 
     system: str
     """As sys.platform: linux, darwin, win32."""
@@ -48,8 +48,8 @@ def list_library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
     """List pairs (folder, file pattern) in order of preference. Folders of environment variables come first, because
     the user chose them."""
     for folder in _list_folders(computer):
-        for library in ("drd", "dhd"):
-            yield folder, _make_file_pattern(library, computer)
+        for library_name in ("drd", "dhd"):
+            yield folder, _make_file_pattern(library_name, computer)
 
 
 def _list_folders(computer: Computer) -> Iterator[Path]:
@@ -72,11 +72,11 @@ def _list_folders(computer: Computer) -> Iterator[Path]:
     yield Path("/usr/local/lib")
 
 
-def _make_file_pattern(library: str, computer: Computer) -> str:
-    """Make the glob pattern of a library's file names. library: drd or dhd."""
+def _make_file_pattern(library_name: str, computer: Computer) -> str:
+    """Make the glob pattern of a library's file names. library_name: drd or dhd."""
     if computer.system == "win32":
-        return f"{library}64.dll"
-    return f"lib{library}*.dylib" if computer.system == "darwin" else f"lib{library}.so*"
+        return f"{library_name}64.dll"
+    return f"lib{library_name}*.dylib" if computer.system == "darwin" else f"lib{library_name}.so*"
 
 
 def _find_newest(folder: Path, pattern: str) -> Path | None:

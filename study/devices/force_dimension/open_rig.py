@@ -16,7 +16,7 @@ from study.devices.force_dimension.acceptance import check_accepted
 from study.devices.force_dimension.connect import load_library, make_device_error, make_ready, open_model
 from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import UNKNOWN_SERIAL, Handle
-from study.devices.force_dimension.lab import LabSettings, read_lab
+from study.devices.force_dimension.lab import LabSettings, read_lab_settings
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.watchdog_check import check_watchdog
@@ -30,7 +30,7 @@ def open_force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimens
     """Open a device of the vendor by the name of its model (`MODELS`), with watchdog and gravity compensation, and its
     accelerometer where one is configured and `settings.with_sensor` is true. Raises `DeviceError` with the reason;
     device and accelerometer are then stopped and closed."""
-    model, lab = MODELS[name], read_lab()
+    model, lab = MODELS[name], read_lab_settings()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
     try:

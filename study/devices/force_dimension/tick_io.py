@@ -76,7 +76,7 @@ MAX_SCALED_FORCES, SCALED_SHARE = 5, 0.02
 recorded force. The share detects a force of which only the peaks are reduced, for some milliseconds in each period."""
 
 ROUNDING_FACTOR = 1 + 1e-9
-"""Factor on the cap that allows for rounding."""
+"""Factor on the cap that allows for rounding, as in `study.devices.admission`."""
 REPEAT_ZERO_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, types.float64, VECTOR_TYPE)
 """Signature of the compiled function that repeats the zero force between stimuli."""
 LOCK_S = 0.002
@@ -149,10 +149,10 @@ def _reenable_forces(calls: Addresses, cells: FloatArray) -> int:
         return code
     if cells[CLOSED] != 0.0:
         return record_failure(cells, DEVICE_CLOSED)
-    number = np.int32(cells[DEVICE_NUMBER])
-    if not is_success(call_int(calls[BRAKES], (np.int32(0), number))):
+    device_number = np.int32(cells[DEVICE_NUMBER])
+    if not is_success(call_int(calls[BRAKES], (np.int32(0), device_number))):
         return record_library_failure(cells, BRAKES)
-    if cells[CLOSED] == 0.0 and not is_success(call_int(calls[ENABLE], (np.int32(1), number))):
+    if cells[CLOSED] == 0.0 and not is_success(call_int(calls[ENABLE], (np.int32(1), device_number))):
         return record_library_failure(cells, ENABLE)
     if cells[CLOSED] != 0.0:  # the call hung while the device was closed: undo it
         _brake(calls, cells)
@@ -163,9 +163,9 @@ def _reenable_forces(calls: Addresses, cells: FloatArray) -> int:
 @njit_inline
 def _brake(calls: Addresses, cells: FloatArray) -> None:
     """Switch forces off and brakes on; the answers of the library are ignored."""
-    number = np.int32(cells[DEVICE_NUMBER])
-    call_int(calls[ENABLE], (np.int32(0), number))
-    call_int(calls[BRAKES], (np.int32(1), number))
+    device_number = np.int32(cells[DEVICE_NUMBER])
+    call_int(calls[ENABLE], (np.int32(0), device_number))
+    call_int(calls[BRAKES], (np.int32(1), device_number))
 
 
 @njit_inline
@@ -229,13 +229,13 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     Nothing is written before the time WITHHELD_UNTIL_S."""
     if read_clock_s(calls) < cells[WITHHELD_UNTIL_S]:
         return 0
-    norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    if norm == 0.0:
+    norm_n = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    if norm_n == 0.0:
         return _write_zero(calls, cells)
-    if not norm <= cells[CAP_N] * ROUNDING_FACTOR:
+    if not norm_n <= cells[CAP_N] * ROUNDING_FACTOR:
         code = _write_zero(calls, cells)
         if cells[FAILED] == 0.0:
-            cells[REFUSED_N] = norm
+            cells[REFUSED_N] = norm_n
         return code if code != 0 else record_failure(cells, FORCE_REFUSED)
     if cells[FAILED] != 0.0:
         return FAILED_BEFORE
@@ -265,7 +265,7 @@ def _repeat_zero(calls: Addresses, cells: FloatArray, interval_s: float, force: 
 
 
 def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any, Any]:
-    """Compile the entry points. sources: fingerprint, captured so that a change invalidates the cache."""
+    """Compile the entry points. sources_fingerprint: captured so that a change invalidates numba's cache."""
 
     @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
@@ -296,4 +296,4 @@ sense_once, write_once, repeat_zero_once = _compile_entry_points(
     )
 )
 """`sense_once` and `write_once` as defined in `study.devices.rig.CompiledIo`; `repeat_zero_once(calls, cells,
-interval_s, zero)` repeats the zero force where the last force was a zero, interval_s (s) or longer ago."""
+interval_s, force)` repeats the zero force where the last force was a zero, interval_s (s) or longer ago."""

@@ -24,29 +24,29 @@ too early."""
 
 
 def check_watchdog(
-    handle: Handle, drops_after_s: float, now_s: Callable[[], float], sleep: Callable[[float], None]
+    handle: Handle, watchdog_timeout_s: float, now_s: Callable[[], float], sleep: Callable[[float], None]
 ) -> float:
     """Pause the commands, and wait until the device reports its force as off; then enable it again. Returns the time
     (s) from the last command to this report.
 
-    drops_after_s: timeout of the watchdog (s), 0 without one; now_s and sleep: clock. Raises `DeviceError` where there
-    is no watchdog, or the force stays on, goes off for another cause or without the brakes, and `LibraryError`.
+    watchdog_timeout_s: timeout of the watchdog (s), 0 without one; now_s and sleep: clock. Raises `DeviceError` where
+    there is no watchdog, or the force stays on, goes off for another cause or without the brakes, and `LibraryError`.
     """
-    if drops_after_s <= 0:
+    if watchdog_timeout_s <= 0:
         raise _make_watchdog_error("It has no watchdog, or none that can be set.")
     if not any(_send_zeros(handle, now_s, sleep) for _ in range(MAX_ATTEMPTS)):
         raise _make_watchdog_error(f"It does not continue to accept forces: {handle.read_status().off_reason}.")
     last_command_s = now_s()
     while (status := handle.read_status()).force_on:
-        if now_s() - last_command_s > drops_after_s + MARGIN_S and handle.read_status().force_on:
+        if now_s() - last_command_s > watchdog_timeout_s + MARGIN_S and handle.read_status().force_on:
             raise _make_watchdog_error(
                 f"{1000 * (now_s() - last_command_s):.0f} ms after the last command it still accepts forces."
             )
         sleep(POLL_INTERVAL_S)
-    release_s = now_s() - last_command_s
-    _check_reason(status)
+    release_delay_s = now_s() - last_command_s
+    _check_release_cause(status)
     handle.enable_force()
-    return release_s
+    return release_delay_s
 
 
 def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[float], None]) -> bool:
@@ -60,7 +60,7 @@ def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[flo
     return handle.read_status().force_on
 
 
-def _check_reason(status: Status) -> None:
+def _check_release_cause(status: Status) -> None:
     """Require the watchdog as the cause, and the brakes on. Raises `DeviceError`."""
     if status.off_cause != WATCHDOG_CAUSE:
         raise _make_watchdog_error(f"It let go for another reason: {status.off_reason}.")

@@ -266,7 +266,7 @@ def _compile_tick(sources_fingerprint: int) -> tuple[Any, Any]:
     return tick, record_missed_ticks
 
 
-_SOURCES = compute_fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
+_SOURCES_FINGERPRINT = compute_fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 """Fingerprint of all files whose code is compiled into the entry points."""
-tick, record_missed_ticks = _compile_tick(_SOURCES)
-publish = _compile_publish(_SOURCES)
+tick, record_missed_ticks = _compile_tick(_SOURCES_FINGERPRINT)
+publish = _compile_publish(_SOURCES_FINGERPRINT)

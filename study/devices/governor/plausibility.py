@@ -177,7 +177,7 @@ def _update_expected_axis_motion(state: FloatArray, settings: FloatArray, i: int
 @njit_inline
 def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading of a single axis is stale: unchanged although its component of the force must have moved
-    it."""
+    it. Updates the expected motion, the reference and the count of unchanged ticks of every axis."""
     is_stale, stretch_ticks, half_resolution = (
         False,
         AXIS_STRETCH_RATIO * settings[STALE_TICKS],
@@ -201,8 +201,8 @@ def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray)
 
 @njit_inline
 def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: float) -> bool:
-    """Whether the low-passed acceleration of the readings exceeds its bound. x, y, z: the latest step, in m per
-    tick."""
+    """Whether the low-passed acceleration of the readings exceeds its bound. Updates it and the last step.
+    x, y, z: the latest step, in m per tick."""
     last_x = state[LAST_STEP]
     if not math.isnan(last_x):  # NaN before the second reading
         step_change_m = compute_norm(x - last_x, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
@@ -219,7 +219,7 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
 def find_reading_fault(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
     """Find the fault of a reading: its code, for which the force must be released, or NO_FAULT. reading: its first
     three numbers are the position, m. `state` holds the last position (LAST_POSITION; NaN before the first reading) and
-    the ticks since then (ELAPSED_TICKS)."""
+    the ticks since then (ELAPSED_TICKS). Updates the cells of this module in `state`."""
     if not is_bounded(reading, MAX_COMPONENT_M):
         return NOT_A_NUMBER
     if not compute_norm(reading[0], reading[1], reading[2]) <= settings[WORKSPACE_RADIUS]:

@@ -131,14 +131,13 @@ class RemoteDevice:
 
     def release(self) -> PlaybackResult:
         """Release the stimulus and return what was played. Where the process is lost: no recording, and the counters
-        that it reported last. May be called again after an interruption."""
+        that it reported last. After an interruption, a further call gets the answer of the same release."""
         if self._loss_reason or self._closed:
             if self._held_stimulus is None:
                 self._require_connected()
             self._held_stimulus = None
             return PlaybackResult(recording=None, health=self._make_health_when_lost())
         fade_out_s = self._held_stimulus.fade_out_s if self._held_stimulus is not None else 0.0
-        # A caller that was interrupted while it waited gets the answer of the same release.
         self._release_call = self._release_call or self._process.work.queue_call("release")
         try:
             result: PlaybackResult = self._release_call.wait_for_answer(fade_out_s + self._get_timeout_s(self._keep_s))
@@ -172,6 +171,7 @@ class RemoteDevice:
         return result
 
     def look(self) -> Look:
+        """Snapshot of the device; without a position or an acceleration where the process is lost."""
         with contextlib.suppress(DeviceError):
             look: Look = self._call_remote(self._process.look, "look")
             return look
@@ -224,12 +224,11 @@ class RemoteDevice:
                 continue
 
     def _get_timeout_s(self, recorded_s: float) -> float:
-        """Compute the timeout (s) of a call that returns a recording of this length (s; 0: none) after a fade."""
+        """Return the timeout (s) of a call that returns a recording of this length (s; 0: none) after a fade."""
         return self._fade_s + ANSWER_TIMEOUT_S + SENT_S_PER_RECORDED_S * recorded_s
 
     def _call_remote(self, pipe: CallPipe, name: str, *arguments: Any, timeout_s: float | None = None) -> Any:
-        """Call a method in the process. Raises `DeviceError` for a lost or closed device, and what the method
-        raised."""
+        """Call a method in the process; raises `DeviceError` for a lost or closed device, else what that raised."""
         self._require_connected()
         try:
             return pipe.queue_call(name, *arguments).wait_for_answer(
@@ -296,5 +295,6 @@ class RemoteDevice:
         return Fault.STOPPED if self._stopped else Fault.LOST
 
     def _make_health_when_lost(self) -> Health:
+        """Make the counters reported last, with the fault and the reason of the loss."""
         reason = f"the process of its loop is gone: {self._loss_reason}" if self._loss_reason else self._health.why
         return replace(self._health, fault=self._find_fault_when_lost(), why=reason)

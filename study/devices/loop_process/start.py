@@ -20,8 +20,8 @@ KILL_TIMEOUT_S = 2.0
 
 
 class LoopProcess:
-    """The process of the device loop, with a `CallPipe` for each of `PIPE_NAMES`. The constructor starts it, and raises
-    `DeviceError` where the system refuses.
+    """The process of the device loop, with a `CallPipe` for each group of methods, named as in `PIPE_NAMES`. The
+    constructor starts it, and raises `DeviceError` where the system refuses.
 
     It has a separate session, so that the terminal's Ctrl-C and Ctrl-Z do not reach it. Its pipes are closed when this
     process ends for any reason. It inherits this process's stderr, for warnings after its pipes are closed.

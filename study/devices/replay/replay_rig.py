@@ -38,15 +38,16 @@ AX, TRUE_AX = ACCELERATION.start, TRUE_ACCELERATION.start
 """Indices in a reading of the x components of measured and true acceleration."""
 
 _VECTOR = types.float64[::1]
-_NOISE = types.uint64[::1]
+_RANDOM_STATE = types.uint64[::1]
 """numba's types of the arguments: vectors of floats, and the state of the random generator."""
 
 
 def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     """Compile `sense` and `advance`. sources_fingerprint: captured so that a change of a source invalidates numba's
-    cache."""
+    cache. Arguments of both: state, with the indices above; parameters, the recorded readings row by row, and last the
+    half width of the noise (m/s²)."""
 
-    @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
+    @njit(types.void(_VECTOR, _VECTOR, _RANDOM_STATE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
         """Fill the reading of the tick in `state`. noise: (1,), 0 during ticks; else the state of the random generator,
         for readings while nothing is played, with the handle at rest and noise in the acceleration."""
@@ -100,18 +101,16 @@ def make_replay_rig(path: Path) -> CompiledRig:
     rate_hz, state = recording.sample_rate_hz, np.zeros(CROSSFADE + 1)
     state[LENGTH] = len(readings)
 
-    def prepare(rows: FloatArray, repeats: bool, wait: int) -> None:
+    def prepare(rows: FloatArray, repeats: bool, wait_ticks: int) -> None:
         """Choose the stretch of the recording for the commands rows (n, 3), N; see `CompiledRig.prepare`."""
         min_rows = round(MIN_REPEATED_S * rate_hz)
         commands = np.tile(rows, (max(1, min_rows // len(rows)), 1)) if repeats else rows
         stretch_rows = min(len(commands), len(readings))
-        crossfade_rows = (
-            min(round(CROSSFADE_S * rate_hz), stretch_rows - 1, len(readings) - stretch_rows) if repeats else 0
-        )
+        fade_rows = min(round(CROSSFADE_S * rate_hz), stretch_rows - 1, len(readings) - stretch_rows) if repeats else 0
         # The cross-fade needs the rows before the stretch, where the end of the loop must have been played, too.
-        preceding = commands[:stretch_rows][stretch_rows - crossfade_rows :]
-        first_row = crossfade_rows + _find_stretch(excitation, np.concatenate([preceding, commands[:stretch_rows]]))
-        state[[TICK, FIRST_ROW, LENGTH, REPEATS, CROSSFADE]] = -wait, first_row, stretch_rows, repeats, crossfade_rows
+        lead_in = commands[:stretch_rows][stretch_rows - fade_rows :]
+        first_row = fade_rows + _find_stretch(excitation, np.concatenate([lead_in, commands[:stretch_rows]]))
+        state[[TICK, FIRST_ROW, LENGTH, REPEATS, CROSSFADE]] = -wait_ticks, first_row, stretch_rows, repeats, fade_rows
 
     return CompiledRig(
         info=DeviceInfo(
@@ -139,8 +138,8 @@ def _find_stretch(excitation: FloatArray, pattern: FloatArray) -> int:
     fft_length = len(excitation) + len(pattern)
     spectrum = np.fft.rfft(excitation, fft_length, axis=0) * np.fft.rfft(pattern, fft_length, axis=0).conj()
     correlation = np.fft.irfft(spectrum, fft_length, axis=0).sum(axis=1)[:candidate_count]
-    energy = np.concatenate([[0.0], np.cumsum((excitation**2).sum(axis=1))])
-    return int(np.argmin(energy[len(pattern) :] - energy[:candidate_count] - 2 * correlation))
+    cumulative_energy = np.concatenate([[0.0], np.cumsum((excitation**2).sum(axis=1))])
+    return int(np.argmin(cumulative_energy[len(pattern) :] - cumulative_energy[:candidate_count] - 2 * correlation))
 
 
 def _collect_readings(recording: Recording, path: Path) -> FloatArray:

@@ -34,11 +34,11 @@ def fill_mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass_matrix: 
             mass_matrix[row, 3 + mode] = coupling_mass
             mass_matrix[3 + mode, row] = coupling_mass
     for mode in range(MOUNT_MODES):
-        for second_mode in range(MOUNT_MODES):
+        for column_mode in range(MOUNT_MODES):
             coupling_mass = 0.0
             for axis in range(3):
-                coupling_mass += directions[mode, axis] * mass_matrix[axis, 3 + second_mode]
-            mass_matrix[3 + mode, 3 + second_mode] = coupling_mass
+                coupling_mass += directions[mode, axis] * mass_matrix[axis, 3 + column_mode]
+            mass_matrix[3 + mode, 3 + column_mode] = coupling_mass
         mass_matrix[3 + mode, 3 + mode] += parameters[MOUNT_MASS + mode]
 
 

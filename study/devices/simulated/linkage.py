@@ -11,7 +11,8 @@ satisfies
 
 The inverse solves this for q, leg by leg; the forward solution is the intersection of the three spheres of radius
 `forearm` about the elbows. All lengths in m, angles in rad. Source: R. Clavel, "Conception d'un robot parallèle rapide
-à 4 degrés de liberté", thesis 925, EPFL 1991. Compiled into `compiled` (inverse), `dynamics` and `sensors` (forward).
+à 4 degrés de liberté", thesis 925, EPFL 1991. Compiled into `compiled` and `dynamics` (inverse), and `sensors`
+(forward).
 """
 
 import math

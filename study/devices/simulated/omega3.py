@@ -43,12 +43,18 @@ def build_omega3(
     if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
         raise ValueError(f"place_m must be within {parameters.stops.radius_m} m of the centre, not {place_m}")
     packed_parameters = pack_parameters(parameters, hand, place_m)
-    without_hand, with_hand = pack_parameters(parameters, False, place_m), packed_parameters.copy()
+    parameters_without_hand, parameters_with_hand = (
+        pack_parameters(parameters, False, place_m),
+        packed_parameters.copy(),
+    )
 
     def simulate_hand(on_handle: bool) -> None:
-        """Set only the parameters that the hand changes; others, which a test may have altered, are kept."""
-        differs_with_hand = without_hand != with_hand
-        packed_parameters[differs_with_hand] = (with_hand if on_handle and hand else without_hand)[differs_with_hand]
+        """Put the simulated hand on the handle or take it off; no effect in a device without a hand. Only the
+        parameters that the hand changes are set: others, which a test may have altered, are kept."""
+        differs_with_hand = parameters_without_hand != parameters_with_hand
+        packed_parameters[differs_with_hand] = (
+            parameters_with_hand if on_handle and hand else parameters_without_hand
+        )[differs_with_hand]
 
     details = f"{parameter_source}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}"
     mass_kg = compute_effective_mass_kg(parameters, packed_parameters)

@@ -30,7 +30,7 @@ _STATE_INCREMENT = np.uint64(0x9E3779B97F4A7C15)
 """Increment of the state in SplitMix64; below, the factors and shifts of its output function (the cited paper)."""
 _FIRST_FACTOR = np.uint64(0xBF58476D1CE4E5B9)
 _SECOND_FACTOR = np.uint64(0x94D049BB133111EB)
-_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+_SHIFT_30, _SHIFT_27, _SHIFT_31, _SHIFT_11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _UNIFORM_SPACING = 2.0**-53
 """Spacing of the uniform numbers: 53 random bits."""
 
@@ -40,10 +40,10 @@ def draw_uniform(noise: npt.NDArray[np.uint64]) -> Any:
     """Draw a uniform number in (0, 1]. Advances noise[0], the state of the generator."""
     noise[0] += _STATE_INCREMENT
     output_bits = noise[0]
-    output_bits = (output_bits ^ (output_bits >> _S30)) * _FIRST_FACTOR
-    output_bits = (output_bits ^ (output_bits >> _S27)) * _SECOND_FACTOR
-    output_bits = output_bits ^ (output_bits >> _S31)
-    return (np.float64(output_bits >> _S11) + 1.0) * _UNIFORM_SPACING
+    output_bits = (output_bits ^ (output_bits >> _SHIFT_30)) * _FIRST_FACTOR
+    output_bits = (output_bits ^ (output_bits >> _SHIFT_27)) * _SECOND_FACTOR
+    output_bits = output_bits ^ (output_bits >> _SHIFT_31)
+    return (np.float64(output_bits >> _SHIFT_11) + 1.0) * _UNIFORM_SPACING
 
 
 @inlined

@@ -94,9 +94,9 @@ class DiagnosisProcess:
 def _send_case_name(process: "subprocess.Popen[str]", case_name: str) -> bool:
     """Send a case name and wait until the process repeats it, when its answer is written. Kills the process after
     `CASE_TIMEOUT_S`, which ends the wait. Returns whether the name came back."""
-    timeout = threading.Timer(CASE_TIMEOUT_S, process.kill)
-    timeout.daemon = True
-    timeout.start()
+    kill_timer = threading.Timer(CASE_TIMEOUT_S, process.kill)
+    kill_timer.daemon = True
+    kill_timer.start()
     try:
         if process.stdin is None or process.stdout is None:
             return False
@@ -106,7 +106,7 @@ def _send_case_name(process: "subprocess.Popen[str]", case_name: str) -> bool:
     except OSError:
         return False
     finally:
-        timeout.cancel()
+        kill_timer.cancel()
 
 
 Workers = int | Executor

@@ -53,28 +53,29 @@ def run_controls(
 
 
 def _prepare_control(folder: ProofFolder, seed: int, control: Control, settings: CaseSettings) -> tuple[str, ...]:
-    """Write the inputs of one control if missing and return their case names; the settings file is written last."""
+    """Write the inputs of one control if missing and return their case names; the file with the names is written
+    last, so that the inputs are drawn again after an interruption."""
     names_path = folder.path / f"{control.name.replace(' ', '-')}.json"
-    prefix = f"{CONTROLS.index(control):02d}"
-    if (written_names := _read_case_names(names_path, prefix)) is not None:
+    name_prefix = f"{CONTROLS.index(control):02d}"
+    if (written_names := _read_case_names(names_path, name_prefix)) is not None:
         return written_names
     inputs = control.draw(seed, settings)
-    case_names = tuple(f"{prefix}{number}" for number in range(len(inputs)))
+    case_names = tuple(f"{name_prefix}{number}" for number in range(len(inputs)))
     for name, control_input in zip(case_names, inputs, strict=True):
         _write_input(folder.open / name, control_input)
     write_text(names_path, json.dumps(case_names) + "\n", overwrite=True)
     return case_names
 
 
-def _read_case_names(names_path: Path, prefix: str) -> tuple[str, ...] | None:
-    """Read the case names of a control; None where there are none or they lack `prefix`, as of another version of the
-    program: the inputs are then drawn again."""
+def _read_case_names(names_path: Path, name_prefix: str) -> tuple[str, ...] | None:
+    """Read the case names of a control; None where there are none or they lack `name_prefix`, as of another version of
+    the program: the inputs are then drawn again."""
     try:
         case_names = load_json(read_text(names_path))
     except (StudyError, ValueError):
         return None
     is_complete = isinstance(case_names, list) and case_names == [
-        f"{prefix}{number}" for number in range(len(case_names))
+        f"{name_prefix}{number}" for number in range(len(case_names))
     ]
     return tuple(case_names) if is_complete and case_names else None
 

@@ -74,11 +74,13 @@ def seal_missing_cases(
 ) -> str:
     """Write the cases without a label in worker processes, and seal the bank. case_writers: function that writes a
     case, by its number; on_sealed: called with the number of sealed cases. Returns the seal as `seal_cases`."""
-    missing_writers = [write for number, write in case_writers.items() if not folder.get_label_file(number).exists()]
+    missing_writers = [
+        case_writer for number, case_writer in case_writers.items() if not folder.get_label_file(number).exists()
+    ]
     sealed_count = len(case_writers) - len(missing_writers)
     on_sealed(sealed_count)
     with finish_begun_cases(folder), open_worker_processes(workers if len(missing_writers) > 1 else 1) as pool:
-        for written_case in as_completed([pool.submit(write) for write in missing_writers]):
+        for written_case in as_completed([pool.submit(case_writer) for case_writer in missing_writers]):
             written_case.result()
             sealed_count += 1
             on_sealed(sealed_count)

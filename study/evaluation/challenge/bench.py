@@ -1,5 +1,6 @@
 """Linear part of a simulated device, the bench: a handle with three axes on springs and dampers to the ground, with
-three oscillators (structural modes) attached. Drawn by `draw_case`, integrated by `device`.
+three oscillators (structural modes) attached. Drawn by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`,
+integrated by `device`.
 
 Equation of motion: M d2q/dt2 + C dq/dt + K q = (f, 0), where q holds the positions of the handle and of the
 oscillators' masses along their directions, and f is the force on the handle. All ranges of parameters were chosen.
@@ -72,16 +73,16 @@ def draw_bench(random: np.random.Generator) -> Bench:
     ranges below (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
     mean_mass_kg = random.uniform(0.17, 0.29)
     mass = np.diag(mean_mass_kg * random.uniform(0.92, 1.08, 3)) + _draw_symmetric(random, MAX_MASS_COUPLING_KG)
-    mean_stiffness = random.uniform(90.0, 210.0)
-    stiffness = np.diag(mean_stiffness * random.uniform(0.6, 1.5, 3)) + _draw_symmetric(
-        random, MAX_STIFFNESS_COUPLING_SHARE * mean_stiffness
+    mean_stiffness_n_per_m = random.uniform(90.0, 210.0)
+    stiffness = np.diag(mean_stiffness_n_per_m * random.uniform(0.6, 1.5, 3)) + _draw_symmetric(
+        random, MAX_STIFFNESS_COUPLING_SHARE * mean_stiffness_n_per_m
     )
-    direction = random.normal(size=(3, 3))
+    directions = random.normal(size=(3, 3))
     oscillators = Oscillators(
         random.uniform((9.5, 77.0, 135.0), (13.2, 110.0, 208.0)),
         mean_mass_kg * random.uniform((0.12, 0.08, 0.06), (0.21, 0.18, 0.14)),
         random.uniform((0.06, 0.022, 0.016), (0.135, 0.047, 0.037)),
-        direction / np.linalg.norm(direction, axis=1, keepdims=True),
+        directions / np.linalg.norm(directions, axis=1, keepdims=True),
     )
     return Bench(mass, np.diag(random.uniform(2.6, 6.5, 3)), stiffness, oscillators)
 

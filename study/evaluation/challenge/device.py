@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge import handle_force_kernel as handle
+from study.evaluation.challenge import handle_force_kernel
 from study.evaluation.challenge.actuator_kernel import GAIN, drive_actuators
 from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.drive_plan import RATE_HZ
@@ -26,7 +26,7 @@ STEPS_PER_SAMPLE = 20
 def _make_zero_forces() -> FloatArray:
     """Make the table (3, 11) of handle forces that are all zero, with end stops at infinity."""
     forces = np.zeros((3, 11))
-    forces[:, handle.UPPER_STOP], forces[:, handle.LOWER_STOP] = np.inf, -np.inf
+    forces[:, handle_force_kernel.UPPER_STOP], forces[:, handle_force_kernel.LOWER_STOP] = np.inf, -np.inf
     return forces
 
 
@@ -48,6 +48,7 @@ class Device:
     read them."""
 
     bench: Bench
+    """Linear dynamics: masses, dampers, springs."""
     amplifiers: FloatArray = field(default_factory=_make_ideal_amplifiers)
     """(3, 9), columns in `actuator_kernel`"""
     friction: FloatArray = field(default_factory=lambda: np.zeros((3, 7)))
@@ -76,6 +77,7 @@ class Device:
     """Maps the commands (samples, 3), N, to a new array of them before they reach the amplifiers; None: the
     identity."""
     sensor: Sensor = field(default_factory=Sensor)
+    """Sensor, with its clock and the logger."""
     steps: int = STEPS_PER_SAMPLE
     """Integration steps per sample."""
 

@@ -127,7 +127,7 @@ def _draw_effects(
         return (), ()
     if kind == "pair":
         return _draw_pair(random), tuple(float(value) for value in random.uniform(lowest_strength, 1.0, 2))
-    effect_names = tuple(DECOYS if kind == "outside" else mujoco_access.EFFECTS if bank == "engine" else EFFECTS)
+    effect_names = tuple(DECOYS if kind == "outside" else mujoco_access.MUJOCO_EFFECTS if bank == "engine" else EFFECTS)
     stream_seed = [seed, 3, sorted(LOWEST_STRENGTHS).index(kind), sorted(NUISANCE_SIZES).index(bank)]
     effect_order = np.random.default_rng(stream_seed).permutation(len(effect_names))
     pass_number, order_position = divmod(earlier_cases, len(effect_names))

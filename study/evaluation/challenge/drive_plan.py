@@ -36,6 +36,7 @@ class DrivePlan:
     command: FloatArray
     """(samples, 3), N"""
     segments: tuple[Segment, ...]
+    """In order of time; the rest after a segment belongs to none."""
 
 
 def draw_multisine(random: np.random.Generator, level_n: float, period: int = PERIOD_SAMPLES) -> FloatArray:
@@ -93,12 +94,12 @@ def _place_on_axis(axis: int, wave: FloatArray) -> FloatArray:
     return command
 
 
-def _make_sweep(samples: int) -> FloatArray:
-    """Make a logarithmic sine sweep (samples,), N, with linear fade-in and fade-out."""
-    t, duration_s = np.arange(samples) / RATE_HZ, samples / RATE_HZ
+def _make_sweep(sample_count: int) -> FloatArray:
+    """Make a logarithmic sine sweep (sample_count,), N, with linear fade-in and fade-out."""
+    time_s, duration_s = np.arange(sample_count) / RATE_HZ, sample_count / RATE_HZ
     log_ratio = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
-    cycles = SWEEP_HZ[0] * duration_s / log_ratio * (np.exp(log_ratio * t / duration_s) - 1.0)
-    fade_in = np.minimum(np.arange(samples) / SWEEP_FADE_SAMPLES, 1.0)
+    cycles = SWEEP_HZ[0] * duration_s / log_ratio * (np.exp(log_ratio * time_s / duration_s) - 1.0)
+    fade_in = np.minimum(np.arange(sample_count) / SWEEP_FADE_SAMPLES, 1.0)
     wave: FloatArray = SWEEP_PEAK_N * np.sin(2 * np.pi * cycles) * fade_in * np.append(1.0, fade_in[:0:-1])
     return wave
 

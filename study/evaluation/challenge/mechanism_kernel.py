@@ -1,7 +1,7 @@
 """Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled). Called
-by `study.evaluation.challenge.device`.
+by `study.evaluation.challenge.device`; `laws.build_law`, `laws.draw_law` and `effects.hand` use the types.
 
-    M(q) d2q/dt2 = -C dq/dt - K q + (drive + friction + handle forces + creep + time-varying forces + laws, 0)
+    M(q) d2q/dt2 = -C dq/dt - K q + (drive + friction + handle forces + coupling + creep + modulation + laws, 0)
 
 q: positions of the handle (3) and of the attached oscillators. Optionally, the drive force acts through play
 (backlash): on a motor that touches the handle at either end of a gap.
@@ -64,8 +64,11 @@ class Motion(NamedTuple):
     """Motion of the handle at the samples, (samples, 3) each, SI units."""
 
     acceleration: FloatArray
+    """m/s^2, under the drive force of the previous integration step."""
     position: FloatArray
+    """m."""
     velocity: FloatArray
+    """m/s, extrapolated by half a step to the time of the position."""
     law_force: FloatArray
     """N, force of the laws (`law_kernel`) alone, at the start of the sample."""
 
@@ -88,8 +91,8 @@ def integrate_motion(m: Mechanism, force: FloatArray, steps_per_sample: int, rat
     for step in range(force.shape[0]):
         v_now[:] = v + 0.5 * h * a
         _set_linear_forces(m, q, v_now, f)
-        _add_ground_forces(m, q, v_now, deflection, h, f)
-        _add_slow_forces(m, q, v_now, creep, step * h, f)
+        _add_friction_and_coupling(m, q, v_now, deflection, h, f)
+        _add_creep_and_modulation(m, q, v_now, creep, step * h, f)
         for j in range(3):
             drive[j] = force[step, j]
         if m.laws.shape[0] > 0:
@@ -147,11 +150,11 @@ def _set_linear_forces(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray
 
 
 @njit(cache=True, nogil=True)
-def _add_ground_forces(
+def _add_friction_and_coupling(
     m: Mechanism, q: FloatArray, v: FloatArray, deflection: FloatArray, h: float, f: FloatArray
 ) -> None:
-    """Add friction, `compute_handle_force` and the coupling of x and y to `f`. deflection: deflections of the bristles,
-    updated."""
+    """Add friction, `compute_handle_force` and the coupling of x and y to `f` (n,), N. deflection: deflections of the
+    bristles (3,), m, updated."""
     for j in range(3):
         friction_n, deflection[j] = step_bristle(m.friction[j], q[j], v[j], deflection[j], h)
         f[j] += friction_n + compute_handle_force(m.forces[j], q[j], v[j])
@@ -161,8 +164,11 @@ def _add_ground_forces(
 
 
 @njit(cache=True, nogil=True)
-def _add_slow_forces(m: Mechanism, q: FloatArray, v: FloatArray, creep: FloatArray, t: float, f: FloatArray) -> None:
-    """Add creep and time-varying forces to `f`. creep: relaxed part of the creep springs' deflection, updated; t: s."""
+def _add_creep_and_modulation(
+    m: Mechanism, q: FloatArray, v: FloatArray, creep: FloatArray, t: float, f: FloatArray
+) -> None:
+    """Add creep and modulated damping and stiffness to `f` (n,), N. creep: relaxed part of the creep springs'
+    deflection (3, elements), m, updated; t: time (s)."""
     for j in range(3):
         for element in range(creep.shape[1]):
             if m.creep_stiffness[j, element] != 0.0:
@@ -179,8 +185,8 @@ def _add_slow_forces(m: Mechanism, q: FloatArray, v: FloatArray, creep: FloatArr
 @njit(cache=True, nogil=True)
 def _apply_play(play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float) -> None:
     """Move the motor by one step of h seconds and replace its drive force (N) by the contact force: a spring and a
-    damper where the motor, relative to the handle, is beyond half of the gap. motor: its position and velocity,
-    updated."""
+    damper where the motor, relative to the handle, is beyond half of the gap. motor: its position (m) and velocity
+    (m/s), updated."""
     j = int(play[PLAY_AXIS])
     separation, closing = motor[0] - q[j], motor[1] - v[j]
     penetration = max(separation - 0.5 * play[GAP], 0.0) + min(separation + 0.5 * play[GAP], 0.0)

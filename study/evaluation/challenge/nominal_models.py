@@ -1,10 +1,10 @@
 """Nominal models of the challenge: the model of a device, without the concealed effect, that the diagnosis is given.
 
 Calibrated model: mass, damping and stiffness of the bench without the effect, at each of the driven axes, with
-independent normal errors whose standard deviation is the stated, tight tolerance. Re-tuned model: these parameters are
-fitted by `retune` to the response of the true device at 1.5 N, so that they absorb as much of the concealed effect as
-they can; the stated tolerances are wide. Off-diagonal elements and modes are exact in both. Called by `draw_case`,
-`laws.draw_law` and `second_engine.mujoco_case`.
+independent normal errors whose standard deviation is the stated tolerance (a few per cent). Re-tuned model: these
+parameters are fitted by `retune` to the response of the true device at 1.5 N, so that they absorb as much of the
+concealed effect as they can; the stated tolerances are wide. Off-diagonal elements and modes are exact in both. Called
+by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`.
 """
 
 from dataclasses import replace
@@ -53,7 +53,7 @@ def retune(
     """Fit the diagonals of mass, damping and stiffness at these axes to the response to the multisines at 1.5 N;
     returns the fitted bench and `RETUNED_TOLERANCE`. response: (samples, 3), m/s^2; its residuals are divided by the
     sensor noise. Gauss-Newton with forward differences, at most `MAX_ITERATIONS` steps, until every change is below a
-    twentieth of its difference step; every step is limited by `_limit_shift`."""
+    twentieth of its difference step (chosen); every step is limited by `_limit_shift`."""
     fit_segments = [segment for segment in plan.segments if segment.role == "fit" and segment.amplitude == LEVELS_N[1]]
     commands = [plan.command[segment.start : segment.stop] for segment in fit_segments]
     channels, axes_mask = list(axes), _make_axes_mask(axes)
@@ -66,7 +66,7 @@ def retune(
     shift = np.zeros(9)
 
     def predict_response(trial_shift: FloatArray) -> FloatArray:
-        """Predict the response (samples of the segments, channels), over the noise, with a shift (9,)."""
+        """Predict the response (samples of the segments, channels), divided by the noise, with a shift (9,)."""
         responses = np.vstack(
             [
                 _simulate_linear_response(shift_diagonals(bench, trial_shift), command)[:, channels]
@@ -94,9 +94,12 @@ def retune(
 def shift_diagonals(bench: Bench, changes: FloatArray) -> Bench:
     """Add changes to the diagonals of mass, damping and stiffness at the handle; returns a new bench. changes: (9,), in
     kg, N s/m and N/m, for x, y, z each."""
-    mass, damping, stiffness = (np.diag(values) for values in np.asarray(changes).reshape(3, 3))
+    mass_change, damping_change, stiffness_change = (np.diag(values) for values in np.asarray(changes).reshape(3, 3))
     return replace(
-        bench, mass=bench.mass + mass, damping=bench.damping + damping, stiffness=bench.stiffness + stiffness
+        bench,
+        mass=bench.mass + mass_change,
+        damping=bench.damping + damping_change,
+        stiffness=bench.stiffness + stiffness_change,
     )
 
 

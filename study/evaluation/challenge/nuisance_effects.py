@@ -2,8 +2,8 @@
 
 Each device gets four, drawn from seven; the labels of the cases do not name them. A diagnosis must not report them, nor
 be misled by them. At factor 1 they change the readings by about a tenth of the noise; the factor scales each size. The
-ranges of sizes in the functions below are those at factor 1, drawn uniformly and chosen by hand. Called by `draw_case`
-and `laws.draw_law`.
+sizes in the functions below are those at factor 1, drawn uniformly; their ranges were chosen by hand. Called by
+`draw_case` and `laws.draw_law`.
 """
 
 from collections.abc import Callable
@@ -40,17 +40,18 @@ def add_nuisance_effects(device: Device, factor: float, seed: int) -> Device:
     return device
 
 
-def _with_columns(table: FloatArray, cells: dict[int, FloatArray | float]) -> FloatArray:
-    """Copy a parameter table (3 axes, columns) with some columns replaced. cells: new values by column, (3,) or a
-    number for all axes."""
+def _with_columns(table: FloatArray, column_values: dict[int, FloatArray | float]) -> FloatArray:
+    """Copy a parameter table (3 axes, columns) with some columns replaced. column_values: new values by column, (3,) or
+    a number for all axes."""
     new_table = table.copy()
-    for column, values in cells.items():
+    for column, values in column_values.items():
         new_table[:, column] = values
     return new_table
 
 
 def _add_dry_friction(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Set dry friction of 25 to 100 µN per axis, with a bristle of 3e5 N/m."""
+    """Set dry friction of 25 to 100 µN per axis, the same in both directions, with a bristle of 3e5 N/m (not scaled by
+    factor)."""
     friction_n = factor * random.uniform(0.25e-4, 1e-4, 3)
     return replace(
         device,
@@ -61,14 +62,14 @@ def _add_dry_friction(device: Device, factor: float, random: np.random.Generator
 
 
 def _add_cogging(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Set a cogging force of 50 to 200 µN per axis, with a pitch of 0.7 to 3 mm and any phase (not scaled by
-    factor)."""
-    cells = {
+    """Set a cogging force of 50 to 200 µN per axis, with a pitch of 0.7 to 3 mm and any phase (both not scaled
+    by factor)."""
+    column_values = {
         COGGING_AMPLITUDE: factor * random.uniform(0.5e-4, 2e-4, 3),
         COGGING_PITCH: random.uniform(7e-4, 3e-3, 3),
         COGGING_PHASE: random.uniform(0.0, 2 * np.pi, 3),
     }
-    return replace(device, forces=_with_columns(device.forces, dict(cells)))
+    return replace(device, forces=_with_columns(device.forces, dict(column_values)))
 
 
 def _add_cubic_stiffness(device: Device, factor: float, random: np.random.Generator) -> Device:
@@ -79,7 +80,7 @@ def _add_cubic_stiffness(device: Device, factor: float, random: np.random.Genera
 
 
 def _add_quadratic_damping(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Set a quadratic damping of up to 0.004 N s²/m² per axis."""
+    """Set a quadratic damping of 0 to 0.004 N s²/m² per axis."""
     return replace(
         device, forces=_with_columns(device.forces, {QUADRATIC_DAMPING: factor * random.uniform(0.0, 0.004, 3)})
     )

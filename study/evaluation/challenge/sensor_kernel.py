@@ -11,8 +11,9 @@ from equalizer.signals.signal import FloatArray
 
 @njit(cache=True, nogil=True)
 def filter_first_order(samples: FloatArray, smoothing_factor: float) -> FloatArray:
-    """Apply the first-order low-pass y += smoothing_factor (x - y) per channel, with y = 0 before the first sample.
-    samples: (n, channels); smoothing_factor: 1 - exp(-2 pi f_c / sample rate), 0 to 1."""
+    """Apply the first-order low-pass y += smoothing_factor (x - y) per channel, with y = 0 before the first sample;
+    returns a new array. samples: (n, channels); smoothing_factor: 1 - exp(-2 pi f_c / sample rate), 0 to 1, for the
+    corner frequency f_c."""
     smoothed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
         state = 0.0

@@ -24,29 +24,29 @@ CORRECT_TABLE_ADVICE = "Correct it before it is sealed; from then on nothing in 
 
 
 def draw_labels(table_path: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
-    """Write a table with every change `repeats` times, and the control (nothing is changed) twice as often, in random
-    order. Each row has a random salt of 64 bits (chosen), so that the order cannot be found by trying all orders
-    against the seal's hash. seed: of the order; None draws a secret seed. Raises AlreadyExistsError where the table
-    exists, CannotWriteError where it cannot be written."""
+    """Draw the labels and write them as a table: every change `repeats` times, and the control (nothing is changed)
+    twice as often, in random order. Each row has a random salt of 64 bits (chosen), so that the order cannot be found
+    by trying all orders against the seal's hash. seed: of the order; None draws a secret seed. Raises
+    AlreadyExistsError where the table exists, CannotWriteError where it cannot be written."""
     change_names = [
         change.name for change in CHANGES for _ in range(repeats * (2 if change.name == CONTROL_CHANGE else 1))
     ]
-    label_order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(change_names))
+    change_order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(change_names))
     labels = tuple(
         Label(f"rec_{number:02d}", change_names[int(index)], None, "", secrets.token_hex(8))
-        for number, index in enumerate(label_order, start=1)
+        for number, index in enumerate(change_order, start=1)
     )
     write_text(table_path, format_csv_table(labels, Label))
     return labels
 
 
-def read_labels(path: Path) -> tuple[Label, ...]:
+def read_labels(table_path: Path) -> tuple[Label, ...]:
     """Read the rows of a table of labels. Raises CannotReadError; UnusableFileError for an invalid or empty table, an
     unknown change, or a recording that appears twice."""
     try:
-        labels = parse_csv_table(read_text(path), Label)
+        labels = parse_csv_table(read_text(table_path), Label)
     except CsvError as error:
-        raise UnusableFileError(path, "table of labels", error.problems, CORRECT_TABLE_ADVICE) from error
+        raise UnusableFileError(table_path, "table of labels", error.problems, CORRECT_TABLE_ADVICE) from error
     problems = [
         f"{label.recording}: '{label.change}' is no change of the kit"
         f"{suggest_word(label.change, tuple(CHANGES_BY_NAME))}"
@@ -60,38 +60,38 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     ]
     if problems or not labels:
         raise UnusableFileError(
-            path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT_TABLE_ADVICE
+            table_path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT_TABLE_ADVICE
         )
     return labels
 
 
-def seal_labels(path: Path) -> str:
+def seal_labels(table_path: Path) -> str:
     """Seal a table: returns the SHA-256 of its bytes, and writes it to the seal file in the format of `sha256sum
-    --check`. An existing seal is not replaced. Raises StudyError where the table is invalid or was sealed with other
-    content."""
-    read_labels(path)
-    digest, seal_path = compute_sha256(path), make_seal_path(path)
+    --check`. An existing seal is not replaced. Raises StudyError where the table is invalid, was sealed with other
+    content, or the seal cannot be written."""
+    read_labels(table_path)
+    table_hash, seal_path = compute_sha256(table_path), make_seal_path(table_path)
     if not seal_path.exists():
-        write_text(seal_path, f"{digest}  {path.name}\n")
-    elif (earlier_hash := read_sealed_hash(path)) != digest:
+        write_text(seal_path, f"{table_hash}  {table_path.name}\n")
+    elif (earlier_hash := read_sealed_hash(table_path)) != table_hash:
         raise StudyError(
             "The table was sealed before, with another hash",
-            f"{seal_path.name} says {earlier_hash or 'no hash'}; {path.name} has {digest} now.",
+            f"{seal_path.name} says {earlier_hash or 'no hash'}; {table_path.name} has {table_hash} now.",
             "Put the table back as it was sealed. If it was wrong then, draw a new one under another name, and record "
             "again: the first hash is known to those who diagnose.",
             saved="Nothing was changed.",
         )
-    return digest
+    return table_hash
 
 
-def make_seal_path(path: Path) -> Path:
+def make_seal_path(table_path: Path) -> Path:
     """Make the path of the seal file of a table: the table's path with `SEAL_SUFFIX`."""
-    return path.with_name(path.name + SEAL_SUFFIX)
+    return table_path.with_name(table_path.name + SEAL_SUFFIX)
 
 
-def read_sealed_hash(path: Path) -> str:
+def read_sealed_hash(table_path: Path) -> str:
     """Read the hash in the seal file of a table, in lower case; empty where the file is missing or empty. Raises
     CannotReadError."""
-    seal_path = make_seal_path(path)
+    seal_path = make_seal_path(table_path)
     words = read_text(seal_path).split() if seal_path.exists() else []
     return words[0].lower() if words else ""

@@ -27,7 +27,7 @@ from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
 
 NOTHING_SCORED = "Nothing was scored, and nothing written."
-"""Part of every error message of this module: the statement on what was saved."""
+"""Sentence on the saved files in every error that this module raises itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,21 +44,21 @@ class KitScore:
     """Source of the hash with which `sha256` was compared, in words."""
 
 
-def score_kit(path: Path, diagnoses: Path, scores_path: Path, seal: str | None = None) -> KitScore:
+def score_kit(table_path: Path, diagnoses_folder: Path, scores_path: Path, seal: str | None = None) -> KitScore:
     """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `scores_path` as CSV.
-    diagnoses: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over
-    before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError where the
-    hashes differ, the table is invalid, no diagnosis is found, one is unusable, or the scores cannot be written."""
-    digest = compute_sha256(path)
-    compared_with = _require_sealed_hash(path, digest, seal)
-    labels = read_labels(path)
-    label_diagnoses = _read_diagnoses(diagnoses, labels)
+    diagnoses_folder: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed
+    over before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError where
+    the hashes differ, the table is invalid, no diagnosis is found, one is unusable, or the scores cannot be written."""
+    table_hash = compute_sha256(table_path)
+    compared_with = _require_sealed_hash(table_path, table_hash, seal)
+    labels = read_labels(table_path)
+    label_diagnoses = _read_diagnoses(diagnoses_folder, labels)
     scored_labels = tuple(
         score_unanswered(label) if diagnosis is None else score_label(label, diagnosis)
         for label, diagnosis in zip(labels, label_diagnoses, strict=True)
     )
     write_text(scores_path, format_csv_table(scored_labels, ScoredLabel))
-    return KitScore(scored_labels, compute_kit_figures(scored_labels), digest, compared_with)
+    return KitScore(scored_labels, compute_kit_figures(scored_labels), table_hash, compared_with)
 
 
 def format_score_lines(score: KitScore) -> tuple[str, ...]:
@@ -86,64 +86,64 @@ def _format_missed_label(scored_label: ScoredLabel) -> str:
     )
 
 
-def _read_diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
-    """Read the diagnosis of each label, in order; None for a label without one. Raises StudyError where the folder is
-    missing, no label has a diagnosis, or a diagnosis is unusable."""
-    if not folder.is_dir():
+def _read_diagnoses(diagnoses_folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
+    """Read the diagnosis of each label, in order; None for a label without a diagnosis. Raises StudyError where the
+    folder is missing, no label has a diagnosis, or a diagnosis is unusable."""
+    if not diagnoses_folder.is_dir():
         raise StudyError(
             "There is no such folder",
-            f"{folder} is no folder of diagnoses.",
+            f"{diagnoses_folder} is no folder of diagnoses.",
             "Give --diagnoses the folder that holds one folder per recording, by its name.",
             saved=NOTHING_SCORED,
         )
-    diagnoses = tuple(_read_one_diagnosis(folder, label.recording) for label in labels)
+    diagnoses = tuple(_read_one_diagnosis(diagnoses_folder, label.recording) for label in labels)
     if any(diagnosis is not None for diagnosis in diagnoses):
         return diagnoses
     raise StudyError(
         "There is no diagnosis to score",
-        f"{folder} holds no {DIAGNOSIS_NAME} of any recording in the table, such as "
+        f"{diagnoses_folder} holds no {DIAGNOSIS_NAME} of any recording in the table, such as "
         f"{labels[0].recording}/{DIAGNOSIS_NAME}.",
         "Give --diagnoses the folder that holds one folder per recording, by its name.",
         saved=NOTHING_SCORED,
     )
 
 
-def _read_one_diagnosis(folder: Path, recording: str) -> Diagnosis | None:
+def _read_one_diagnosis(diagnoses_folder: Path, recording_name: str) -> Diagnosis | None:
     """Read the diagnosis of a recording; None where its file is missing. Raises StudyError where the file is
     unusable."""
-    path = folder / recording / DIAGNOSIS_NAME
+    path = diagnoses_folder / recording_name / DIAGNOSIS_NAME
     if not path.is_file():
         return None
     try:
         return read_diagnosis(path)
     except StudyError as error:
         raise StudyError(
-            f"{recording}/{error.title}",
+            f"{recording_name}/{error.title}",
             error.happened,
             f"Get {path.parent} again as `hapteq diagnose` wrote it, or move it away: then it counts as not right.",
             saved=NOTHING_SCORED,
         ) from error
 
 
-def _require_sealed_hash(path: Path, digest: str, seal: str | None) -> str:
+def _require_sealed_hash(table_path: Path, table_hash: str, seal: str | None) -> str:
     """Compare the hash of the table with `seal`, or without it with the seal file. Returns the source of the sealed
     hash in words. Raises StudyError where the hashes differ or there is no seal file, WrongUseError where `seal` is no
     hash."""
-    seal_path = make_seal_path(path)
+    seal_path = make_seal_path(table_path)
     if seal is None:
-        sealed_digest, source = read_sealed_hash(path), f"{seal_path.name} says"
+        sealed_hash, source = read_sealed_hash(table_path), f"{seal_path.name} says"
         comparison = (
             f"compared only with {seal_path.name} in the same folder, which can be rewritten together with the table: "
             "give --seal the hash that was handed over before the diagnoses"
         )
     else:
-        sealed_digest, source, comparison = _parse_hash(seal), "--seal gives", "the hash that --seal gives"
-    if sealed_digest == digest:
+        sealed_hash, source, comparison = _parse_hash(seal), "--seal gives", "the hash that --seal gives"
+    if sealed_hash == table_hash:
         return comparison
     raise StudyError(
         "The labels are not those that were sealed",
-        f"{path.name} has the hash {digest}; {source} {sealed_digest}."
-        if sealed_digest
+        f"{table_path.name} has the hash {table_hash}; {source} {sealed_hash}."
+        if sealed_hash
         else f"There is no seal in {seal_path.name}.",
         "Score the table as it was sealed before the diagnoses; changes made to it since cannot be trusted.",
         saved=NOTHING_SCORED,

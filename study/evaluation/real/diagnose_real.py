@@ -1,10 +1,11 @@
-"""Diagnose one recording of a real device. Called by `real_recordings` (`hapteq real`).
+"""Diagnose one recording of a real device. Called by `real_recordings` (`hapteq real`); `inject_real` imports
+recordings with it.
 
 1. The recording is imported by its map. Its model is the map's, or a linear model or force balance fitted to it.
 2. `diagnose` searches for missing effects. Where a recording from before a known change exists, it is the reference.
 3. The resulting model is tested on further recordings, to which at most a gain is fitted (`volume_free` in the map).
 
-A recording that cannot be diagnosed gets the answer "refused", with the reason.
+A recording that cannot be diagnosed gets the verdict "refused", with the reason as its answer.
 """
 
 from collections.abc import Sequence
@@ -101,7 +102,7 @@ def diagnose_real(
         return RealDiagnosis(_make_refusal(real_recording, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (IncomparableRecordingsError, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         return RealDiagnosis(_make_refusal(real_recording, f"The fits broke down: {refusal}."), None, parents)
-    further_tests = tuple(_test_on_further(test, real_recording, findings) for test in real_recording.tests)
+    further_tests = tuple(_test_on_recording(test, real_recording, findings) for test in real_recording.tests)
     pair = None if case.reference is None else _compare_pair(real_recording, case, findings)
     objections = (
         *diagnosis.objections,
@@ -112,8 +113,9 @@ def diagnose_real(
 
 
 def _downgrade_if_remainder(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
-    """Downgrade "explained" to "partly explained" where the recording made before the change shows a remainder
-    beyond what the model missed then: a single reference recording leaves wide uncertainty."""
+    """Downgrade "explained" to "partly explained" where the error that remains with the effects exceeds
+    `EXPLAINED_ERROR` times that of the model before the change: a single reference recording leaves wide uncertainty
+    for the verdict."""
     remaining_error, reference_error = pair.with_effects, pair.expected_left
     if (
         answer.verdict != "explained"
@@ -156,12 +158,12 @@ def _import_case(
     except NothingToDiagnose as refusal:
         raise make_not_diagnosable_error(refusal.problems) from refusal
     references = () if real_recording.reference is None else (import_real_recording(real_recording.reference),)
-    common = keep_common_signals((*prepared.recordings, *references))
-    recording = common.recordings[0]
+    kept_signals = keep_common_signals((*prepared.recordings, *references))
+    recording = kept_signals.recordings[0]
     first_model = _choose_model(real_recording, recording, bounds, on_progress)
-    remarks = (*prepared.remarks, *common.remarks, *first_model.remarks)
+    remarks = (*prepared.remarks, *kept_signals.remarks, *first_model.remarks)
     return _ImportedCase(
-        recording, first_model.model, first_model.balances, remarks, common.recordings[1] if references else None
+        recording, first_model.model, first_model.balances, remarks, kept_signals.recordings[1] if references else None
     )
 
 
@@ -175,7 +177,8 @@ def _choose_model(
     real_recording: RealRecording, recording: Recording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
     """Choose the given model, else a linear model fitted to the recording, with a force balance where there is no
-    reference recording. Raises StudyError where the given model does not fit the channels, or none can be fitted."""
+    reference recording. The fit reports a tenth of the progress. Raises StudyError where the given model does not fit
+    the channels, or none can be fitted."""
     given_model = real_recording.read_model()
     if given_model is None:
         diagnosis_input = DiagnosisInput((recording,), (real_recording.name,), real_recording.found_map.files, ())
@@ -191,8 +194,8 @@ def _choose_model(
     return FirstModel(given_model, ())
 
 
-def _make_refusal(real_recording: RealRecording, answer: str) -> RealAnswer:
-    """Make the answer for a recording that is not diagnosed. answer: the reason, as a sentence."""
+def _make_refusal(real_recording: RealRecording, reason_text: str) -> RealAnswer:
+    """Make the answer for a recording that is not diagnosed. reason_text: why, as a sentence."""
     diagnosis = real_recording.found_map.source.map.diagnosis
     return RealAnswer(
         folder=real_recording.folder.name,
@@ -200,7 +203,7 @@ def _make_refusal(real_recording: RealRecording, answer: str) -> RealAnswer:
         title=real_recording.found_map.source.map.title,
         device=real_recording.found_map.source.map.device,
         verdict="refused",
-        answer=answer,
+        answer=reason_text,
         model="",
         error="",
         fitted=None,
@@ -221,10 +224,10 @@ def _make_refusal(real_recording: RealRecording, answer: str) -> RealAnswer:
     )
 
 
-def _test_on_further(test_map: FoundMap, real_recording: RealRecording, findings: Findings) -> FurtherTest:
+def _test_on_recording(test_map: FoundMap, real_recording: RealRecording, findings: Findings) -> FurtherTest:
     """Test the re-tuned and the improved model on a further recording; at most its gain is fitted to it (`volume_free`
-    in the map). The sign of the commands is not chosen again for this recording (turns=False): it was decided once, for
-    all recordings of the device. A recording that cannot be used gives a test with the problem as text."""
+    in the map). The sign of the commands is not chosen again for this recording (may_reverse=False): it was decided
+    once, for all recordings of the device. A recording that cannot be used gives a test with the problem as text."""
     title, has_free_gain = test_map.source.map.title, test_map.source.map.diagnosis.volume_free
     try:
         recording = import_real_recording(test_map)
@@ -235,8 +238,8 @@ def _test_on_further(test_map: FoundMap, real_recording: RealRecording, findings
             for model in (_require_retuned(findings), findings.improved)
         )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
-        error_label = problem.happened if isinstance(problem, StudyError) else f"{problem}."
-        return FurtherTest(test_map.name, title, "", None, None, problem=error_label)
+        problem_text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
+        return FurtherTest(test_map.name, title, "", None, None, problem=problem_text)
     error_without, error_with = (
         errors.with_gain if has_free_gain else errors.without_gain for errors in (retuned_error, improved_error)
     )

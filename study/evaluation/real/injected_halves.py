@@ -1,4 +1,4 @@
-"""Split a real recording into an intact half and one that carries a fault, and measure how visible the fault is.
+"""Split a real recording into an intact half and a half for an injected fault, and measure how visible the fault is.
 
 Called by `inject_real`, which injects the fault into the second half.
 """
@@ -13,7 +13,7 @@ from analysis.diagnosis.contrast.compared_base import Base
 from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
 from analysis.diagnosis.data.observed_parts import cut_part, find_parts
-from equalizer.signals.joining import concatenate, concatenate_if_all
+from equalizer.signals.joining import concatenate_if_all_present, concatenate_signals
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -27,23 +27,25 @@ MIN_PARTS = 4
 
 def draw_halves(recording: Recording, random: np.random.Generator) -> tuple[Recording, Recording]:
     """Draw two adjoining stretches of the recording, or, with probability 1/2 from `MIN_PARTS` parts on, two random
-    sets of its parts. Returns the half that stays intact and the half for the fault, in random order. Both are without
-    roles: the fit samples are drawn anew in each."""
-    without_roles = replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
-    parts = find_parts(without_roles)
+    sets of its parts, each in their order of time. Returns the half that stays intact and the half for the fault, in
+    random order. Both are without roles: the fit samples are drawn anew in each."""
+    recording_without_roles = replace(
+        recording, segments=tuple(replace(segment, role="") for segment in recording.segments)
+    )
+    parts = find_parts(recording_without_roles)
     if len(parts) >= MIN_PARTS and random.random() < 0.5:
-        order = random.permutation(len(parts))
-        part_sets = [sorted(order[: len(parts) // 2]), sorted(order[len(parts) // 2 :])]
+        part_order = random.permutation(len(parts))
+        part_sets = [sorted(part_order[: len(parts) // 2]), sorted(part_order[len(parts) // 2 :])]
         first_half, second_half = (
-            _join_parts(without_roles, [parts[part_number] for part_number in part_numbers])
+            _join_parts(recording_without_roles, [parts[part_number] for part_number in part_numbers])
             for part_numbers in part_sets
         )
     else:
         half_length = int(min(len(recording) // 2, MAX_SAMPLES) * random.uniform(MIN_LENGTH_RATIO, 1.0))
         start = int(random.integers(len(recording) - 2 * half_length + 1))
         first_half, second_half = (
-            _cut_half_with_lead(without_roles, start, start + half_length),
-            _cut_half_with_lead(without_roles, start + half_length, start + 2 * half_length),
+            _cut_half_with_lead(recording_without_roles, start, start + half_length),
+            _cut_half_with_lead(recording_without_roles, start + half_length, start + 2 * half_length),
         )
     return (first_half, second_half) if random.random() < 0.5 else (second_half, first_half)
 
@@ -68,11 +70,11 @@ def _join_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recor
     first_stretch = stretches[0]
     return replace(
         first_stretch,
-        command=concatenate([stretch.command for stretch in stretches]),
-        response=concatenate([stretch.response for stretch in stretches]),
-        position=concatenate_if_all([stretch.position for stretch in stretches]),
-        excitation=concatenate_if_all([stretch.excitation for stretch in stretches]),
-        condition=concatenate_if_all([stretch.condition for stretch in stretches]),
+        command=concatenate_signals([stretch.command for stretch in stretches]),
+        response=concatenate_signals([stretch.response for stretch in stretches]),
+        position=concatenate_if_all_present([stretch.position for stretch in stretches]),
+        excitation=concatenate_if_all_present([stretch.excitation for stretch in stretches]),
+        condition=concatenate_if_all_present([stretch.condition for stretch in stretches]),
         time_s=None,
         segments=tuple(segments) or (Segment(0, int(stops[-1]), "noise", 0.0),),
         meta={**recording.meta, "parts": part_bounds},
@@ -114,7 +116,7 @@ def blank_lead_responses(recording: Recording) -> Recording:
 
 
 def _blank_lead(signal: Signal, lead_samples: int) -> Signal:
-    """Replace the first `lead_samples` samples by NaN in a copy of the signal."""
+    """Replace the first `lead_samples` samples of all channels by NaN in a copy of the signal."""
     samples = signal.samples.copy()
     samples[:lead_samples] = np.nan
     return replace(signal, samples=samples)
@@ -140,7 +142,7 @@ def compute_held_out_change(intact: Recording, faultless: Recording, faulty: Rec
         ]
     except (np.linalg.LinAlgError, ValueError):
         return None
-    return max(error_ratios, key=lambda ratio: abs(np.log(max(ratio, 1e-12))))
+    return max(error_ratios, key=lambda error_ratio: abs(np.log(max(error_ratio, 1e-12))))
 
 
 def _measure_error(base: Base, fitted_parts: tuple[Part, ...], tested_parts: tuple[Part, ...]) -> float:

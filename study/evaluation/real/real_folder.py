@@ -1,7 +1,8 @@
 """Inventory of a folder of real recordings: sub-folders of recordings with import maps.
 
 A map may also state that a recording only tests the diagnosis of another one (`tests`), and that two were made before
-and after a change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`.
+and after a change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`;
+`diagnose_real`, `inject_real` and `reuse_answers` use `RealRecording`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from study.store.formats.mechanical_model_file import read_mechanical_model
 
 @dataclass(frozen=True, slots=True)
 class RealRecording:
-    """One recording to diagnose."""
+    """One recording to diagnose, with the files that its map relates to it."""
 
     folder: Path
     """Sub-folder in which it lies."""
@@ -74,6 +75,7 @@ class RealFolder:
     """Recordings found in a folder, and the sub-folders that could not be used."""
 
     recordings: tuple[RealRecording, ...]
+    """Recordings to diagnose."""
     troubles: tuple[UnusableInput, ...]
     """Sub-folders that could not be used, with the reason."""
 
@@ -116,14 +118,15 @@ def _select_recordings(folder: Path, found_maps: Sequence[FoundMap]) -> list[Rea
         if found_map.source.map.diagnosis.tests and any(_is_test_of(found_map, candidate) for candidate in found_maps):
             continue
         tests = tuple(candidate for candidate in found_maps if _is_test_of(candidate, found_map))
-        reference, changed = _find_pair(found_map, found_maps)
-        recordings.append(RealRecording(folder, found_map, tests, reference, changed))
+        reference, change_text = _find_reference(found_map, found_maps)
+        recordings.append(RealRecording(folder, found_map, tests, reference, change_text))
     return recordings
 
 
 def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
-    """Whether `test` only tests the diagnosis of `base`. With one recording per file, the file names must agree up
-    to the first underscore."""
+    """Whether `test` only tests the diagnosis of `base`: its map states the name of that recording, or of its map. In
+    the latter case, if that map makes a recording of each file, the file names must agree up to the first
+    underscore."""
     tested_name = test.source.map.diagnosis.tests
     if not tested_name or base.source.map.diagnosis.tests:
         return False
@@ -133,9 +136,10 @@ def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
     return tested_name == base.source.name and (not base.source.map.separate or has_same_stem)
 
 
-def _find_pair(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
+def _find_reference(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
     """Find the recording before a change of the device, and the change in words, as the map states them; None and an
-    empty text where the map states none or that recording is missing."""
+    empty text where the map states none or that recording is missing. Only the first pair of the map that the
+    recording's first file matches counts."""
     for pair in found_map.source.map.diagnosis.pair:
         if found_map.files[0].match(pair.after):
             reference = next(

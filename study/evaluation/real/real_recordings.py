@@ -44,7 +44,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import read_answer_and_provenance, write_real_answer
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
-from study.workflows.forked_map import measure_processor_s, without_forking
+from study.workflows.forked_map import disable_forking, measure_processor_s
 from study.workflows.run_on_executor import run_tasks
 
 RETUNED_NAME = "retuned.toml"
@@ -229,7 +229,7 @@ def _diagnose_on_executor(
 def diagnose_sent_recording(folder: str, name: str, files: FileContents) -> FileContents:
     """Diagnose one recording on a worker, and return the files of its results. folder, files: name and files of its
     sub-folder; name: of the recording. Raises StudyError where the recording is not in these files."""
-    with TemporaryDirectory() as temporary, without_forking():
+    with TemporaryDirectory() as temporary, disable_forking():
         plan = RealPlan(Path(temporary) / "recordings", Path(temporary) / "out")
         write_files(plan.folder / folder, files)
         real_folder = read_real_folder(plan.folder)

@@ -21,8 +21,9 @@ def format_real_lines(written_results: WrittenReal) -> tuple[str, ...]:
 
 
 def _format_answer(real_answer: RealAnswer) -> str:
-    """Format the line of one recording: verdict, effects, held-out errors as fractions of the signal (model as given,
-    re-tuned, with the effects, black box), and duration in seconds; the answer in words where no error was measured."""
+    """Format the line of one recording: verdict, effects (or the best candidate of an unexplained recording), held-out
+    errors relative to the signal (model as given, re-tuned, with the effects, black box), and duration (s); the answer
+    in words where no error was measured."""
     effects_text = f": {', '.join(real_answer.effects)}" if real_answer.effects else ""
     if real_answer.verdict == "unexplained" and real_answer.candidates:
         effects_text = f", best candidate (not confirmed) {real_answer.candidates[0].effect}"
@@ -30,9 +31,9 @@ def _format_answer(real_answer: RealAnswer) -> str:
     if real_answer.held_out is None:
         return f"{answer_text}. {real_answer.answer}"
     errors = real_answer.held_out
-    after_text = f", with what was found {format_error(errors.after)}" if real_answer.effects else ""
+    with_effects_text = f", with what was found {format_error(errors.after)}" if real_answer.effects else ""
     black_box_text = "" if real_answer.black_box is None else f", black box {format_error(real_answer.black_box)}"
     return (
         f"{answer_text}. Held out: as given {format_error(errors.before)}, re-tuned {format_error(errors.retuned)}"
-        f"{after_text}{black_box_text} ({real_answer.seconds:.0f} s)."
+        f"{with_effects_text}{black_box_text} ({real_answer.seconds:.0f} s)."
     )

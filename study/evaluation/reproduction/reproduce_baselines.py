@@ -26,12 +26,14 @@ from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place,
 
 @dataclass(frozen=True, slots=True)
 class _Placement:
-    """Place of the handle (m), and whether a simulated hand holds it. description: its words in the name of
-    a row."""
+    """Condition of a comparison: place of the handle, and whether a simulated hand holds it."""
 
     description: str
+    """Words for the condition in the name of a row."""
     place_m: Place
+    """Position of the handle (m)."""
     hand: bool
+    """Whether a simulated hand holds the handle."""
 
 
 _PLACEMENTS = (
@@ -43,15 +45,19 @@ _PLACEMENTS = (
 
 
 def play_baselines(
-    plan: ReproductionPlan, models: PlacedModels, estimate: FrequencyResponse, on_share: Callable[[float], None]
+    plan: ReproductionPlan,
+    models: PlacedModels,
+    frequency_response: FrequencyResponse,
+    on_share: Callable[[float], None],
 ) -> tuple[PlayedResponse, ...]:
     """Play all baselines under each condition; at the edge and in the hand, they are followed by the equalizer that was
     designed for this condition.
 
-    estimate: frequency response at the centre, including the spring. on_share: called with the fraction done, 0 to 1.
+    frequency_response: of the device at the centre, including the spring. on_share: called with the fraction done, 0 to
+    1.
     """
     baseline_inverses = compute_baseline_inverses(
-        models.centre, estimate, _list_band_frequencies_hz(plan, models.centre.sample_rate_hz)
+        models.centre, frequency_response, _list_band_frequencies_hz(plan, models.centre.sample_rate_hz)
     )
     row_count = len(_PLACEMENTS) * len(baseline_inverses) + 2
     responses: list[PlayedResponse] = []
@@ -97,14 +103,14 @@ def _list_band_frequencies_hz(plan: ReproductionPlan, rate_hz: float) -> FloatAr
 
 def _make_driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
     """Make the driver that multiplies the spectrum of the target acceleration by the inverse, line by line in the band,
-    to give the forces (n, axes), N; lines outside the band are zero."""
+    to give the forces (n, axes), N; they have no spectral lines outside the band."""
 
     def drive(target: Signal) -> FloatArray:
         """Compute the forces (n, axes), N, for a period of the target acceleration, m/s²."""
         band_lines = mask_lines_in_band(plan.band_hz, len(target), target.sample_rate_hz)
-        spectrum = np.fft.rfft(target.samples, axis=0)
-        forces = np.zeros((len(spectrum), inverse.response.shape[1]), dtype=complex)
-        forces[band_lines] = np.einsum("lmp,lp->lm", inverse.response, spectrum[band_lines])
-        return np.asarray(np.fft.irfft(forces, len(target), axis=0), dtype=np.float64)
+        target_spectrum = np.fft.rfft(target.samples, axis=0)
+        force_spectrum = np.zeros((len(target_spectrum), inverse.response.shape[1]), dtype=complex)
+        force_spectrum[band_lines] = np.einsum("lmp,lp->lm", inverse.response, target_spectrum[band_lines])
+        return np.asarray(np.fft.irfft(force_spectrum, len(target), axis=0), dtype=np.float64)
 
     return drive

@@ -43,44 +43,44 @@ class ReproducedModel:
     """A model for figure 5, identified from a recording, with its held-out test."""
 
     model: IdentifiedModel
-    """Includes the spring, so that playback under the same spring needs no separate compensation."""
+    """Model that includes the spring, so that playback under the same spring needs no separate compensation."""
     tested: HeldOutValidation | None
     """Test on the held-out part of the recording; None where there is none."""
 
     def as_used_model(self, name: str) -> UsedModel:
-        """Convert to the summary for the report. name: of its recording."""
+        """Convert to the summary for the report. name: of its recording; underscores become blanks."""
         quality = self.model.quality
         assert quality is not None, "every model that is kept or made here has one"
         return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
 
 
 def identify_or_load(
-    plan: ReproductionPlan, cached: CachedRecording, on_share: Callable[[float], None]
+    plan: ReproductionPlan, cached_recording: CachedRecording, on_share: Callable[[float], None]
 ) -> ReproducedModel:
     """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
     quality, is replaced. on_share: called with the fraction done, 0 to 1. Raises StudyError where the identification
     fails."""
-    path = plan.models / cached.path.name
-    model = _load_cached_model(path, plan, cached.path)
+    path = plan.models / cached_recording.path.name
+    model = _load_cached_model(path, plan, cached_recording.path)
     if model is None:
         path.unlink(missing_ok=True)
-        identify_plan = IdentifyPlan((cached.path,), path, plan.band_hz, plan.order, with_spring=True)
+        identify_plan = IdentifyPlan((cached_recording.path,), path, plan.band_hz, plan.order, with_spring=True)
         model = identify_model(identify_plan, on_share).model
     on_share(1.0)
-    return ReproducedModel(model, validate_on_test(model, (use_excitation_as_command(cached.recording),)))
+    return ReproducedModel(model, validate_on_test(model, (use_excitation_as_command(cached_recording.recording),)))
 
 
-def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
-    """Load the cached model, if it was identified from the recording `source` with the order and band of the plan and
-    states its quality; else None."""
+def _load_cached_model(path: Path, plan: ReproductionPlan, recording_path: Path) -> IdentifiedModel | None:
+    """Load the cached model, if it was identified from the recording at `recording_path` with the order and band of the
+    plan and states its quality; else None."""
     try:
         model = read_identified_model(path) if path.exists() else None
     except UnusableFileError:
         return None
     if model is None or model.quality is None or (model.order, model.band_hz) != (plan.order, plan.band_hz):
         return None
-    parents = [parent.get("sha256") for parent in model.provenance.get("parents", ())]
-    return model if parents == [compute_sha256(source)] else None
+    parent_hashes = [parent.get("sha256") for parent in model.provenance.get("parents", ())]
+    return model if parent_hashes == [compute_sha256(recording_path)] else None
 
 
 def use_excitation_as_command(recording: Recording) -> Recording:
@@ -99,27 +99,27 @@ def use_excitation_as_command(recording: Recording) -> Recording:
 """Approximate duration of each step (s), the first per simulated participant, for the progress only."""
 
 CENTRE_NAME, FRICTIONLESS_NAME, HAND_NAME = "centre", "frictionless", "hand"
-"""Recordings at the centre, without friction and with a hand, and the models of them."""
+"""Names of the recordings at the centre, without friction and with a hand, and of the models identified from them."""
 
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
-    """Make all figures. on_progress: called with the fraction done, 0 to 1. After UserInterruptError, the next call
-    continues. Raises StudyError where a step fails."""
+    """Reproduce all figures. on_progress: called with the fraction done, 0 to 1. Raises StudyError where a step fails,
+    and UserInterruptError, after which the next call reuses the steps that were finished."""
     requests = _list_requests(plan)
     model_names = _list_model_names()
     steps = StepProgress(_estimate_step_durations_s(plan, requests, model_names), on_progress)
-    saved = f"Sessions, recordings and models so far are in {plan.output_folder}."
-    with convert_interrupts("The reproduction is not finished.", saved, further_types=(UserInterruptError,)):
+    saved_text = f"Sessions, recordings and models so far are in {plan.output_folder}."
+    with convert_interrupts("The reproduction is not finished.", saved_text, further_types=(UserInterruptError,)):
         _make_folders(plan)
         recordings = {
             name: record_or_load(plan, request, steps.make_callback(f"recording {name}"))
             for name, request in requests.items()
         }
-        collected = _rehearse_study(plan, steps)
-        identified = {
+        collected_trials = _rehearse_study(plan, steps)
+        identified_models = {
             name: identify_or_load(plan, recordings[name], steps.make_callback(f"model {name}")) for name in model_names
         }
-        results = _collect_results(plan, recordings, identified, collected, steps)
+        results = _collect_results(plan, recordings, identified_models, collected_trials, steps)
         return write_reproduction_folder(plan, results, steps.make_callback("writing"))
 
 
@@ -185,22 +185,22 @@ def _rehearse_study(plan: ReproductionPlan, steps: StepProgress) -> CollectedTri
 def _collect_results(
     plan: ReproductionPlan,
     recordings: Mapping[str, CachedRecording],
-    identified: Mapping[str, ReproducedModel],
-    collected: CollectedTrials,
+    identified_models: Mapping[str, ReproducedModel],
+    collected_trials: CollectedTrials,
     steps: StepProgress,
 ) -> ReproductionResults:
-    """Compute all figures. Raises StudyError where a recording does not suffice for its figure."""
+    """Compute the results of all figures. Raises StudyError where a recording does not suffice for its figure."""
     models = PlacedModels(
-        centre=identified[CENTRE_NAME].model,
-        intermediate=tuple(identified[name].model for name in _list_intermediate_names()),
-        frictionless=identified[FRICTIONLESS_NAME].model,
-        hand=identified[HAND_NAME].model,
+        centre=identified_models[CENTRE_NAME].model,
+        intermediate=tuple(identified_models[name].model for name in _list_intermediate_names()),
+        frictionless=identified_models[FRICTIONLESS_NAME].model,
+        hand=identified_models[HAND_NAME].model,
     )
     centre_recording = recordings[CENTRE_NAME].recording
     try:
-        device = _measure_device(recordings["sweep"].recording)
+        measured_device = _measure_device(recordings["sweep"].recording)
         ellipsoid_results = _measure_ellipsoids(recordings["ellipsoid"].recording)
-        estimate = estimate_transfer((use_excitation_as_command(centre_recording),))
+        frequency_response = estimate_transfer((use_excitation_as_command(centre_recording),))
     except (TransferEstimateError, ValueError) as problem:
         raise StudyError(
             "The recordings do not carry the figures",
@@ -209,18 +209,18 @@ def _collect_results(
             saved=f"Sessions, recordings and models are in {plan.output_folder}.",
         ) from problem
     return ReproductionResults(
-        study=analyse_study(collected.trials, collected.protocol),
+        study=analyse_study(collected_trials.trials, collected_trials.protocol),
         ellipsoids=ellipsoid_results,
-        device=device,
+        device=measured_device,
         device_name=centre_recording.device,
-        played=play_equalized(plan, models, steps.make_callback("playing")),
-        baselines=play_baselines(plan, models, estimate, steps.make_callback("baselines")),
-        models=tuple(reproduced.as_used_model(name) for name, reproduced in identified.items()),
-        tested=identified[CENTRE_NAME].tested,
-        tested_frictionless=identified[FRICTIONLESS_NAME].tested,
+        equalized_playback=play_equalized(plan, models, steps.make_callback("playing")),
+        baselines=play_baselines(plan, models, frequency_response, steps.make_callback("baselines")),
+        models=tuple(reproduced.as_used_model(name) for name, reproduced in identified_models.items()),
+        held_out_test=identified_models[CENTRE_NAME].tested,
+        frictionless_test=identified_models[FRICTIONLESS_NAME].tested,
         remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),
         sources=tuple(recording.path for recording in recordings.values()),
-        protocol_hash=collected.protocol_hash,
+        protocol_hash=collected_trials.protocol_hash,
     )
 
 

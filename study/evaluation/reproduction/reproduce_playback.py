@@ -1,7 +1,7 @@
-"""Playback of wanted accelerations on a simulated device: response from wanted to true acceleration (figure 5).
+"""Playback of target accelerations on a simulated device: response from target to true acceleration (figure 5).
 
-Figure 5 of the paper compares wanted and delivered accelerations with and without the equalizer. Each row of the figure
-is one position of the handle, one device and one way to convert the wanted acceleration to forces (a driver). The three
+Figure 5 of the paper compares target and delivered accelerations with and without the equalizer. Each row of the figure
+is one position of the handle, one device and one way to convert the target acceleration to forces (a driver). The three
 axes are played one after the other, all rows at the same peak force. Called by `reproduce_equalized` and
 `reproduce_baselines`.
 """
@@ -28,8 +28,8 @@ from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, Repro
 from study.session.stimulus.limits import make_recording_limits
 from study.store.formats.protocol_files import read_recording_protocol
 
-AXES = ("ax", "ay", "az")
-"""Names of the channels of a wanted acceleration."""
+ACCELERATION_CHANNELS = ("ax", "ay", "az")
+"""Names of the channels of a target acceleration."""
 PEAK_FORCE_RATIO = 0.93
 """Peak of the norm of the force, as a fraction of the protocol's force cap. Chosen: far above friction, not clipped."""
 PLAYED_PERIODS = 2
@@ -37,10 +37,10 @@ PLAYED_PERIODS = 2
 FADE_S = 0.5
 """Duration of the fade-in of the periodic forces (s). Chosen."""
 WAVE_SEED = 5
-"""Seed of the wanted acceleration, the same for all rows, so that they can be compared. Chosen."""
+"""Seed of the target acceleration, the same for all rows, so that they can be compared. Chosen."""
 
 Driver = Callable[[Signal], FloatArray]
-"""Converts one period of wanted accelerations (period, 3), m/s², to the forces (period, 3) that should cause it, up to
+"""Converts one period of target accelerations (period, 3), m/s², to the forces (period, 3) that should cause it, up to
 a common factor."""
 
 
@@ -51,6 +51,7 @@ class PlaybackRow:
     name: str
     """Label of the row in the figure and its table."""
     driver: Driver
+    """Function that converts the target acceleration to forces."""
     place_m: Place = CENTRE
     """Position of the handle in the workspace: x, y, z (m)."""
     device: str = SIMULATED
@@ -58,17 +59,17 @@ class PlaybackRow:
     hand: bool = False
     """Whether a simulated hand holds the handle."""
     signal: SignalKind = "sweep"
-    """Kind of the wanted acceleration: sweep or multisine."""
+    """Kind of the target acceleration: sweep or multisine."""
 
 
 def drive_without_equalizer(target: Signal) -> FloatArray:
-    """Drive without an equalizer: forces (period, 3) equal to the wanted accelerations, up to a common factor."""
+    """Drive without an equalizer: forces (period, 3) equal to the target accelerations, up to a common factor."""
     return target.samples
 
 
 def play_row(plan: ReproductionPlan, row: PlaybackRow) -> PlayedResponse:
-    """Measure the response of one row. Raises DeviceError, and StudyError where the device does not play the forces to
-    their end or does not report its true acceleration."""
+    """Play one row on its device and measure its response. Raises DeviceError, and StudyError where the device does not
+    play the forces to their end or does not report its true acceleration."""
     protocol = read_recording_protocol(plan.protocols.band).protocol
     settings = DeviceSettings(
         limits=make_recording_limits(protocol),
@@ -84,15 +85,15 @@ def play_row(plan: ReproductionPlan, row: PlaybackRow) -> PlayedResponse:
 
 
 def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
-    """Measure the response from wanted to true acceleration, (lines, 3, 3). Each axis is played in turn; its forces are
-    scaled to the peak `peak_n` (N), and the wanted acceleration by the same factor."""
+    """Measure the response from target to true acceleration, (lines, 3, 3). Each axis is played in turn; its forces are
+    scaled to the peak `peak_n` (N), and the target acceleration by the same factor."""
     rate_hz = device.info.sample_rate_hz
     target_wave = make_target_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
     targets, delivered_accelerations, total_clipped_ticks = [], [], 0
     for axis in range(3):
         samples = np.zeros((len(target_wave), 3))
         samples[:, axis] = target_wave
-        period_force = row.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
+        period_force = row.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", ACCELERATION_CHANNELS))
         scale = peak_n / float(np.linalg.norm(period_force, axis=1).max())
         true_acceleration, clipped_ticks = _play_to_steady_state(device, scale * period_force)
         targets.append(scale * target_wave)

@@ -13,7 +13,7 @@ Place = tuple[float, float, float]
 CENTRE: Place = (0.0, 0.0, 0.0)
 """Centre of the workspace."""
 EDGE: Place = (0.0, 0.05, 0.0)
-"""Near the edge of the workspace, whose soft stops begin at 75 mm. Chosen."""
+"""Position near the edge of the workspace, whose soft stops begin 75 mm from the centre. Chosen."""
 INTERMEDIATE_PLACES: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
 """Positions at which further models are identified for interpolation, in addition to the centre. `EDGE` is not among
 them, so that playback there tests the interpolation. Chosen."""
@@ -41,12 +41,15 @@ class ReproductionPlan:
     settings of the identified models."""
 
     output_folder: Path
+    """Folder of all results."""
     subjects: int = 10
     """Number of simulated participants."""
     seed: int = 1
+    """Seed of participants and devices."""
     workers: int = 2
     """Number of worker processes."""
     protocols: ReproducedProtocols = ReproducedProtocols()
+    """Protocols of study and recordings."""
     order: int = 26
     """Order (number of states) of the identified models."""
     band_hz: tuple[float, float] = (5.0, 35.0)

@@ -25,15 +25,15 @@ class ReproductionResults:
     """Measured frequency responses of the simulated device (figures 1 and 4)."""
     device_name: str
     """Name of the device in its recordings."""
-    played: EqualizedPlayback
+    equalized_playback: EqualizedPlayback
     """Playback with the equalizer (figure 5)."""
     baselines: tuple[PlayedResponse, ...]
     """Playback by other methods, for comparison."""
     models: tuple[UsedModel, ...]
     """Models that the equalizer used."""
-    tested: HeldOutValidation | None
+    held_out_test: HeldOutValidation | None
     """Held-out test of the model identified at the centre of the workspace; None where it was not tested."""
-    tested_frictionless: HeldOutValidation | None
+    frictionless_test: HeldOutValidation | None
     """The same for the device without friction."""
     remarks: tuple[str, ...]
     """Remarks on recordings and models, as sentences."""

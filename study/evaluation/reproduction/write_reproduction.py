@@ -48,13 +48,13 @@ def write_reproduction_folder(
 ) -> WrittenReproduction:
     """Write figures, document and page, replacing those of an earlier run. on_share: called with the fraction done, 0
     to 1; the intermediate fractions are approximate. Raises CannotWriteError."""
-    limit_hz = find_direction_limit(results.study)
+    direction_limit_hz = find_direction_limit(results.study)
     # Where the thresholds give no limit of direction, the published one separates the bands.
-    used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
-    bands = compute_frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
-    reproduction = _make_document(plan, results, bands, limit_hz, used_limit_hz)
+    band_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if direction_limit_hz is None else direction_limit_hz
+    bands = compute_frequency_bands(results.device.onset.frequency_hz, band_limit_hz)
+    reproduction = _make_document(plan, results, bands, direction_limit_hz, band_limit_hz)
     pictures = make_reproduction_pictures(
-        results.study, results.ellipsoids, results.device, bands, used_limit_hz, results.played.rows
+        results.study, results.ellipsoids, results.device, bands, band_limit_hz, results.equalized_playback.rows
     )
     on_share(0.2)
     write_pictures(plan.figures, [picture for figure_pictures in pictures.values() for picture in figure_pictures])
@@ -62,24 +62,25 @@ def write_reproduction_folder(
     provenance = gather_provenance(
         protocol_hash=results.protocol_hash, seeds={"reproduction": plan.seed}, parents=results.sources
     )
-    document, report = plan.output_folder / REPRODUCTION_NAME, plan.output_folder / PAGE_NAME
-    write_reproduction(document, reproduction, provenance)
+    document_path, report_path = plan.output_folder / REPRODUCTION_NAME, plan.output_folder / PAGE_NAME
+    write_reproduction(document_path, reproduction, provenance)
     page_html = render_reproduction_report(reproduction, pictures, _format_provenance(provenance), format_local_now())
-    write_text(report, page_html, overwrite=True)
+    write_text(report_path, page_html, overwrite=True)
     on_share(1.0)
-    return WrittenReproduction(reproduction, summarise_figures(reproduction), document, report)
+    return WrittenReproduction(reproduction, summarise_figures(reproduction), document_path, report_path)
 
 
 def _make_document(
     plan: ReproductionPlan,
     results: ReproductionResults,
     bands: tuple[FrequencyBand, ...],
-    limit_hz: float | None,
-    used_limit_hz: float,
+    direction_limit_hz: float | None,
+    band_limit_hz: float,
 ) -> Reproduction:
-    """Make the document: findings on each figure, playback rows, baselines and models. limit_hz: limit of direction
-    from the thresholds, None without one; used_limit_hz: the limit that separates the bands (Hz)."""
-    playback = results.played
+    """Make the document: findings on each figure, playback rows, baselines and models. direction_limit_hz: highest
+    frequency at which the thresholds show direction to be felt, None without one; band_limit_hz: the limit that
+    separates the bands (Hz)."""
+    playback = results.equalized_playback
     return Reproduction(
         device=results.device_name,
         subjects=plan.subjects,
@@ -87,7 +88,7 @@ def _make_document(
         band_hz=plan.band_hz,
         order=plan.order,
         figures=(
-            make_band_findings(bands, limit_hz, used_limit_hz),
+            make_band_findings(bands, direction_limit_hz, band_limit_hz),
             make_study_findings(results.study),
             make_ellipsoid_findings(results.ellipsoids),
             make_response_findings(results.device.response, results.device.resonances, results.device.onset),
@@ -102,9 +103,11 @@ def _make_document(
 def _make_equalization_findings(results: ReproductionResults) -> FigureFindings:
     """Make the findings on figure 5, with the errors of the tested models with and without friction where both are
     known."""
-    with_friction, frictionless = results.tested, results.tested_frictionless
+    with_friction, frictionless = results.held_out_test, results.frictionless_test
     errors = (with_friction.error, frictionless.error) if with_friction and frictionless else None
-    return make_equalized_findings(results.played.rows, errors, (*results.remarks, *results.played.remarks))
+    return make_equalized_findings(
+        results.equalized_playback.rows, errors, (*results.remarks, *results.equalized_playback.remarks)
+    )
 
 
 def _format_provenance(provenance: Provenance) -> dict[str, str]:

@@ -30,7 +30,8 @@ class RunGroups:
 
 def find_runs(arrays: Mapping[str, npt.NDArray[Any]], min_samples: int) -> RunGroups:
     """Find the runs in a file, by the separator that gives the largest number of arrays in runs. Each run must contain
-    an array of at least `min_samples` values; without two such runs the result is empty. arrays: by name."""
+    an array of at least `min_samples` values; without two such runs the result is empty. arrays: in the order of the
+    file, by name."""
     long_array_names = [name for name, array in arrays.items() if array.size >= min_samples]
     candidates = [_group_arrays(tuple(arrays), long_array_names, separator) for separator in _SEPARATORS]
     return max(candidates, key=lambda groups: len(groups.prefixes) * len(groups.names))
@@ -39,7 +40,7 @@ def find_runs(arrays: Mapping[str, npt.NDArray[Any]], min_samples: int) -> RunGr
 def _group_arrays(names: Sequence[str], long_names: Sequence[str], separator: str) -> RunGroups:
     """Find the runs by one separator: the prefixes that are followed by the most common set of names. long_names: names
     of arrays of which each run must contain at least one."""
-    members: dict[str, list[str]] = {}
+    stems_by_prefix: dict[str, list[str]] = {}
     for name in names:
         run_prefix, found_separator, stem = _split_name(name, separator)
         if (
@@ -47,17 +48,17 @@ def _group_arrays(names: Sequence[str], long_names: Sequence[str], separator: st
             and stem
             and (separator not in _AMBIGUOUS_SEPARATORS or any(letter.isdigit() for letter in run_prefix))
         ):
-            members.setdefault(run_prefix + found_separator, []).append(stem)
-    stem_counts = Counter(tuple(sorted(stems)) for stems in members.values())
-    common_stems, count = stem_counts.most_common(1)[0] if stem_counts else ((), 0)
+            stems_by_prefix.setdefault(run_prefix + found_separator, []).append(stem)
+    stem_counts = Counter(tuple(sorted(stems)) for stems in stems_by_prefix.values())
+    common_stems, prefix_count = stem_counts.most_common(1)[0] if stem_counts else ((), 0)
     prefixes = [
         prefix
-        for prefix, stems in members.items()
+        for prefix, stems in stems_by_prefix.items()
         if tuple(sorted(stems)) == common_stems and any(prefix + name in long_names for name in stems)
     ]
-    if count < 2 or len(prefixes) < 2:
+    if prefix_count < 2 or len(prefixes) < 2:
         return RunGroups((), {})
-    return RunGroups(tuple(prefixes), {name: prefixes[0] + name for name in members[prefixes[0]]})
+    return RunGroups(tuple(prefixes), {name: prefixes[0] + name for name in stems_by_prefix[prefixes[0]]})
 
 
 def _split_name(name: str, separator: str) -> tuple[str, str, str]:

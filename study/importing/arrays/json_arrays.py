@@ -1,7 +1,8 @@
 """Read arrays from JSON files; called by `study.importing.arrays.read_arrays`.
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
-record per line). Arrays inside an object have its name as prefix (`run1/u`), unless it is the only object with arrays.
+record per line; https://jsonlines.org). Arrays inside an object have its name as prefix (`run1/u`), unless it is the
+only object with arrays.
 """
 
 import re
@@ -21,15 +22,16 @@ from study.store.disk.strict_json import load_json
 Array = npt.NDArray[Any]
 """Array of numbers or texts, or a placeholder (an object array with one entry) for one that is not read."""
 MAX_JSON_BYTES = 2**26
-"""Largest JSON file in bytes (64 MiB). Chosen: parsed, it takes about twenty times as much memory."""
+"""Largest size of a JSON file (bytes; 64 MiB). Chosen: parsed, it takes about twenty times as much memory."""
 _MAX_OBJECTS, _MAX_VALUES = 2**21, 2**24
-"""Most objects and lists of a file, each of which takes hundreds of bytes of memory, and most values of it. Chosen."""
+"""Largest number of objects and lists of a file, each of which takes hundreds of bytes of memory, and of its values, by
+its commas. Chosen."""
 _HAPTEQ_FORMAT_PREFIX = "hapteq"
 """Beginning of the names of the formats that hapteq writes."""
 _HAPTEQ_FORMAT_PATTERN = re.compile(rb'"format"\s*:\s*"hapteq')
 """Bytes in which a document declares one of these formats."""
 _SEARCHED_BYTES = 4096
-"""Bytes at the start of a file that are searched for `_HAPTEQ_FORMAT_PATTERN`."""
+"""Number of bytes at the start of a file that are searched for `_HAPTEQ_FORMAT_PATTERN`. Chosen."""
 _UNIT_KEYS = ("unit", "units")
 """Keys that state the unit of the values in the same object."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
@@ -43,7 +45,7 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
         text = read_regular(path, MAX_JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as problem:
         raise ValueError(f"it is no UTF-8 text (byte {problem.start}), as JSON is; save it as UTF-8") from problem
-    document = _parse(text)
+    document = _parse_document(text)
     if isinstance(document, dict) and str(document.get("format", "")).startswith(_HAPTEQ_FORMAT_PREFIX):
         raise ValueError(f"it is a hapteq document ({document['format']}), and holds no recording")
     arrays = dict(_find_arrays(document, ()))
@@ -56,12 +58,12 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
 
 
 def is_hapteq_document(path: Path) -> bool:
-    """Whether the beginning of a JSON file declares a format that hapteq writes."""
+    """Whether the beginning of a JSON file declares a format that hapteq writes. Raises OSError."""
     with open_regular(path) as file:
         return _HAPTEQ_FORMAT_PATTERN.search(file.read(_SEARCHED_BYTES)) is not None
 
 
-def _parse(text: str) -> Any:
+def _parse_document(text: str) -> Any:
     """Parse a JSON text to its document, or JSON Lines to a list of records. Raises ValueError for another text, or too
     much content."""
     if text.count("{") + text.count("[") > _MAX_OBJECTS or text.count(",") > _MAX_VALUES:
@@ -69,24 +71,24 @@ def _parse(text: str) -> Any:
     try:
         return load_json(text, with_nan=True)
     except ValueError as json_error:
-        lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
+        lines = [(line_number, line) for line_number, line in enumerate(text.splitlines(), start=1) if line.strip()]
         if len(lines) < 2:
             raise ValueError(f"this is no JSON: {json_error}") from json_error
         try:
-            records = [_parse_record(number, line) for number, line in lines]
+            records = [_parse_record(line_number, line) for line_number, line in lines]
         except ValueError as lines_error:
             raise ValueError(f"this is neither JSON ({json_error}) nor lines of it ({lines_error})") from lines_error
         return records
 
 
-def _parse_record(number: int, line: str) -> Any:
+def _parse_record(line_number: int, line: str) -> Any:
     """Parse the record on one line. Raises ValueError unless it is a JSON object."""
     try:
         record = load_json(line, with_nan=True)
     except ValueError as problem:
-        raise ValueError(f"line {number}: {problem}") from problem
+        raise ValueError(f"line {line_number}: {problem}") from problem
     if not isinstance(record, dict):
-        raise ValueError(f"line {number} is no record in braces")
+        raise ValueError(f"line {line_number} is no record in braces")
     return record
 
 
@@ -108,7 +110,7 @@ def _find_arrays_in_object(
     value: Mapping[str, Any], key_path: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Find the arrays of an object, each with its path of keys. `{"unit": "N", "values": [...]}` is one array, with the
-    unit in brackets behind its name."""
+    unit in brackets after its name."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     list_keys = [key for key, entry in value.items() if isinstance(entry, list)]
     values_key = list_keys[0] if len(list_keys) == 1 else next((key for key in _VALUE_KEYS if key in list_keys), "")

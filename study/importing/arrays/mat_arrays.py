@@ -1,6 +1,7 @@
 """Read arrays from MAT files of version 5 (Matlab's -v6 and -v7); called by `study.importing.arrays.read_arrays`.
+`header_map`, `map_skeleton` and `expressions.namespace` take from here the advice on arrays that are not read.
 
-They are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
+The files are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
 memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; texts, objects, functions
 and sparse matrices are replaced by placeholders with their kind, a complex array by 0j. Format: MAT-File Level 5,
 MathWorks, 2010.
@@ -46,7 +47,7 @@ _CONVERSIONS = {
     "class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
     "class table": "{name} = table2struct({name}, 'ToScalar', true)",
 }
-"""Matlab statement that makes a readable array of one that is not read, by a part of its description."""
+"""Matlab statement that converts an array that is not read to a readable one, by a part of its description."""
 
 
 def suggest_conversion(name: str, kind: str) -> str:
@@ -67,11 +68,12 @@ class _CellArrays(tuple[Array, ...]):
 
 
 class _ElementReader:
-    """Sequential reader of data elements, from `position` onwards. order: byte order of the file, `<` or `>`."""
+    """Sequential reader of data elements, from `position` onwards. content: bytes of the file or of an element;
+    byte_order: of the file, `<` or `>`."""
 
-    def __init__(self, content: memoryview, order: str) -> None:
+    def __init__(self, content: memoryview, byte_order: str) -> None:
         self.content = content
-        self.order = order
+        self.byte_order = byte_order
         self.position = 0
 
     @property
@@ -80,11 +82,12 @@ class _ElementReader:
         return len(self.content) - self.position
 
     def read_element(self) -> "tuple[int, _ElementReader]":
-        """Read data type and content of the next element; `position` moves to its end. Raises ValueError if it is
-        longer than the rest of the file."""
+        """Read data type and content of the next element; `position` moves to its end. An element is a tag of 8 bytes,
+        data type and size, and its data, padded to a multiple of 8 bytes unless compressed. Raises ValueError if it is
+        longer than the rest of the content."""
         if self.remaining < 8:
             raise ValueError("it is cut off")
-        data_type, size = struct.unpack_from(self.order + "II", self.content, self.position)
+        data_type, size = struct.unpack_from(self.byte_order + "II", self.content, self.position)
         start, is_padded = self.position + 8, True
         if data_type >> 16:  # data of up to four bytes are stored in the tag itself
             data_type, size, start = data_type & 0xFFFF, data_type >> 16, self.position + 4
@@ -94,29 +97,31 @@ class _ElementReader:
         self.position = self.position + 8 if not is_padded else start + size
         if is_padded and data_type != _COMPRESSED:
             self.position = min(start + -(-size // 8) * 8, len(self.content))
-        return data_type, _ElementReader(self.content[start : start + size], self.order)
+        return data_type, _ElementReader(self.content[start : start + size], self.byte_order)
 
     def read_numbers(self) -> Array:
         """Read the numbers of the next element. Raises ValueError if its data type is not numeric."""
         data_type, element = self.read_element()
         if data_type not in _NUMBER_TYPES:
             raise ValueError(f"an element of the type {data_type} is found where numbers are needed")
-        return np.frombuffer(element.content, np.dtype(self.order + _NUMBER_TYPES[data_type]))
+        return np.frombuffer(element.content, np.dtype(self.byte_order + _NUMBER_TYPES[data_type]))
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
     """Read all arrays of a file by name: fields of structures as `data.u`, entries of a cell as `2-of-6/u`. Raises
-    OSError; ValueError where the file is no MAT file of version 5, damaged or too large."""
+    OSError; ValueError where the file is no MAT file of version 5 or too large; any of `DAMAGE_ERRORS` where it is
+    damaged."""
+    # The last two bytes of the header state the byte order.
     content = read_regular(path, MAX_MAT_BYTES)
     if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
-    limit = SizeLimit(len(content))
+    size_limit = SizeLimit(len(content))
     reader = _ElementReader(memoryview(content)[_HEADER_BYTES:], "<" if content[126:128] == b"IM" else ">")
     arrays: dict[str, Array] = {}
     while reader.remaining >= 8:
         data_type, element = reader.read_element()
         if data_type == _COMPRESSED:
-            data_type, element = _decompress(element, limit).read_element()
+            data_type, element = _decompress(element, size_limit).read_element()
         if data_type == _MATRIX:
             name, value = _read_matrix(element, 0)
             if name and not name.startswith("__"):  # the contents of objects have no name
@@ -124,14 +129,15 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
     return arrays
 
 
-def _decompress(compressed: _ElementReader, limit: SizeLimit) -> _ElementReader:
-    """Decompress a variable. Raises DeclaredSizeError where it is larger than the limit."""
+def _decompress(compressed: _ElementReader, size_limit: SizeLimit) -> _ElementReader:
+    """Decompress a variable. Raises DeclaredSizeError where it is larger than the limit, zlib.error where it is
+    damaged."""
     decompressor = zlib.decompressobj()
-    content = decompressor.decompress(compressed.content, limit.limit_bytes)
+    content = decompressor.decompress(compressed.content, size_limit.limit_bytes)
     if decompressor.unconsumed_tail:
-        limit.add_size("a compressed variable", limit.limit_bytes + 1)
-    limit.add_size("a compressed variable", len(content))
-    return _ElementReader(memoryview(content), compressed.order)
+        size_limit.add_size("a compressed variable", size_limit.limit_bytes + 1)
+    size_limit.add_size("a compressed variable", len(content))
+    return _ElementReader(memoryview(content), compressed.byte_order)
 
 
 def _read_matrix(element: _ElementReader, depth: int) -> tuple[str, Any]:
@@ -173,7 +179,7 @@ def _read_numeric(element: _ElementReader, shape: tuple[int, ...], number_type: 
     return values.astype(number_type).reshape(shape, order="F")
 
 
-def _read_structures(element: _ElementReader, count: int, depth: int) -> dict[str, Any]:
+def _read_structures(element: _ElementReader, structure_count: int, depth: int) -> dict[str, Any]:
     """Read the fields of a structure by name; for an array of structures, those of each under its number, as in
     `signals.2`. Raises ValueError where it is damaged."""
     name_length = int(element.read_numbers()[0])
@@ -184,20 +190,27 @@ def _read_structures(element: _ElementReader, count: int, depth: int) -> dict[st
         name_bytes[offset : offset + name_length].split(b"\0")[0].decode("utf-8", "replace")
         for offset in range(0, len(name_bytes), name_length)
     ]
-    if count * len(field_names) * 8 > element.remaining:
-        raise ValueError(f"{count} structures of {len(field_names)} fields are longer than the rest of the file")
+    if structure_count * len(field_names) * 8 > element.remaining:
+        raise ValueError(
+            f"{structure_count} structures of {len(field_names)} fields are longer than the rest of the file"
+        )
     structures = [
-        {field_name: _read_field(element, field_name, depth) for field_name in field_names} for _ in range(count)
+        {field_name: _read_field(element, field_name, depth) for field_name in field_names}
+        for _ in range(structure_count)
     ]
-    return structures[0] if count == 1 else {str(number): fields for number, fields in enumerate(structures, start=1)}
+    return (
+        structures[0]
+        if structure_count == 1
+        else {str(number): fields for number, fields in enumerate(structures, start=1)}
+    )
 
 
-def _read_cells(element: _ElementReader, count: int, depth: int) -> Any:
+def _read_cells(element: _ElementReader, cell_count: int, depth: int) -> Any:
     """Read the arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side;
     otherwise a placeholder. Raises ValueError where it is damaged."""
-    if count * 8 > element.remaining:
-        raise ValueError(f"a cell of {count} arrays is longer than the rest of the file")
-    arrays = [_read_field(element, f"{number}", depth) for number in range(1, count + 1)]
+    if cell_count * 8 > element.remaining:
+        raise ValueError(f"a cell of {cell_count} arrays is longer than the rest of the file")
+    arrays = [_read_field(element, f"{number}", depth) for number in range(1, cell_count + 1)]
     if not arrays or not all(
         isinstance(array, np.ndarray) and array.dtype.kind in "fiu" and array.size for array in arrays
     ):

@@ -41,7 +41,7 @@ HDF5_ENDINGS = (".h5", ".hdf5")
 FOREIGN_ENDINGS = (*TABLE_ENDINGS, *WORKBOOK_ENDINGS, *JSON_ENDINGS, ".npz", ".npy", ".mat")
 """Endings of files that never hold recordings in hapteq's own format; HDF5 files may."""
 
-_CHECK_FILE = "Check the file; nothing else can be read from it."
+_CHECK_FILE_ADVICE = "Check the file; nothing else can be read from it."
 """Remedy for a file that is damaged or of the wrong kind."""
 IMPORT_AGAIN = "Do that, and import again; docs/importing.md lists the keys of a map."
 """Remedy for messages of the form "cause; remedy", which already state what to correct."""
@@ -53,6 +53,7 @@ class Arrays:
 
     path: Path
     by_name: Mapping[str, Array]
+    """Arrays by name, in the order of the file."""
     clocks: tuple[str, ...] = ()
     """Names of arrays of dates or clock times, converted to seconds since the first."""
     notes: tuple[str, ...] = ()
@@ -80,22 +81,23 @@ def read_arrays(path: Path, settings: CsvMap) -> Arrays:
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:
-        content = _read_by_ending(path, settings)
+        table = _read_by_ending(path, settings)
     except UnusableFileError as refused:
-        raise ImportRefusedError(path.name, refused.happened, _CHECK_FILE) from refused
+        raise ImportRefusedError(path.name, refused.happened, _CHECK_FILE_ADVICE) from refused
     except DAMAGE_ERRORS as problem:
         message = str(problem) or type(problem).__name__
         # Messages of this program have the form "cause; remedy"; those of a library give only the cause.
-        raise ImportRefusedError(path.name, message, IMPORT_AGAIN if "; " in message else _CHECK_FILE) from problem
-    if not content.by_name:
+        raise ImportRefusedError(
+            path.name, message, IMPORT_AGAIN if "; " in message else _CHECK_FILE_ADVICE
+        ) from problem
+    if not table.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
-    return Arrays(
-        path, {name: np.squeeze(array) for name, array in content.by_name.items()}, content.clocks, content.notes
-    )
+    return Arrays(path, {name: np.squeeze(array) for name, array in table.by_name.items()}, table.clocks, table.notes)
 
 
 def _read_by_ending(path: Path, settings: CsvMap) -> Table:
-    """Read a file by its ending: columns of a text table or of the sheets of a workbook, or arrays of another file."""
+    """Read a file by its ending: columns of a text table or of the sheets of a workbook, or arrays of another file.
+    Raises the errors of the reader of the format."""
     if path.suffix.lower() in TABLE_ENDINGS:
         return read_csv_arrays(path, settings)
     if path.suffix.lower() in WORKBOOK_ENDINGS:
@@ -113,7 +115,7 @@ def _read_non_table(path: Path) -> dict[str, Array]:
             return read_json_arrays(path)
         case ".mat":
             return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
-        case kind if kind in HDF5_ENDINGS:
+        case ending if ending in HDF5_ENDINGS:
             return read_hdf5_arrays(path, transposed=False)
         case ".xls" | ".ods" | ".xlsb":
             raise ValueError("it is a workbook of another kind; save it as .xlsx, or the sheet as .csv")

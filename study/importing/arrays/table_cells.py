@@ -24,8 +24,8 @@ COMMENT_MARKS = ("#", "%")
 """Marks with which a comment line begins."""
 _SPREADSHEET_ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """Cells of a spreadsheet that look like the beginning of a comment but are not."""
-_LONGEST_ERROR_LENGTH = 8
-"""Characters of a spreadsheet's longest error value, such as `#DIV/0!`."""
+_COMPARED_LENGTH = 8
+"""Number of characters of a line that are compared with `_SPREADSHEET_ERRORS`, the longest of which has 7."""
 _NUMBER_LIKE = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
 """A field that begins like a number, date or clock time; `rest` is the text behind that."""
 _BRACKETED = re.compile(r"[\[(].*[\])]")
@@ -35,12 +35,12 @@ _BRACKETED = re.compile(r"[\[(].*[\])]")
 def is_comment(line: str) -> bool:
     """Whether a line begins with # or %, and not with an error value of a spreadsheet, such as `#N/A`."""
     text = line.lstrip()
-    return text.startswith(COMMENT_MARKS) and not text[:_LONGEST_ERROR_LENGTH].lower().startswith(_SPREADSHEET_ERRORS)
+    return text.startswith(COMMENT_MARKS) and not text[:_COMPARED_LENGTH].lower().startswith(_SPREADSHEET_ERRORS)
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
-    """Split a line into stripped fields; none for an empty line. Where blanks delimit, a name and its unit in brackets
-    (`force [N]`) are one field."""
+    """Split a line into stripped fields; none for an empty line. With blanks as delimiters, a name and its unit in
+    brackets (`force [N]`) are one field."""
     if not line:
         return []
     if delimiter == " " and '"' not in line:
@@ -57,7 +57,7 @@ def split_row(line: str, delimiter: str) -> list[str]:
 
 def is_number(field: str, decimal: str) -> bool:
     """Whether a field is a number (also infinite) or stands for a missing one. decimal: decimal sign; with a comma, a
-    field with a point is no number: the point would separate thousands."""
+    field with a point between digits is no number: the point would separate thousands."""
     if "_" in field:  # Python reads 1_000 as 1000, but in files it is a label
         return False
     try:
@@ -96,10 +96,10 @@ def is_unit(text: str) -> bool:
 
 def has_data(fields: Sequence[str], decimal: str) -> bool:
     """Whether any field is a number in any notation, a date or a clock time, none of which occurs in a header."""
-    return has_number(fields, decimal) or any(is_stamp(field) or _is_spelled_number(field) for field in fields)
+    return has_number(fields, decimal) or any(is_stamp(field) or _is_number_in_any_notation(field) for field in fields)
 
 
-def _is_spelled_number(field: str) -> bool:
+def _is_number_in_any_notation(field: str) -> bool:
     """Whether a field is a number, date or clock time in any notation, without text behind it."""
     match = _NUMBER_LIKE.fullmatch(field)
     return match is not None and not match["rest"]
@@ -121,13 +121,13 @@ def find_first_number_row(
     rows: Sequence[Line], delimiter: str, decimal: str, text_columns: Collection[int] = ()
 ) -> int | None:
     """Find the index of the first row of numbers, or of the first of the rows directly above it that are as wide and in
-    which every number is missing; None without a row of numbers."""
+    which every number is missing; None without a row of numbers. text_columns: as in `are_numbers`."""
     split_rows = (split_row(text, delimiter) for _, text in rows)
-    first_row = next(
+    first_index_and_width = next(
         ((row_index, len(row)) for row_index, row in enumerate(split_rows) if are_numbers(row, decimal, text_columns)),
         None,
     )
-    index, width = first_row or (None, 0)
+    index, width = first_index_and_width or (None, 0)
     while index:
         fields_above = split_row(rows[index - 1][1], delimiter)
         if len(fields_above) != width or not all(is_empty(field) or is_stamp(field) for field in fields_above):

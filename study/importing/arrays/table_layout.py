@@ -43,6 +43,7 @@ class TableLayout:
 
     delimiter: str
     decimal: str
+    """Decimal sign, "." or ","."""
     names: tuple[str, ...]
     """Column names, with the unit in brackets where a row of units states it."""
     body: Sequence[Line]
@@ -67,15 +68,15 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
         return _make_named_layout(rows, first_row, marks, settings)
     kept_rows, notes = _drop_trailing_remarks(rows, first_row, marks)
     header_fields = _collect_header_rows(lines, kept_rows, first_row, marks.delimiter)
-    faulty_count = _count_faulty_rows(
+    faulty_row_count = _count_faulty_rows(
         kept_rows[:first_row], len(split_row(kept_rows[first_row][1], marks.delimiter)), marks
     )
     min_columns = max(
-        [len(settings.names), *map(count_filled_fields, header_fields[: len(header_fields) - faulty_count][-2:])]
+        [len(settings.names), *map(count_filled_fields, header_fields[: len(header_fields) - faulty_row_count][-2:])]
     )
     rows = [
-        *kept_rows[: first_row - faulty_count],
-        *_strip_empty_ends(kept_rows[first_row - faulty_count :], marks.delimiter, min_columns),
+        *kept_rows[: first_row - faulty_row_count],
+        *_strip_empty_ends(kept_rows[first_row - faulty_row_count :], marks.delimiter, min_columns),
     ]
     if settings.names:
         return replace(_make_named_layout(rows, first_row, marks, settings), notes=notes)
@@ -83,9 +84,9 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     column_count = len(fields)
     fitted_headers = [_fit_header(row, fields, marks.delimiter) for row in header_fields]
     header, units = _split_header_and_units(fitted_headers, column_count, marks.decimal)
-    if header is None and faulty_count:
-        header, units = _split_header_and_units(fitted_headers[:-faulty_count], column_count, marks.decimal)
-        first_row -= 0 if header is None else faulty_count
+    if header is None and faulty_row_count:
+        header, units = _split_header_and_units(fitted_headers[:-faulty_row_count], column_count, marks.decimal)
+        first_row -= 0 if header is None else faulty_row_count
     if header is not None:
         names = append_units(_name_columns(header), units)
     elif first_row == 0 or (
@@ -118,11 +119,11 @@ def _strip_empty_ends(body: Sequence[Line], delimiter: str, min_columns: int) ->
     if delimiter == " ":
         return body
     surplus_delimiters = len(split_row(body[0][1], delimiter)) - max(min_columns, 1)
-    blanks = f" \t{delimiter}"
+    stripped_characters = f" \t{delimiter}"
     for _, text in body:
         if surplus_delimiters < 1:
             return body
-        surplus_delimiters = min(surplus_delimiters, text.count(delimiter, len(text.rstrip(blanks))))
+        surplus_delimiters = min(surplus_delimiters, text.count(delimiter, len(text.rstrip(stripped_characters))))
     return [(number, text.rsplit(delimiter, surplus_delimiters)[0]) for number, text in body]
 
 
@@ -130,7 +131,7 @@ def _drop_trailing_remarks(
     rows: Sequence[Line], first_row: int, marks: TableMarks
 ) -> tuple[Sequence[Line], tuple[str, ...]]:
     """Drop lines of words below the last row of numbers, such as `End of file`. Returns the remaining rows, and a
-    sentence about each dropped line."""
+    sentence about each dropped line, with its first 60 characters (chosen)."""
     width, row_stop = len(split_row(rows[first_row][1], marks.delimiter)), len(rows)
     while row_stop > first_row + 1:
         fields = [field for field in split_row(rows[row_stop - 1][1], marks.delimiter) if field]
@@ -190,11 +191,13 @@ def _is_marked_header(fields: list[str], widths: range, delimiter: str) -> bool:
 
 
 def _find_header_row(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
-    """Find the index of the first row above the numbers with the same width, without a number and not of units;
-    otherwise 0."""
+    """Find the index of the first row above the numbers with the same width, without a number and not of units; 0 where
+    there is none."""
     split_rows = [split_row(text, marks.delimiter) for _, text in rows_above]
-    is_header = [len(row) == width and not has_number(row, marks.decimal) and not _are_units(row) for row in split_rows]
-    return is_header.index(True) if True in is_header else 0
+    header_mask = [
+        len(row) == width and not has_number(row, marks.decimal) and not _are_units(row) for row in split_rows
+    ]
+    return header_mask.index(True) if True in header_mask else 0
 
 
 def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> list[str]:
@@ -218,7 +221,7 @@ def _split_header_and_units(
     rows_above: Sequence[list[str]], width: int, decimal: str
 ) -> tuple[list[str] | None, list[str] | None]:
     """Split the rows directly above the numbers into header and row of units. The header is None without a row of the
-    right width that holds no data; the units are None without a row of units."""
+    right width that holds no data; the units are None without a row of units or without a header above it."""
     full_rows = [fields if len(fields) == width else None for fields in rows_above]
     last_row = full_rows[-1] if full_rows else None
     header = full_rows[-2] if len(full_rows) > 1 else None
@@ -229,10 +232,10 @@ def _split_header_and_units(
 
 def _are_units(fields: Sequence[str]) -> bool:
     """Whether each field is a known unit, in brackets or not, or empty; or whether all texts are in brackets."""
-    texts = [field for field in fields if field.lower() not in _UNITLESS]
-    return bool(texts) and (
-        all(is_unit(_strip_brackets(field)) for field in texts)
-        or all(_strip_brackets(field) != field for field in texts)
+    unit_texts = [field for field in fields if field.lower() not in _UNITLESS]
+    return bool(unit_texts) and (
+        all(is_unit(_strip_brackets(field)) for field in unit_texts)
+        or all(_strip_brackets(field) != field for field in unit_texts)
     )
 
 
@@ -254,12 +257,19 @@ def append_units(header: Sequence[str], units: Sequence[str] | None) -> list[str
         return list(header)
     names = []
     for name, field in zip(header, units, strict=True):
-        unit_text, parsed = _strip_brackets(field), parse_signal_name(name)
+        unit_text, parsed_name = _strip_brackets(field), parse_signal_name(name)
         unit = normalise_unit(unit_text)
         if unit.lower() in _UNITLESS:
             names.append(name)
             continue
-        if parsed.unit and parsed.is_certain and is_unit(unit) and parse_unit(parsed.unit) != parse_unit(unit):
-            raise ValueError(f"its header says {parsed.unit} in '{name}', and its row of units says {unit}")
-        names.append(name if parsed.unit == unit else f"{name} [{unit_text if is_peak_value(unit_text) else unit}]")
+        if (
+            parsed_name.unit
+            and parsed_name.is_certain
+            and is_unit(unit)
+            and parse_unit(parsed_name.unit) != parse_unit(unit)
+        ):
+            raise ValueError(f"its header says {parsed_name.unit} in '{name}', and its row of units says {unit}")
+        names.append(
+            name if parsed_name.unit == unit else f"{name} [{unit_text if is_peak_value(unit_text) else unit}]"
+        )
     return names

@@ -1,5 +1,5 @@
 """Detect delimiter, decimal sign and columns of words of a table: the choice by which most rows consist of numbers.
-Called by `table_layout`."""
+Called by `table_layout`; `csv_arrays` uses the advice on thousands."""
 
 import re
 from collections import Counter
@@ -35,15 +35,17 @@ class TableMarks:
 
     delimiter: str
     decimal: str
+    """Decimal sign, "." or ","."""
     texts: frozenset[int] = frozenset()
     """Indices of the columns of words."""
 
 
 def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
-    """Find delimiter and decimal sign. Pairs are ranked in this order: as many columns as the map names; most rows of
-    numbers; tabs before blanks in a table with tabs; a line above the numbers that has as many fields; most columns.
-    Columns of words are assumed where more rows consist of numbers with them. If no row consists of numbers, the
-    delimiter is taken that splits most rows alike. Raises ValueError where a comma or point is ambiguous."""
+    """Find delimiter and decimal sign. Pairs are ranked by these criteria in turn: as many columns as the map names;
+    most rows of numbers; tabs before blanks in a table with tabs; a line above the numbers that has as many fields;
+    most columns. Columns of words are assumed where more rows consist of numbers with them. If no row consists of
+    numbers, the delimiter is taken that splits most rows alike. Raises ValueError where a comma or point is
+    ambiguous."""
     sample = rows[:: max(len(rows) // _SAMPLE_ROWS, 1)]
     has_tabs = all("\t" in text for _, text in sample[len(sample) // 2 :])
     best_rank, marks = (False, 0, False, False, 0), None
@@ -51,26 +53,26 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
         number_rows = _select_number_rows(sample, TableMarks(delimiter, decimal))
         if not number_rows:
             continue
-        columns = Counter(map(len, number_rows)).most_common(1)[0][0]
+        column_count = Counter(map(len, number_rows)).most_common(1)[0][0]
         first_row = find_first_number_row(rows, delimiter, decimal)
         header = rows[first_row - 1][1] if first_row else ""
         header_fields = split_row(header, delimiter)
-        has_fitting_fields = len(header_fields) == columns or count_filled_fields(header_fields) == max(
+        has_fitting_fields = len(header_fields) == column_count or count_filled_fields(header_fields) == max(
             map(count_filled_fields, number_rows)
         )
-        is_header = has_fitting_fields and not _has_delimiter_comma(header, decimal, columns)
+        is_header = has_fitting_fields and not _has_delimiter_comma(header, decimal, column_count)
         rank = (
-            columns == len(settings.names),
+            column_count == len(settings.names),
             len(number_rows),
             not (has_tabs and delimiter == " "),
             is_header,
-            columns,
+            column_count,
         )
         if rank > best_rank:
             best_rank, marks = rank, TableMarks(delimiter, decimal)
-    marks_with_texts = _find_marks_with_texts(sample, settings)
-    if marks_with_texts and len(_select_number_rows(sample, marks_with_texts)) > best_rank[1]:
-        marks = marks_with_texts
+    marks_with_text_columns = _find_marks_with_text_columns(sample, settings)
+    if marks_with_text_columns and len(_select_number_rows(sample, marks_with_text_columns)) > best_rank[1]:
+        marks = marks_with_text_columns
     if marks and marks.decimal == "," and not settings.decimal:
         _refuse_ambiguous_commas(sample, marks)
     if marks and marks.decimal == "." and not settings.decimal:
@@ -94,20 +96,20 @@ def _list_mark_pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple
                 yield delimiter, decimal
 
 
-def _has_delimiter_comma(header: str, decimal: str, columns: int) -> bool:
+def _has_delimiter_comma(header: str, decimal: str, column_count: int) -> bool:
     """Whether the line above rows with a decimal comma shows that commas are delimiters: a line with a comma (`t,u,`
     above `0,1`), or a remark of several words (`Rig 3`) above a single column."""
     if decimal != ",":
         return False
     parsed_name = parse_signal_name(header)
-    is_remark = columns == 1 and len(header.split()) > 1 and not parsed_name.unit and not parsed_name.quantity
+    is_remark = column_count == 1 and len(header.split()) > 1 and not parsed_name.unit and not parsed_name.quantity
     return ("," in header and '"' not in header) or is_remark
 
 
-def _find_marks_with_texts(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
+def _find_marks_with_text_columns(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
     """Find the marks with the most columns of numbers where other columns hold words; None if there are none. Only the
     lower half of the rows is used, which is below any header."""
-    most_number_columns, marks = 0, None
+    max_number_columns, marks = 0, None
     for delimiter, decimal in _list_mark_pairs(sample, settings):
         rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
         columns = list(zip(*rows, strict=True)) if len({len(row) for row in rows}) == 1 else []
@@ -115,8 +117,8 @@ def _find_marks_with_texts(sample: Sequence[Line], settings: CsvMap) -> TableMar
         are_texts = all(is_text(field) or is_empty(field) for column in text_columns for field in columns[column])
         if are_texts and rows and all(are_numbers(row, decimal, text_columns) for row in rows):
             number_columns = sum(has_number(fields, decimal) for fields in columns)
-            if number_columns > most_number_columns:
-                most_number_columns, marks = number_columns, TableMarks(delimiter, decimal, text_columns)
+            if number_columns > max_number_columns:
+                max_number_columns, marks = number_columns, TableMarks(delimiter, decimal, text_columns)
     return marks
 
 
@@ -141,9 +143,9 @@ def _refuse_ambiguous_commas(sample: Sequence[Line], marks: TableMarks) -> None:
 def _refuse_ambiguous_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
     """Raise ValueError where each point in a column may separate thousands, as in a column with 1.886 and 946."""
     columns = list(zip(*_select_number_rows(sample, marks), strict=False))
-    for column in (column for column, fields in enumerate(columns) if _may_be_thousands(fields)):
+    for column in (column for column, fields in enumerate(columns) if _may_separate_thousands(fields)):
         all_fields = [fields[column] for fields in _select_number_rows(rows, marks) if len(fields) > column]
-        if _may_be_thousands(all_fields):
+        if _may_separate_thousands(all_fields):
             example = next(field for field in all_fields if "." in field)
             raise ValueError(
                 f"the point in '{example}' may separate thousands, for smaller numbers of its column have none; where "
@@ -151,7 +153,7 @@ def _refuse_ambiguous_points(rows: Sequence[Line], sample: Sequence[Line], marks
             )
 
 
-def _may_be_thousands(fields: Sequence[str]) -> bool:
+def _may_separate_thousands(fields: Sequence[str]) -> bool:
     """Whether some numbers of a column have points that may separate thousands, and the others have at most three
     digits."""
     numbers = [field for field in fields if not is_empty(field)]
@@ -171,7 +173,7 @@ def _guess_delimiter(sample: Sequence[Line], decimal: str) -> str:
     def rank_delimiter(delimiter: str) -> tuple[int, int]:
         """Rank a delimiter by the number of rows with the most common number of fields, and that number; (0, 1) if rows
         are not split."""
-        width, rows = Counter(len(split_row(text, delimiter)) for text in lower_rows).most_common(1)[0]
-        return (rows, width) if width > 1 else (0, 1)
+        width, row_count = Counter(len(split_row(text, delimiter)) for text in lower_rows).most_common(1)[0]
+        return (row_count, width) if width > 1 else (0, 1)
 
     return max((delimiter for delimiter in _DELIMITERS if delimiter != decimal), key=rank_delimiter)

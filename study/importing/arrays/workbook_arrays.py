@@ -31,16 +31,16 @@ _OLE2_SIGNATURE = b"\xd0\xcf\x11\xe0"
 _DELIMITER = "\t"
 """Delimiter of the lines that are made from a sheet."""
 _MAX_ROWS, _MAX_COLUMNS = 2**20, 2**14
-"""Most rows and columns of a sheet: the limits of Excel."""
+"""Largest number of rows and columns of a sheet: the limits of Excel."""
 _MAX_CELLS = 2**24
-"""Most cells that are read from a sheet; in each row those up to the last filled one count. Chosen."""
+"""Largest number of cells that are read from a sheet; in each row those up to the last filled one count. Chosen."""
 _MAX_CELLS_IN_XML = 2**22
-"""Most cells in the XML of a sheet, filled or only formatted. Chosen: each takes about 0.1 ms, together 7 minutes; a
-text table is read a hundred times faster."""
+"""Largest number of cells in the XML of a sheet, filled or only formatted. Chosen: each takes about 0.1 ms, together 7
+minutes; a text table is read a hundred times faster."""
 _FORMULA_WITHOUT_VALUE = re.compile(rb'<c (?![^<>]*t="str")[^<>]*><f[^<>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>')
 """Matches, in the XML of a sheet, a cell that has a formula but no stored value and is not of type text."""
-_PERCENT_WORD = re.compile(r"%|percent|pct", re.IGNORECASE)
-"""Words in a text cell that mark its column as percentages."""
+_PERCENT_PATTERN = re.compile(r"%|percent|pct", re.IGNORECASE)
+"""Matches, in a text cell such as a header, a word that states that its column holds percentages."""
 
 
 class _UnreadSheetError(ValueError):
@@ -54,17 +54,17 @@ class _PercentNumber(float):
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
     """Read the arrays of a workbook; only the sheet that `settings.sheet` names, if any. Raises OSError; ValueError,
     with the sheet and the problem, where it is no workbook, too large, or has no rows of numbers."""
-    book = _open_workbook(read_regular(path))
+    workbook = _open_workbook(read_regular(path))
     try:
         hidden_names = [
-            sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible" and not settings.sheet
+            sheet.title for sheet in workbook.worksheets if sheet.sheet_state != "visible" and not settings.sheet
         ]
-        visible_sheets = [sheet for sheet in book.worksheets if sheet.title not in hidden_names]
+        visible_sheets = [sheet for sheet in workbook.worksheets if sheet.title not in hidden_names]
         sheets = {sheet.title: _read_rows(sheet) for sheet in visible_sheets if settings.sheet in ("", sheet.title)}
     finally:
-        book.close()
+        workbook.close()
     if not sheets and settings.sheet:
-        raise ValueError(f"it has no sheet '{settings.sheet}'; there are {', '.join(book.sheetnames) or 'none'}")
+        raise ValueError(f"it has no sheet '{settings.sheet}'; there are {', '.join(workbook.sheetnames) or 'none'}")
     numeric_sheets = {name: rows for name, rows in sheets.items() if any(_is_numeric_row(cells) for _, cells in rows)}
     if not numeric_sheets:
         raise ValueError(f"no sheet of it{' that is not hidden' if hidden_names else ''} holds rows of numbers")
@@ -91,14 +91,14 @@ def _open_workbook(data: bytes) -> "Workbook":
 
     if data.startswith(_OLE2_SIGNATURE):
         raise ValueError("it is of the old kind (.xls), or locked with a password: save it as .xlsx, without password")
-    limit = SizeLimit(len(data))
+    size_limit = SizeLimit(len(data))
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             for member in archive.infolist():
-                limit.add_size(member.filename, member.file_size)
+                size_limit.add_size(member.filename, member.file_size)
             for name in archive.namelist():
                 if name.startswith("xl/worksheets/"):
-                    _require_few_cells(name, archive.read(name))
+                    _require_cell_limit(name, archive.read(name))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # warnings about styles and extensions, which do not affect numbers
             return load_workbook(io.BytesIO(data), read_only=True, data_only=True)
@@ -118,14 +118,17 @@ def _read_rows(sheet: Any) -> list[tuple[int, tuple[Any, ...]]]:
         raise ValueError(f"sheet '{sheet.title}' is damaged") from problem
 
 
-def _require_few_cells(member: str, sheet: bytes) -> None:
-    """Raise ValueError where a sheet has too many cells; they are counted in its XML before that is parsed."""
-    cells, rows = sheet.count(b"<c ") + sheet.count(b"<c>"), sheet.count(b"<row")
-    if cells > min(_MAX_CELLS_IN_XML, rows * _MAX_COLUMNS):
-        raise _UnreadSheetError(f"{member} of it has {cells} cells in {rows} rows; save the sheet as .csv")
+def _require_cell_limit(member_name: str, sheet_xml: bytes) -> None:
+    """Raise ValueError where a sheet has more cells than `_MAX_CELLS_IN_XML`, or than its rows can have; they are
+    counted in its XML before that is parsed."""
+    cell_count, row_count = sheet_xml.count(b"<c ") + sheet_xml.count(b"<c>"), sheet_xml.count(b"<row")
+    if cell_count > min(_MAX_CELLS_IN_XML, row_count * _MAX_COLUMNS):
+        raise _UnreadSheetError(
+            f"{member_name} of it has {cell_count} cells in {row_count} rows; save the sheet as .csv"
+        )
 
 
-def _require_computed(sheet: Any) -> None:
+def _require_stored_values(sheet: Any) -> None:
     """Raise ValueError for formulas whose values were not saved: the program that wrote the file did not compute
     them."""
     with sheet.parent._archive.open(sheet._worksheet_path) as member:  # noqa: SLF001 openpyxl has no public function for it
@@ -138,7 +141,7 @@ def _require_computed(sheet: Any) -> None:
 def _iterate_rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
     """Iterate over the rows with any content: row number from 1, and values up to the last filled cell (None where
     empty). Raises ValueError for too many rows, columns or cells, and for formulas without stored values."""
-    _require_computed(sheet)
+    _require_stored_values(sheet)
     sheet.reset_dimensions()  # some programs state fewer rows than they write
     cell_count = 0
     with warnings.catch_warnings():
@@ -149,7 +152,7 @@ def _iterate_rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
                     f"sheet '{sheet.title}' has cells beyond the {_MAX_ROWS} rows and {_MAX_COLUMNS} columns of one"
                 )
             row = tuple(_read_cell(cell) for cell in cells)
-            filled_width = _count_cells(row)
+            filled_width = _count_filled_cells(row)
             cell_count += filled_width
             if cell_count > _MAX_CELLS:
                 raise _UnreadSheetError(f"it has more than {_MAX_CELLS} cells; save its sheets as .csv")
@@ -172,7 +175,7 @@ def _is_numeric_row(cells: Sequence[Any]) -> bool:
 
 def _is_numeric_text(cell: Any) -> bool:
     """Whether a cell is a text that is a number, with decimal point or comma."""
-    return isinstance(cell, str) and any(has_number([cell.strip()], mark) for mark in (".", ","))
+    return isinstance(cell, str) and any(has_number([cell.strip()], decimal) for decimal in (".", ","))
 
 
 def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMap) -> Table:
@@ -182,7 +185,7 @@ def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: 
         column
         for _, cells in rows
         for column, cell in enumerate(cells)
-        if isinstance(cell, str) and _PERCENT_WORD.search(cell)
+        if isinstance(cell, str) and _PERCENT_PATTERN.search(cell)
     }
     # The numbers of a sheet are written with a point here; texts that are numbers may have point or comma.
     has_fraction = any(isinstance(cell, float) and cell % 1 for _, cells in rows for cell in cells)
@@ -203,7 +206,7 @@ def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: 
     return replace(table, by_name={**table.by_name, **faulty_columns})
 
 
-def _count_cells(cells: Sequence[Any]) -> int:
+def _count_filled_cells(cells: Sequence[Any]) -> int:
     """Count the cells up to the last filled one; 0 if all are empty."""
     return max((count for count, cell in enumerate(cells, start=1) if cell is not None), default=0)
 

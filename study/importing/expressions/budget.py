@@ -2,7 +2,8 @@
 
 A definition may use another one twice, and that one a third one twice: a chain of 40 such definitions computes
 2^40 = 10^12 values, although the map is short. Therefore the cost is counted during evaluation, not estimated from the
-text. Called by `expression` and `namespace`; `build_recording` makes one budget per import.
+text. Called by `expression` and `namespace`; `build_recording` makes a budget per import, `map_library` one
+per recording whose arrays it checks.
 """
 
 from collections.abc import Iterator
@@ -13,13 +14,14 @@ from study.importing.map_format.map_errors import ImportProblemError
 MAX_EXPRESSION_DEPTH = 200
 """Largest nesting depth of an expression, with the definitions that it uses. Chosen: below Python's recursion limit."""
 HELD_NUMBERS, HELD_PER_NUMBER = 20_000_000, 20
-"""Numbers that may be held at once (64-bit: 160 MB), and how many more for each number that the files hold. Chosen."""
+"""Number of array elements that may be held at once (64-bit: 160 MB), and addition to it for each number in the files.
+Chosen."""
 MAX_HELD_NUMBERS = 400_000_000
 """Upper limit of the numbers held at once, for files of any size (3.2 GB). Chosen."""
 COMPUTED_NUMBERS, COMPUTED_PER_NUMBER = 500_000_000, 500
-"""Cost that may be computed in total, in additions of two numbers, and how much more for each number that the files
-hold. Chosen."""
-_OPERATION_COST = 10_000
+"""Total cost that an import may have, in additions of two numbers, and addition to it for each number in the files.
+Chosen."""
+_FIXED_OPERATION_COST = 10_000
 """Fixed cost of a single operation, in additions of two numbers. Chosen."""
 
 
@@ -27,6 +29,7 @@ class Budget:
     """Remaining allowance of one import: numbers held, cost, nesting depth."""
 
     def __init__(self) -> None:
+        # `_held` and `_max_held`: array elements; `_remaining_cost`: additions of two numbers; `_depth`: levels.
         self._max_held = HELD_NUMBERS
         self._remaining_cost = COMPUTED_NUMBERS
         self._held = 0
@@ -42,7 +45,7 @@ class Budget:
         cost_per_number: in additions. Raises ImportProblemError where a limit would be exceeded."""
         if self._held + number_count > self._max_held:
             raise ImportProblemError(f"'{expression}' would give more than {self._max_held} numbers")
-        self._remaining_cost -= _OPERATION_COST + cost_per_number * int(number_count)
+        self._remaining_cost -= _FIXED_OPERATION_COST + cost_per_number * int(number_count)
         if self._remaining_cost < 0:
             raise ImportProblemError(
                 f"'{expression}' takes too long: it and what it uses compute far more numbers than the file holds"
@@ -50,7 +53,7 @@ class Budget:
 
     @contextmanager
     def hold_numbers(self, number_count: int) -> Iterator[None]:
-        """Count a value of this many numbers as held while the block runs."""
+        """Count a value of this many numbers as held in memory while the block runs."""
         self._held += number_count
         try:
             yield

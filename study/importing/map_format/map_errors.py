@@ -1,4 +1,4 @@
-"""Errors of an import, raised throughout `study.importing`: what is wrong, and what to do about it."""
+"""Errors of an import, raised throughout `study.importing`: each states its cause and a remedy."""
 
 import re
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ _LONG_QUOTATION = re.compile(rf"(?<!\w)'([^']{{{_MAX_WORD_LENGTH}}})[^']+'(?!\w)
 """A quotation that is longer than a message may show."""
 
 NOTHING_WRITTEN = "Nothing was written."
-"""Part of every import error: the statement on what was saved."""
+"""Sentence on the saved files in every import error."""
 
 
 class ImportProblemError(ValueError):
@@ -40,8 +40,8 @@ class ImportRefusedError(StudyError):
 
 
 class MapNeededError(WrongUseError):
-    """An import without a map of a file whose arrays are not all understood. reason: what is not understood, a clause;
-    skeleton: text of a map for this file, to be completed."""
+    """An import without a map of a file whose arrays are not all understood. file: its name; reason: what is not
+    understood, a clause; skeleton: text of a map for this file, to be completed."""
 
     def __init__(self, file: str, reason: str, skeleton: str) -> None:
         super().__init__(

@@ -55,22 +55,22 @@ def assign_files(import_map: ImportMap, files: Sequence[Path]) -> tuple[PartFile
 
 
 def _order_files(import_map: ImportMap, files: Sequence[Path]) -> list[Path]:
-    """Order the files by the map's patterns; those of one pattern in the given order. Raises ImportProblemError for
-    a file that fits no pattern."""
+    """Order the files by the map's patterns; those of one pattern in the given order. A file that fits several
+    patterns counts for the first. Raises ImportProblemError for a file that fits no pattern."""
     ranked_paths = []
     for path in files:
-        matching_patterns = [
-            number for number, pattern in enumerate(import_map.files) if fnmatchcase(path.name, pattern)
+        pattern_indices = [
+            pattern_index for pattern_index, pattern in enumerate(import_map.files) if fnmatchcase(path.name, pattern)
         ]
-        if not matching_patterns:
+        if not pattern_indices:
             raise ImportProblemError(f"{path.name} is none of the files of this map ({', '.join(import_map.files)})")
-        ranked_paths.append((matching_patterns[0], path))
+        ranked_paths.append((pattern_indices[0], path))
     return [path for _, path in sorted(ranked_paths, key=lambda entry: entry[0])]
 
 
 def _assign_parallel(import_map: ImportMap, files: Sequence[Path]) -> PartFiles:
-    """Make a single part with a file for each clock, recorded in parallel. Raises ImportProblemError where a clock has
-    none or several."""
+    """Make a single part with a file for each clock, recorded in parallel. Raises ImportProblemError where no file
+    or several fit the pattern of a clock."""
     by_clock = {}
     for clock in import_map.clock:
         (path,) = _find_single_file(clock.file or "*", files, f"clock '{clock.name}'")
@@ -90,8 +90,8 @@ def _assign_sequential(import_map: ImportMap, files: Sequence[Path]) -> Iterator
 
 
 def _find_single_file(pattern: str, files: Sequence[Path], subject: str) -> list[Path]:
-    """Find the single file that fits a pattern, as a list of one. Raises ImportProblemError where none or several
-    fit."""
+    """Find the single file that fits a pattern, as a list of one path. subject: what is in the file, for messages.
+    Raises ImportProblemError where no file or several fit."""
     matching_paths = [path for path in files if fnmatchcase(path.name, pattern)]
     if len(matching_paths) != 1:
         raise ImportProblemError(

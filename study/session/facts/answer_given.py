@@ -15,7 +15,8 @@ from study.session.facts.sitting_events import FACT_CONFIG
 
 @dataclass(frozen=True, config=FACT_CONFIG)
 class AnswerHealth:
-    """Counters of the device at the answer, in ticks since the stimulus began, as in `study.devices.device.Health`."""
+    """Faults and counters of the device from the start of the stimulus to the answer, as in
+    `study.devices.device.Health`."""
 
     fault: Annotated[str, Field(pattern="^[A-Z_]{1,40}$")]
     """Name of the fault of the device; NONE without a fault."""
@@ -45,7 +46,8 @@ class AnswerHealth:
 @dataclass(frozen=True, config=FACT_CONFIG)
 class AnswerGiven:
     """The participant's answer, logged before the program acts on it. Run, trial and attempt are indices from 0; the
-    answer is the number of a direction or interval; the response time counts from the start of the stimulus (s)."""
+    answer is the number of a direction or interval; the response time counts from the start of the stimulus (s).
+    `monotonic_s`: see `sitting_events`."""
 
     utc: UtcTime
     run: Index

@@ -1,4 +1,5 @@
-"""Describe the log of a session in words: one sentence per event. Called by `study.workflows.views.view_session`.
+"""Describe the log of a session in words: one sentence per event. `study.workflows.views.view_session` calls
+`describe_log`.
 
 Answers to questions about health are left out. The direction of a trial that does not count (yet) is left out, too: the
 trial may be repeated, and the participant may see the text. Runs and trials count from 1 here, as on the screen of the
@@ -76,14 +77,14 @@ def _describe_in_context(event: Event, presentations: dict[_PresentationKey, Tri
         case TrialMeasured():
             return _describe_measured(event)
         case TrialSpoiled():
-            return f"{_describe_trial_place(event)} is void and is presented again: {event.reason}."
+            return f"{_name_trial(event)} is void and is presented again: {event.reason}."
         case RestTaken():
             return f"Rested {_format_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
-            return _describe_other(event)
+            return _describe_outside_trials(event)
 
 
-def _describe_other(event: Event) -> str:
+def _describe_outside_trials(event: Event) -> str:
     """Describe an event outside the trials."""
     match event:
         case SessionOpened() | SessionResumed() | SessionInterrupted() | SessionClosed():
@@ -170,7 +171,7 @@ def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
     if with_direction:
         target = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
         stimulus_text = f"{target}, {stimulus_text}"
-    return f"{_describe_trial_place(event)} ({event.phase.value}{attempt_text}): {stimulus_text}."
+    return f"{_name_trial(event)} ({event.phase.value}{attempt_text}): {stimulus_text}."
 
 
 def _describe_answer(event: AnswerGiven, presentation: TrialPresented | None) -> str:
@@ -227,8 +228,8 @@ def _describe_device(device: DeviceFacts) -> str:
     return f"{device.name}{' (simulated, nothing moves)' if device.simulated else ''}"
 
 
-def _describe_trial_place(event: TrialPresented | TrialSpoiled) -> str:
-    """Describe run and trial, counted from 1."""
+def _name_trial(event: TrialPresented | TrialSpoiled) -> str:
+    """Name run and trial, counted from 1."""
     return f"Run {event.run + 1}, trial {event.trial + 1}"
 
 
@@ -238,7 +239,7 @@ def _get_presentation_key(event: TrialPresented | AnswerGiven | TrialMeasured) -
 
 
 def _format_seconds(seconds: float) -> str:
-    """Format a duration below 2 minutes in seconds, else in minutes."""
+    """Format a duration below 2 minutes in seconds, otherwise in whole minutes."""
     if seconds < 120:
         return f"{seconds:.3g} s"
     return f"{seconds / 60:.0f} min"

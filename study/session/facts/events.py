@@ -114,7 +114,8 @@ class DeviceFacts:
 
 @dataclass(frozen=True, config=FACT_CONFIG)
 class SessionOpened:
-    """First line of every log: all settings on which the rest of the session depends."""
+    """First line of every log: names of session and participant (`subject`), and all settings on which the session
+    depends."""
 
     utc: UtcTime
     format: Literal["hapteq-session"]
@@ -132,11 +133,11 @@ class SessionOpened:
     seed: Seed
     device: DeviceFacts
     equalizer: str
-    """Name of the method that converts a wanted stimulus to commanded forces."""
+    """Name of the method that converts a target stimulus to commanded forces."""
     versions: dict[str, str]
     """Versions of Python and of the packages that hapteq uses, by name."""
     equalized: EqualizedFacts | None = None
-    """Model and level scales of the equalizer; null: commanded and wanted force are the same."""
+    """Model and level scales of the equalizer; null: commanded and target force are the same."""
     monotonic_s: Seconds | None = None
     dose_elsewhere: DoseElsewhere | None = None
     rules: Literal[1, 2] = 1

@@ -33,14 +33,14 @@ def check_utc_time(text: str) -> str:
 
 
 def _check_recording_path(text: str) -> str:
-    """Return the text unchanged. Raises ValueError unless it is the path of a recording."""
+    """Return the text unchanged. Raises ValueError unless it is the path of a recording (`_RECORDING_PATH_PATTERN`)."""
     if not _RECORDING_PATH_PATTERN.fullmatch(text):
         raise ValueError("is no file in the session's folder recordings")
     return text
 
 
 def _check_file_name(text: str) -> str:
-    """Return the text unchanged. Raises ValueError unless it is the name of a file."""
+    """Return the text unchanged. Raises ValueError unless it is the name of a file (`_FILE_NAME_PATTERN`)."""
     if not _FILE_NAME_PATTERN.fullmatch(text):
         raise ValueError("is no file name in the session's folder")
     return text
@@ -55,8 +55,8 @@ Index = Annotated[int, Field(ge=0, le=10**6)]
 Seed = Annotated[int, Field(ge=0, lt=2**256)]
 """Seed of random numbers, at most 256 bits."""
 Seconds = Annotated[float, Field(ge=0, le=1e9)]
-"""A duration (s); as `monotonic_s`, a reading of the computer's monotonic clock beside `utc`, which is meaningful only
-in differences within a sitting (null where it was not logged)."""
+"""A duration (s). In the field `monotonic_s`, a reading of the computer's monotonic clock at the time `utc`, of which
+only differences within a sitting have a meaning; null where it was not logged."""
 FrequencyHz = Annotated[float, Field(gt=0, le=1e6)]
 """A frequency above 0 (Hz)."""
 ForceN = Annotated[float, Field(ge=0, le=1e3)]

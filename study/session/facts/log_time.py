@@ -5,8 +5,8 @@ no exposure limit depends on the wall clock within a sitting. Between sittings o
 it forward there cannot be distinguished from elapsed time; setting it back is detected and counts as no time.
 
 The monotonic clock stops while the computer sleeps: sleep within a sitting cannot be distinguished from a clock set
-forward. Called where a log is folded into a state (`study.session.state`) or watched (`study.session.watching`,
-`study.workflows.views.watch_session`).
+forward. Called where a log is folded into a state (`study.session.state`), written (`study.workflows.trial.sitting`)
+or watched (`study.session.watching`, `study.workflows.views.watch_session`).
 """
 
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class Moment:
     """Time of a log entry, by wall clock and monotonic clock."""
 
     utc: str
-    """ISO 8601; empty where nothing was logged before."""
+    """Reading of the wall clock, ISO 8601; empty where nothing was logged before."""
     monotonic_s: float | None = None
-    """None in logs of versions before 1.1 and in entries that another program wrote."""
+    """Reading of the monotonic clock (s); None in logs of versions before 1.1 and in entries of another program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,33 +36,36 @@ class ClockStep:
     step_s: float
     """Size of the step in seconds; positive: forward."""
     between_sittings: bool
+    """Whether the two entries belong to different sittings."""
 
     @property
     def sentence(self) -> str:
         """Sentence for the experimenter."""
         step_text = _format_duration(abs(self.step_s))
-        limits = "Time limits and the vibration dose do not follow it; the times in the log do."
+        limits_text = "Time limits and the vibration dose do not follow it; the times in the log do."
         if self.step_s > 0:
-            return f"The computer's clock was set forward by {step_text}, or the computer slept that long. {limits}"
+            return (
+                f"The computer's clock was set forward by {step_text}, or the computer slept that long. {limits_text}"
+            )
         if self.between_sittings:
             return (
                 f"The computer's clock reads {step_text} earlier than at the last entry of the log. No time counts as "
                 "passed since then: the vibration dose continues from there."
             )
-        return f"The computer's clock was set back by {step_text}. {limits}"
+        return f"The computer's clock was set back by {step_text}. {limits_text}"
 
 
 def compute_elapsed_s(start: Moment, end: Moment) -> float:
-    """Time between two entries (s), never negative: by the monotonic clock where both state it, which must then be of
-    the same sitting; otherwise by the wall clock, and 0 where `start.utc` is empty."""
+    """Compute the time between two entries (s), never negative: by the monotonic clock where both state it, which must
+    then be of the same sitting; otherwise by the wall clock, and 0 where `start.utc` is empty."""
     if start.monotonic_s is not None and end.monotonic_s is not None:
         return max(0.0, end.monotonic_s - start.monotonic_s)
     return max(0.0, compute_wall_clock_s(start.utc, end.utc))
 
 
 def find_clock_step(start: Moment, end: Moment, between_sittings: bool = False) -> ClockStep | None:
-    """Step of the wall clock between two entries; None below `MIN_STEP_S`. Without monotonic times only a step back can
-    be detected."""
+    """Find the step of the wall clock between two entries; None below `MIN_STEP_S`. Unless both entries state the
+    monotonic time, only a step back can be detected."""
     wall_s = compute_wall_clock_s(start.utc, end.utc)
     has_monotonic = start.monotonic_s is not None and end.monotonic_s is not None
     step_s = wall_s - compute_elapsed_s(start, end) if has_monotonic else min(0.0, wall_s)
@@ -70,14 +73,15 @@ def find_clock_step(start: Moment, end: Moment, between_sittings: bool = False) 
 
 
 def compute_wall_clock_s(first_utc: str, second_utc: str) -> float:
-    """Seconds by the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
+    """Compute the time (s) from the first to the second reading of the wall clock, ISO 8601 each: negative if the clock
+    was set back; 0 if the first is empty."""
     if not first_utc:
         return 0.0
     return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds()
 
 
 def _format_duration(seconds: float) -> str:
-    """Text of a duration in seconds, minutes, or hours and minutes."""
+    """Format a duration: in seconds below 2 minutes, otherwise in minutes, or hours and minutes."""
     if seconds < 120:
         return f"{seconds:.0f} s"
     hours, minutes = divmod(round(seconds / 60), 60)

@@ -1,10 +1,9 @@
 """Logged events of a sitting except its trials: forms, checks, demonstrations, probes, rests, pauses, notes, end.
 
 Each class with a field `event` is one kind of line of the session's log `events.jsonl`; `event` names the kind, and
-`events` combines them with the events of trials in the type `Event`. `utc`
-is the wall-clock time, `monotonic_s` the session's monotonic clock (s; None where it was not logged). A unit that is
-not stated is given by the type of the field (`fact_types`) or the suffix of its name. A session and a sitting are
-defined in `study.session`.
+`events` combines them with the events of trials in the type `Event`. `utc` is the wall-clock time, `monotonic_s` the
+session's monotonic clock (s; None where it was not logged). A unit that is not stated is given by the type of the field
+(`fact_types`) or the suffix of its name. A session and a sitting are defined in `study.session`.
 """
 
 from typing import Literal
@@ -33,7 +32,7 @@ FACT_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 class DoseElsewhere:
     """Vibration dose of the same hand since its last night's rest, in other sessions of the participant: a field of the
     events that begin a sitting, computed by `study.session.state.daily_dose`. squared_s, vibrated_s, unmeasured_s: as
-    in `vibration_dose.Dose`."""
+    in `study.session.state.vibration_dose.Dose`."""
 
     sessions: tuple[str, ...]
     """Names of these sessions."""
@@ -56,6 +55,7 @@ class FormFilled:
     version: str
     """Version of the form, as stated by its protocol."""
     ethics_id: str
+    """Number of the ethics approval, as stated by the protocol."""
     passed: bool
     """False: consent was not given, or a person may not take part. Always true for the other forms."""
     answers: dict[str, str]
@@ -128,7 +128,7 @@ class OnsetPulsed:
 
 @dataclass(frozen=True, config=FACT_CONFIG)
 class ProbePlayed:
-    """A probe: a known force between two trials (`probe_state`). It is logged before the device moves."""
+    """A probe: a known force between two trials (`study.session.state.probe_state`), logged before the device moves."""
 
     utc: UtcTime
     number: Index
@@ -229,6 +229,7 @@ class NoteTaken:
 
     utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
+    """Who wrote the note."""
     text: str
     adverse: bool = False
     """Whether the note reports an adverse event of the participant, such as pain, numbness or fright."""
@@ -243,5 +244,6 @@ class SessionClosed:
 
     utc: UtcTime
     outcome: Literal["completed", "refused", "excluded"]
+    """`refused`: consent was not given; `excluded`: by the exclusion questions."""
     monotonic_s: Seconds | None = None
     event: Literal["session_closed"] = "session_closed"

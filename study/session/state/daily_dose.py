@@ -16,14 +16,14 @@ from study.session.state.vibration_dose import NO_DOSE, Dose, sum_doses
 
 
 def find_dose_elsewhere(
-    sessions: Mapping[str, SittingState], own_session: str, utc: str, unread_sessions: tuple[str, ...] = ()
+    sessions: Mapping[str, SittingState], current_session: str, utc: str, unread_sessions: tuple[str, ...] = ()
 ) -> DoseElsewhere | None:
-    """Vibration dose from the participant's other sessions since the last pause of at least `DAILY_REST_S` without
-    vibration.
+    """Sum the vibration dose of the participant's other sessions since the last pause of at least `DAILY_REST_S`
+    without vibration.
 
-    sessions: states of all sessions of the participant, by name; own_session: the session that continues at the time
-    utc (ISO 8601); unread: names of sessions that could not be read. None where no other session counts and all were
-    read.
+    sessions: states of all sessions of the participant, by name; current_session: name of the session that continues at
+    the time `utc` (ISO 8601); unread_sessions: names of sessions that could not be read. Returns None where no other
+    session counts and all were read.
 
     The sessions are searched backwards in time up to the first such pause, between two of them or after the last. Only
     the wall clock is known between sessions; where it was set back, no time is counted.
@@ -40,7 +40,7 @@ def find_dose_elsewhere(
             break
         counted_sessions[name] = sitting
         earliest_start_s = max(earliest_start_s, sitting.sitting_elapsed_s or still_s)
-    counted_sessions.pop(own_session, None)
+    counted_sessions.pop(current_session, None)
     if not counted_sessions:
         return DoseElsewhere((), 0.0, 0.0, 0.0, 0.0, unread_sessions) if unread_sessions else None
     dose = sum_doses(*(sitting.dose for sitting in counted_sessions.values()))
@@ -51,8 +51,8 @@ def find_dose_elsewhere(
 
 
 def set_dose_elsewhere(sitting: SittingState, other_dose: DoseElsewhere | None) -> SittingState:
-    """Set the dose from other sessions in the state, at the beginning of a sitting; None: no dose. Where a handle moved
-    later in another session, the time since its last motion is that one."""
+    """Set the dose from other sessions in the state, at the beginning of a sitting; None: no dose. The time since
+    the handle last moved becomes the shorter of those in this and in the other sessions."""
     if other_dose is None:
         return replace(sitting, other_sessions_dose=NO_DOSE, unread_sessions=())
     updated_sitting = replace(sitting, unread_sessions=other_dose.unread, other_sessions_dose=NO_DOSE)

@@ -1,8 +1,8 @@
 """Computation of the next trial: the presentation that follows from protocol, rules, seed and position in the session.
 
-Order: draw direction and polarity, compute the level by the staircase, practice or catch trial, rove the level, limit
-it by the safety cap. Called by `state`, from which `machine` takes the trial to present, and `presentation_check` the
-values that a logged trial must have.
+Order: draw direction and polarity, compute the level by the staircase, practice or catch trial, rove the level within
+the safety cap. Called by `state` (`find_due_presentation`), which gives the trial to present to `machine` and the
+values of a logged trial to `fold_trial`, for `presentation_check`.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,9 @@ class PresentTrial:
     phase: Phase
     frequency_hz: float
     level_db: float
+    """Level in dB relative to 1 N."""
     level_n: float
+    """Amplitude of the force; for equalized stimuli, the level (`level_scale`)."""
     label: int
     """Number of the correct answer: of a direction or, in a detection run, of an interval."""
     direction: int
@@ -51,7 +53,7 @@ class PresentTrial:
     polarity: int
     """Sign of the first half period, +1 or -1."""
     wanted_mps2: float | None = None
-    """Target acceleration of the level (m/s²); None where levels are commanded forces."""
+    """Target acceleration that the level stands for (m/s²); None where levels are commanded forces."""
     nominal_n: float | None = None
     """Level of the staircase (N), around which `level_n` was drawn; None without roving."""
 
@@ -111,7 +113,7 @@ def compute_due_trial(
 
 
 def has_swapped_labels(protocol: StudyProtocol, opening_event: SessionOpened) -> bool:
-    """Whether the numbers 1 and 2 are exchanged for this participant."""
+    """Whether the numbers 1 and 2 of the directions are exchanged for this participant."""
     return are_labels_swapped(
         protocol.schedule, len(protocol.stimulus.frequencies_hz), opening_event.participant_number
     )

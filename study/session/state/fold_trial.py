@@ -53,7 +53,7 @@ def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
 def _make_trial_row(
     opening_event: SessionOpened, event: TrialPresented, was_felt: bool | None, repeat_cause: VoidCause | None
 ) -> Trial:
-    """Row of `trials.csv` at the presentation; answer and measurement are added later."""
+    """Make the row of `trials.csv` at the presentation; answer and measurement are added later."""
     return Trial(
         subject=opening_event.subject,
         session=opening_event.session,
@@ -117,7 +117,7 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
         latest_s=event.latest_s,
         status=TrialStatus(event.status),
     )
-    # Amplitude of the vector along and across the stimulus.
+    # Amplitude of the acceleration vector along and across the stimulus.
     amplitude_mps2 = None
     if event.delivered_mps2 is not None:
         amplitude_mps2 = math.hypot(event.delivered_mps2, event.off_axis_mps2 or 0.0)
@@ -128,7 +128,7 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
         trial=state.trial + 1,
         attempt=0,
         trials=(*state.trials[:-1], row),
-        rest_due_s=_find_rest_within_run(state.protocol, state.trial + 1),
+        rest_due_s=_find_rest_within_run_s(state.protocol, state.trial + 1),
     )
     return _start_next_run(updated_state) if _is_run_over(updated_state) else updated_state
 
@@ -168,7 +168,7 @@ def _set_sensor_facts(row: Trial, sensor: SensorFacts | None) -> Trial:
 
 
 def _require_open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
-    """The presentation to which the event belongs. Raises LogContradiction where that trial is not open."""
+    """Return the presentation to which the event belongs. Raises LogContradiction where that trial is not open."""
     presented = state.presented
     if presented is None or (presented.run, presented.trial, presented.attempt) != (
         event.run,
@@ -196,7 +196,8 @@ def _is_run_over(state: SessionState) -> bool:
 
 
 def _start_next_run(state: SessionState) -> SessionState:
-    """The state at the beginning of the next run, with the rest that is due before it (s); no rest after the last."""
+    """Move the state to the beginning of the next run, with the rest that is due before it (s); no rest after the
+    last run."""
     is_last_run = state.run + 1 == len(state.runs)
     # No enforced rest after a practice run: it is short, and the participant reads its result afterwards.
     rest_s = 0.0 if is_last_run or state.runs[state.run].practice else state.protocol.rests.after_run_s
@@ -208,10 +209,10 @@ def _start_next_run(state: SessionState) -> SessionState:
     )
 
 
-def _find_rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
-    """Rest (s) that is due after so many trials of a run, 0 for none."""
+def _find_rest_within_run_s(protocol: StudyProtocol, trial_count: int) -> float:
+    """Find the rest (s) that is due after this number of trials of a run; 0 for none."""
     trials_between_rests = protocol.rests.after_trials
-    return protocol.rests.within_run_s if trials_between_rests and trials_done % trials_between_rests == 0 else 0.0
+    return protocol.rests.within_run_s if trials_between_rests and trial_count % trials_between_rests == 0 else 0.0
 
 
 def _add_vibration(

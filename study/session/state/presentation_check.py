@@ -16,7 +16,7 @@ class LogContradiction(ValueError):  # noqa: N818 - no suffix: the log is contra
 
 def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
     """Raise LogContradiction unless the logged presentation agrees with `expected`: position in the session, phase,
-    frequency, level in N and dB, nominal level, direction, angle, polarity, wanted acceleration."""
+    frequency, level in N and dB, nominal level, direction, angle, polarity, target acceleration."""
     due_place = (expected.run, expected.trial, expected.attempt)
     if (event.run, event.trial, event.attempt) != due_place:
         raise LogContradiction(
@@ -47,8 +47,8 @@ def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
 
 
 def _is_equal(logged_value: str | float | None, expected_value: str | float | None) -> bool:
-    """Whether the values are equal; floats up to 1e-9 relative or absolute, because the last bits of floating-point
-    powers differ between computers."""
+    """Whether the values are equal; floats up to 1e-9 relative or absolute (chosen), because the last bits of
+    floating-point powers differ between computers."""
     if isinstance(logged_value, float) and isinstance(expected_value, float):
         return math.isclose(logged_value, expected_value, rel_tol=1e-9, abs_tol=1e-9)
     return logged_value == expected_value

@@ -1,5 +1,5 @@
 """Vibration dose of a hand: daily exposure A(8) of hand-transmitted vibration. Called by `sitting_state` and
-`daily_dose`.
+`daily_dose`; `machine` and `study.session.watching.make_watch_view` compute A(8) with it.
 
     A(8) = sqrt( (1 / T0) * integral of a_hw(t)^2 dt ),        T0 = 8 h
 
@@ -36,11 +36,11 @@ class Dose:
 
 
 NO_DOSE = Dose(0.0, 0.0, 0.0)
-"""The dose before the first vibration."""
+"""Dose before the first vibration."""
 
 
 def compute_hand_arm_weight(frequency_hz: float) -> float:
-    """Frequency weighting Wh of an acceleration: |band transition| at s = 2 pi i f, with wn = 2 pi fn and
+    """Compute the frequency weighting Wh of an acceleration: |band transition| at s = 2 pi i f, with wn = 2 pi fn and
 
         band = s² w2² / ((s² + s w1/Q1 + w1²) (s² + s w2/Q1 + w2²))
         transition = (s + w3) w4² / ((s² + s w4/Q2 + w4²) w3)
@@ -58,26 +58,26 @@ def compute_hand_arm_weight(frequency_hz: float) -> float:
     return abs(band * transition)
 
 
-def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
+def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, duration_s: float) -> Dose:
     """Add a sinusoid of this duration (s) to a dose; returns the sum. amplitude_mps2: peak; None if unknown, which adds
     to `unmeasured_s` instead of `squared_s`.
 
     The fades are part of the duration, and count at full amplitude, so that they are overestimated. Raises ValueError
     for a negative duration and, with a known amplitude, for a frequency that is not above 0.
     """
-    if seconds < 0:
-        raise ValueError(f"seconds is {seconds:g}; a vibration lasts 0 s or longer")
-    extended_dose = replace(dose, vibrated_s=dose.vibrated_s + seconds)
+    if duration_s < 0:
+        raise ValueError(f"seconds is {duration_s:g}; a vibration lasts 0 s or longer")
+    extended_dose = replace(dose, vibrated_s=dose.vibrated_s + duration_s)
     if amplitude_mps2 is None:
-        return replace(extended_dose, unmeasured_s=dose.unmeasured_s + seconds)
+        return replace(extended_dose, unmeasured_s=dose.unmeasured_s + duration_s)
     return replace(
         extended_dose,
-        squared_s=dose.squared_s + _compute_weighted_rms_mps2(frequency_hz, amplitude_mps2) ** 2 * seconds,
+        squared_s=dose.squared_s + _compute_weighted_rms_mps2(frequency_hz, amplitude_mps2) ** 2 * duration_s,
     )
 
 
 def sum_doses(*doses: Dose) -> Dose:
-    """Sum of the doses of a hand on a day; `NO_DOSE` without any."""
+    """Add up the doses of a hand on a day; returns `NO_DOSE` without any."""
     return Dose(
         squared_s=sum(dose.squared_s for dose in doses),
         vibrated_s=sum(dose.vibrated_s for dose in doses),
@@ -86,10 +86,11 @@ def sum_doses(*doses: Dose) -> Dose:
 
 
 def compute_a8_mps2(dose: Dose) -> float:
-    """Daily exposure A(8): the constant weighted rms acceleration (m/s^2) over eight hours with the same dose."""
+    """Compute the daily exposure A(8): the constant weighted rms acceleration (m/s^2) over eight hours with the same
+    dose."""
     return math.sqrt(dose.squared_s / WORKING_DAY_S)
 
 
 def _compute_weighted_rms_mps2(frequency_hz: float, amplitude_mps2: float) -> float:
-    """Weighted rms acceleration (m/s^2) of a sinusoid with this peak."""
+    """Compute the weighted rms acceleration (m/s^2) of a sinusoid with this peak."""
     return compute_hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)

@@ -22,13 +22,13 @@ MAX_HAND_STIFFNESS_N_PER_M, MAX_HAND_DAMPING_N_S_PER_M, MAX_HAND_MASS_KG = 2000.
 of a whole arm (135 N/m, 6.5 N s/m, 0.55 kg; Scientific Reports, doi 10.1038/srep18004)."""
 
 MIN_EXPECTED_MPS2 = 0.1
-"""Least expected acceleration (m/s²) at which `has_too_little_motion` can be true. Chosen: a smaller one could be
+"""Smallest expected acceleration (m/s²) at which `has_too_little_motion` can be true. Chosen: a smaller one could be
 masked by the sensor's noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeliveredMotion:
-    """Peak amplitudes of the delivered motion, at the stimulus frequency and its harmonics."""
+    """Peak amplitudes of the delivered motion, at the stimulus frequency and its harmonics; units are in the names."""
 
     along_mps2: float
     """Acceleration along the played direction."""
@@ -42,8 +42,8 @@ class DeliveredMotion:
 
 
 def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> DeliveredMotion | None:
-    """Amplitudes from a trial's recording, by a least-squares fit of a sinusoid at the stimulus frequency; None if less
-    than one period was measured. unit_vector: (3,), the direction played."""
+    """Measure the amplitudes in a trial's recording, by a least-squares fit of a sinusoid at the stimulus frequency;
+    None if less than one period was measured. unit_vector: (3,), the direction played."""
     measured_samples = int(np.isfinite(recording.response.samples).all(axis=1).sum())
     if not covers_a_period(measured_samples, recording.sample_rate_hz, frequency_hz):
         return None
@@ -64,11 +64,11 @@ def has_too_little_motion(
 ) -> bool:
     """Whether the acceleration is smaller than with the stiffest and heaviest hand that is assumed:
 
-    |a| < e = (|F| - friction_n) w² / (K + C w + (M + device_kg) w²), the least acceleration for any phase of the three
-    terms; False where e is below `MIN_EXPECTED_MPS2`. Causes: motors without force, a blocked handle, a dead sensor, an
-    antiresonance. F, a: phasors of commanded force (N) and acceleration (m/s²) along unit_vector, (3,); K, C, M: the
-    assumed limits of the hand; w = 2 pi frequency_hz; friction_n: force that may cause no motion; device_kg: effective
-    mass of the device alone. Raises ValueError for less than one period."""
+    |a| < e = (|F| - friction_n) w² / (K + C w + (M + device_kg) w²), the smallest acceleration for any phase of the
+    three terms; False where e is below `MIN_EXPECTED_MPS2`. Causes: motors without force, a blocked handle, a dead
+    sensor, an antiresonance. F, a: phasors of commanded force (N) and acceleration (m/s²) along unit_vector, (3,); K,
+    C, M: the assumed limits of the hand; w = 2 pi frequency_hz; friction_n: dry friction, the force below which nothing
+    may move; device_kg: effective mass of the device alone. Raises ValueError for less than one period."""
     rate_hz, w = recording.sample_rate_hz, 2 * math.pi * frequency_hz
     force_n = abs(estimate_phasors(recording.command.samples, rate_hz, frequency_hz)[0] @ unit_vector)
     along_mps2 = abs(estimate_phasors(recording.response.samples, rate_hz, frequency_hz)[0] @ unit_vector)

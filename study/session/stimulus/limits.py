@@ -1,5 +1,6 @@
-"""Safety limits of a sitting or recording, computed from its protocol by the workflows that open a device; the device's
-safety layer enforces them at every tick.
+"""Safety limits of a sitting or recording, computed from its protocol; the device's safety layer enforces them at every
+tick. Called by `study.workflows` (`device_settings`, `equalize_stimuli`, `record_device`, `check_device`),
+`study.cli.protocol` and `study.evaluation.reproduction.reproduce_playback`.
 
 The slew rate is the largest slope that a stimulus of the protocol can have, plus an allowance for the spring:
 
@@ -53,8 +54,8 @@ class Limits:
 
 
 def make_study_limits(protocol: StudyProtocol) -> Limits:
-    """Limits of a study, with a slew rate just above that of the steepest stimulus: the highest frequency at the
-    highest level, while it is faded."""
+    """Make the limits of a study, with a slew rate just above that of the steepest stimulus: the highest frequency at
+    the highest level, during a fade."""
     stimulus = protocol.stimulus
     highest_frequency_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
@@ -72,7 +73,7 @@ def compute_highest_level_n(protocol: StudyProtocol) -> float:
 
 
 def make_recording_limits(protocol: RecordingProtocol) -> Limits:
-    """Limits of a recording, with a slew rate just above that of its steepest excitation."""
+    """Make the limits of a recording, with a slew rate just above that of its steepest excitation."""
     slew_rates_n_per_s = [
         (MULTISINE_PEAK_FACTOR if isinstance(segment, MultisineSegment) else 1.0)
         * _bound_slew_n_per_s(find_highest_hz(segment), segment.amplitude_n, protocol.fade_s)
@@ -82,7 +83,7 @@ def make_recording_limits(protocol: RecordingProtocol) -> Limits:
 
 
 def describe_forces(safety: SafetySettings) -> str:
-    """Largest forces (N) on the hand, in words, for messages on which a person decides."""
+    """Describe the largest forces (N) on the hand in words, for messages on which a person decides."""
     feedback_n = min(safety.feedback_cap_n, safety.total_cap_n)
     return (
         f"stimulus at most {safety.stimulus_cap_n:g} N, spring and damper {feedback_n:g} N, "
@@ -98,7 +99,7 @@ def _bound_slew_n_per_s(frequency_hz: float, amplitude_n: float, fade_s: float) 
 
 
 def _make_limits(safety: SafetySettings, slew_n_per_s: float) -> Limits:
-    """Limits of a protocol's safety settings, with this slew rate (N/s)."""
+    """Make the limits of a protocol's safety settings, with this slew rate (N/s)."""
     return Limits(
         stimulus_cap_n=safety.stimulus_cap_n,
         total_cap_n=safety.total_cap_n,

@@ -25,26 +25,26 @@ PHASE_SEED = 16
 
 
 def make_probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
-    """One period, (n, 3), without unit, whose norm over the axes peaks at 1. Each axis has every third odd line between
-    `LOWEST_LINE_HZ` and `settings.to_hz`."""
+    """Make one period of the multisine, (n, 3), without unit, whose norm over the axes peaks at 1. Each axis has every
+    third odd line between `LOWEST_LINE_HZ` and `settings.to_hz`."""
     period_samples = round(PERIOD_S * sample_rate_hz)
     lines = list_lines_between(LOWEST_LINE_HZ, settings.to_hz, period_samples, sample_rate_hz, odd_only=True)
     return make_interleaved_multisine(lines, period_samples, 3, PHASE_SEED)
 
 
 def make_probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:
-    """A probe whose norm peaks at `level_n` (N). Raises ValueError for a level above the cap of probes, or not above
-    0."""
+    """Make a probe, the repeated period, whose norm peaks at `level_n` (N). Raises ValueError for a level above the cap
+    of probes, or not above 0."""
     if not 0 < level_n <= settings.probe_cap_n:
         raise ValueError(f"a probe of {level_n:g} N is not within its cap of {settings.probe_cap_n:g} N")
-    loop = _make_force_signal(level_n * make_probe_wave(settings, sample_rate_hz), sample_rate_hz)
-    return HeldStimulus(loop, fade_in_s=FADE_S, fade_out_s=FADE_S, fade_shape="raised_cosine")
+    period_signal = _make_force_signal(level_n * make_probe_wave(settings, sample_rate_hz), sample_rate_hz)
+    return HeldStimulus(period_signal, fade_in_s=FADE_S, fade_out_s=FADE_S, fade_shape="raised_cosine")
 
 
 def make_reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
-    """The reference as commands (n, 3) in N, and its whole periods as segments: first at full level, then at half of
-    it, because a response that depends on the level shows friction. At each level, the last third of the periods
-    (rounded up) is reserved for the test of a model. There are at least 4 periods per level."""
+    """Make the reference as commands (n, 3) in N, and its whole periods as segments: first at full level, then at half
+    of it, because a response that depends on the level shows friction. At each level, the last third of the periods
+    (rounded up) is reserved for the test of a model. There are at least 4 periods per level (chosen)."""
     wave = make_probe_wave(settings, sample_rate_hz)
     period_samples, fade_samples = len(wave), round(FADE_S * sample_rate_hz)
     periods_per_level = max(4, round(settings.reference_s / PERIOD_S / 2))
@@ -77,5 +77,5 @@ def make_reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> t
 
 
 def _make_force_signal(samples: FloatArray, sample_rate_hz: float) -> Signal:
-    """Samples (n, 3) in N as a signal of forces along x, y and z."""
+    """Convert samples (n, 3) in N to a signal of forces along x, y and z."""
     return Signal(samples, sample_rate_hz, "force", "N", ("fx", "fy", "fz"))

@@ -23,19 +23,20 @@ from protocols.definition.study_protocol import StimulusSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 PLANE_AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}
-"""Indices of a plane's first and second axis; an angle counts from the first towards the second."""
+"""Indices (x: 0, y: 1, z: 2) of a plane's first and second axis; an angle counts from the first towards the second."""
 
 
 def compute_direction_vector(directions: TestDirections, direction: int) -> FloatArray:
-    """Unit vector (3,) of direction 1 or 2: 45° to either side of the line of symmetry. Raises ValueError for any other
-    number."""
+    """Compute the unit vector (3,) of direction 1 (+45° from the line of symmetry) or 2 (-45°). Raises ValueError for
+    any other number."""
     if direction not in (1, 2):
         raise ValueError(f"there are directions 1 and 2, not {direction}")
     return compute_vector_at_angle(directions, compute_direction_angle_deg(directions, direction))
 
 
 def compute_vector_at_angle(directions: TestDirections, angle_deg: float) -> FloatArray:
-    """Unit vector (3,) in the plane of the directions, at `angle_deg` from its first axis towards its second."""
+    """Compute the unit vector (3,) in the plane of the directions, at `angle_deg` from its first axis towards its
+    second."""
     angle_rad = math.radians(angle_deg)
     first_axis, second_axis = PLANE_AXES[directions.plane]
     unit_vector = np.zeros(3)
@@ -44,21 +45,21 @@ def compute_vector_at_angle(directions: TestDirections, angle_deg: float) -> Flo
 
 
 def compute_direction_angle_deg(directions: TestDirections, direction: int) -> float:
-    """Angle of direction 1 or 2 in the plane (degrees), from the plane's first axis towards its second. Any other
-    number counts as 2."""
+    """Compute the angle of direction 1 or 2 in the plane (degrees), from the plane's first axis towards its second. Any
+    other number counts as 2."""
     return directions.symmetry_deg + (45.0 if direction == 1 else -45.0)
 
 
 def count_loop_samples(frequency_hz: float, sample_rate_hz: float) -> int:
-    """Number of samples of the shortest loop of whole periods: rate / gcd(rate, frequency). Frequency and sample rate
-    are rounded to multiples of 0.1 Hz."""
+    """Count the samples of the shortest loop of whole periods: rate / gcd(rate, frequency), both rounded to multiples
+    of 0.1 Hz. Exact only for such multiples; protocols accept no others (`protocols.definition.field_types`)."""
     sample_rate_decihertz, frequency_decihertz = round(sample_rate_hz * 10), round(frequency_hz * 10)
     return sample_rate_decihertz // math.gcd(sample_rate_decihertz, frequency_decihertz)
 
 
 def compute_fade_in(settings: StimulusSettings, sample_rate_hz: float) -> FloatArray:
-    """Envelope (ticks,) of the fade-in, from 0 towards 1 (linear or raised cosine), as the safety layer applies it to a
-    stimulus without `onset`."""
+    """Compute the envelope (ticks,) of the fade-in, from 0 towards 1 (linear or raised cosine), as the safety layer
+    applies it to a stimulus without `onset`."""
     tick_count = round(settings.fade_in_s * sample_rate_hz)
     elapsed_fraction: FloatArray = np.arange(tick_count) / max(tick_count, 1)
     return elapsed_fraction if settings.fade_shape == "linear" else 0.5 - 0.5 * np.cos(np.pi * elapsed_fraction)
@@ -75,8 +76,8 @@ def make_held_stimulus(
     """Compute the loop of one trial, and its onset where the equalizer computes one. amplitude: peak, in N where the
     equalizer takes a force, in m/s² where it takes an acceleration; its sign is the polarity. unit_vector: (3,),
     the direction."""
-    loop_samples = count_loop_samples(frequency_hz, sample_rate_hz)
-    phase_rad = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(loop_samples)
+    loop_sample_count = count_loop_samples(frequency_hz, sample_rate_hz)
+    phase_rad = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(loop_sample_count)
     is_force = equalizer.takes == "force"
     target_signal = Signal(
         samples=amplitude * np.sin(phase_rad)[:, None] * unit_vector,

@@ -21,12 +21,13 @@ MS_PER_S = 1000.0
 MAX_P99_TICKS = 1.0
 """Limit, exclusive, of the 99th percentile of the lateness, in ticks: 1 ms at 1 kHz. A tick that is later is missed."""
 
-MAX_LATE_SHARE = 0.002
+MAX_LATE_FRACTION = 0.002
 """Allowed fraction of late ticks, missed ones included, on an idle computer. Chosen: a loop with real-time priority
 stays below it."""
 
-MAX_LATE_SHARE_BUSY = 0.01
-"""Allowed fraction of late ticks, missed ones included, with all cores busy. Chosen."""
+MAX_LATE_FRACTION_BUSY = 0.01
+"""Allowed fraction of late ticks, missed ones included, with all cores busy. Chosen: five times that of an idle
+computer."""
 
 BUSY_LOAD = 1.0
 """Load average per processor from which all cores count as busy: one running task per processor."""
@@ -54,7 +55,7 @@ class Lateness:
         return not self.p99_ms < MAX_P99_TICKS * self.tick_ms
 
 
-def measure_lateness(late_s: FloatArray, rate_hz: float) -> Lateness:
+def summarize_lateness(late_s: FloatArray, rate_hz: float) -> Lateness:
     """Compute statistics of the lateness. late_s (n,): lateness of each wake-up (s), not negative; rate_hz: tick rate.
     Raises ValueError if empty."""
     if len(late_s) == 0:
@@ -109,7 +110,7 @@ def _is_busy(load_per_processor: float | None) -> bool:
 def _choose_late_limit(load_per_processor: float | None) -> float:
     """Choose the allowed fraction of late ticks for this load; that of an idle computer if the load is unknown
     (None)."""
-    return MAX_LATE_SHARE_BUSY if _is_busy(load_per_processor) else MAX_LATE_SHARE
+    return MAX_LATE_FRACTION_BUSY if _is_busy(load_per_processor) else MAX_LATE_FRACTION
 
 
 def judge_late_ticks(late_ticks: int, latest_ms: float, ticks: int, load_per_processor: float | None) -> DeviceFinding:
@@ -121,8 +122,8 @@ def judge_late_ticks(late_ticks: int, latest_ms: float, ticks: int, load_per_pro
     is_within_limit = late_fraction <= allowed_fraction
     value_text = f"{late_ticks} of {ticks} ({late_fraction:.2%}) ended after the next was due, missed ones among them"
     value_text += f"; the latest {latest_ms:.1f} ms after its time"
-    if late_fraction > MAX_LATE_SHARE:
-        normal_limit = f"{MAX_LATE_SHARE:.1%}"
+    if late_fraction > MAX_LATE_FRACTION:
+        normal_limit = f"{MAX_LATE_FRACTION:.1%}"
         value_text += (
             f"; at most {allowed_fraction:.1%} are fine with all cores busy ({normal_limit} else)"
             if is_busy

@@ -4,6 +4,6 @@ Called by `run_session`, `resume_session` and `end_sitting` of `study.workflows.
 """
 
 
-def format_answer_count(answers: int) -> str:
+def format_answer_count(answer_count: int) -> str:
     """Format a number of answers with its verb: "1 answer is", "0 answers are", "3 answers are"."""
-    return "1 answer is" if answers == 1 else f"{answers} answers are"
+    return "1 answer is" if answer_count == 1 else f"{answer_count} answers are"

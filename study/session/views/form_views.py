@@ -2,8 +2,8 @@
 the validation and encoding of their answers.
 
 Texts are shown in the participant's language; answers are logged as codes that are the same in every language, so that
-studies in several languages can be analysed together (`encode_answers`). `forms` makes the forms from a protocol;
-`form_entry` and the screens fill them in.
+studies in several languages can be analysed together (`encode_answers`). `forms` makes the forms from a protocol, and
+encodes their answers for the log; `form_entry`, the screens and the line mode (`study.tui`) fill them in.
 """
 
 import re
@@ -77,8 +77,8 @@ class FormReply:
 
 
 def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:
-    """Find the fields of the form without a valid answer in the reply, in their order. Spaces around an answer are
-    ignored."""
+    """Find the fields of the form whose answer is missing (where one is required) or invalid, in their order. Spaces
+    around an answer are ignored."""
     return tuple(field for field in form.fields if not is_valid_answer(field, reply.answers.get(field.key, "").strip()))
 
 
@@ -105,7 +105,7 @@ def parse_number(answer: str) -> float | None:
 
 def encode_answers(form: Form, reply: FormReply) -> dict[str, str]:
     """Encode the answers for the log, the same in every language: choices as their codes, numbers with a decimal point
-    and 10 significant digits, missing answers as empty text."""
+    and 10 significant digits, free text without surrounding spaces, missing answers as empty text."""
     encoded_answers = {}
     for field in form.fields:
         answer = reply.answers.get(field.key, "").strip()

@@ -1,7 +1,8 @@
 """Format logged UTC times as local time with the offset from UTC, for screens, command-line tables and messages.
 
 Logs, tables and JSON contain UTC. The time zone is an argument, because this package does not read settings of the
-computer; `study.tui` and `study.cli` pass `study.local_clock.convert_to_machine_zone`.
+computer; callers outside it (`study.tui`, `study.cli`, `study.workflows`, `study.evaluation`) pass
+`study.local_clock.convert_to_machine_zone`.
 """
 
 from collections import Counter
@@ -10,7 +11,7 @@ from datetime import UTC, datetime
 from typing import Literal
 
 Zone = Callable[[datetime], datetime]
-"""Converts a time with any UTC offset to local time, daylight saving time included."""
+"""Converts a time with any UTC offset to local time with its offset, daylight saving time included."""
 
 TimePrecision = Literal["minutes", "seconds"]
 """Smallest unit of a time that is shown."""
@@ -36,11 +37,11 @@ def split_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "seconds
     "") where it cannot be converted."""
     try:
         time = datetime.fromisoformat(utc)
-        local = zone(time if time.tzinfo is not None else time.replace(tzinfo=UTC))
+        local_time = zone(time if time.tzinfo is not None else time.replace(tzinfo=UTC))
     except (ValueError, OverflowError, OSError):
         return utc, "", ""
-    offset = local.strftime("%z")
-    return local.date().isoformat(), local.time().isoformat(precision), f"{offset[:3]}:{offset[3:5]}"
+    offset = local_time.strftime("%z")
+    return local_time.date().isoformat(), local_time.time().isoformat(precision), f"{offset[:3]}:{offset[3:5]}"
 
 
 def format_times_in_zone(utc_times: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:

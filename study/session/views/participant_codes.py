@@ -30,9 +30,9 @@ def explain_invalid_code(text: str) -> str:
 
 
 def suggest_code(used_codes: tuple[str, ...]) -> str:
-    """Suggest the next code: the letters of the latest numbered code with the highest number that follows them plus 1,
-    with at least as many digits. P01 without a numbered code, or if the result were too long. used_codes: the latest
-    first."""
+    """Suggest the next code. The latest code of letters and a number (such as P07) sets the letters and the least
+    number of digits; the number is one more than the highest that was used with these letters. P01 if there is no such
+    code, or if the result were longer than 16 characters. used_codes: the latest first."""
     for code in used_codes:
         match = _NUMBERED_CODE_PATTERN.fullmatch(code)
         if match is None:

@@ -2,7 +2,8 @@
 
 No value reveals level, frequency or correctness of a trial, so that the display cannot give hints. The module is quick
 to import, because a screen shows its first frame before numerical libraries are loaded. `study.workflows` makes the
-values; the displays (`study.tui`, simulated participants) show them and give the replies.
+values; the displays (`study.tui`, simulated participants) show them and give the replies. The findings of device checks
+(`DeviceFinding`) are also made by `study.devices` and printed by `hapteq doctor`.
 """
 
 from __future__ import annotations

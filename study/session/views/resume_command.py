@@ -1,6 +1,7 @@
 """Command line that resumes an unfinished session, for messages after a sitting or a failure of its process.
 
-Called by `run_session` and `end_sitting` of `study.workflows.session`, and by `study.tui.engine.client`.
+Called by `run_session` and `end_sitting` of `study.workflows.session`, and by `study.tui.engine.client`; the form of a
+new session (`new_session_form`) uses `SIMULATED_DEVICE`.
 """
 
 SIMULATED_DEVICE = "simulated"
@@ -9,7 +10,7 @@ SIMULATED_DEVICE = "simulated"
 
 
 def format_resume_command(session_path: str, device_name: str) -> str:
-    """Format the command `hapteq resume`. session_path: of the session's folder, which is not quoted for a shell;
+    """Format the command `hapteq resume`. session_path: path of the session's folder, inserted without shell quotes;
     device_name: as `open_device` takes it."""
     option = "" if device_name == SIMULATED_DEVICE else f" --device {device_name}"
     return f"hapteq resume {session_path}{option}"

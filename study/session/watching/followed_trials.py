@@ -12,13 +12,13 @@ from study.session.state.state import SessionState, find_due_presentation, make_
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeResult, StaircasePoint, WatchedRun
 
-LAST_TRIALS = 40
-"""Largest number of latest trials that the experimenter's view lists. Chosen."""
+MAX_LISTED_TRIALS = 40
+"""Largest number of latest trials that the experimenter's view lists. Chosen: more than the table shows at once."""
 
 
 def find_shown_run(state: SessionState) -> int | None:
-    """Index of the run to plot: the current run while a trial is open or before the first answer of the session,
-    otherwise the run of the latest counted answer. None for a finished session without answers."""
+    """Find the index of the run to plot: the current run while a trial is open or before the first answer of the
+    session, otherwise the run of the latest counted answer. None for a finished session without answers."""
     counted_runs = [trial.run for trial in state.trials if trial.is_valid]
     if not state.finished and (not counted_runs or state.presented is not None):
         return state.run
@@ -26,13 +26,13 @@ def find_shown_run(state: SessionState) -> int | None:
 
 
 def _select_counted_trials(state: SessionState, run: int) -> list[Trial]:
-    """Trials of a run that count: answered and not void."""
+    """Select the trials of a run that count: answered and not void."""
     return [trial for trial in state.trials if trial.run == run and trial.is_valid]
 
 
-def collect_points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
-    """Counted trials of a run without catch trials, as points of its staircase; empty for None. The open trial is left
-    out even after its answer, because it may still become void."""
+def collect_staircase_points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
+    """Collect the counted trials of a run without catch trials, as points of its staircase; empty for None. The open
+    trial is left out even after its answer, because it may still become void."""
     if run is None:
         return ()
     closed_trials = [
@@ -47,7 +47,8 @@ def _is_open(state: SessionState, trial: Trial) -> bool:
 
 
 def find_next_level_n(state: SessionState, shown_run: int | None) -> float | None:
-    """Level of the next trial of the shown run (N); None if that is not the current run, or the session is finished."""
+    """Find the level of the next trial (N); None if the shown run is not the current one, or the session is
+    finished."""
     if state.finished or shown_run != state.run:
         return None
     run = state.runs[state.run]
@@ -59,22 +60,22 @@ def find_next_level_n(state: SessionState, shown_run: int | None) -> float | Non
 
 
 def make_watched_run(state: SessionState, run: Run) -> WatchedRun:
-    """A run of the schedule with its status; trials and reversals are counted over its trials that count."""
-    counted_trials, rule = _select_counted_trials(state, run.index), state.protocol.staircase
+    """Summarise a run of the schedule: its status, and the numbers of its trials that count and of their reversals."""
+    counted_trials, staircase_rule = _select_counted_trials(state, run.index), state.protocol.staircase
     return WatchedRun(
         run=run.index,
         phase="practice" if run.practice else run.phase.value,
         frequency_hz=run.frequency_hz,
         status="present" if run.index == state.run else "done" if run.index < state.run else "to come",
         reversals=sum(trial.reversal for trial in counted_trials),
-        reversals_needed=0 if run.practice or rule.is_bayesian else rule.reversals,
+        reversals_needed=0 if run.practice or staircase_rule.is_bayesian else staircase_rule.reversals,
         trials=len(counted_trials),
     )
 
 
 def make_open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
-    """The presented trial without an answer; None if there is none, or the session is closed. presented_s: seconds
-    since its presentation."""
+    """Make the view of the presented trial without an answer; None if there is none, or the session is closed.
+    presented_s: seconds since its presentation."""
     presented = state.presented
     if presented is None or state.answered is not None or state.closed:
         return None
@@ -90,18 +91,18 @@ def make_open_trial(state: SessionState, presented_s: float) -> OpenTrial | None
 
 
 def list_last_trials(session: FollowedSession) -> tuple[ClosedTrial, ...]:
-    """Latest answered or void trials, at most `LAST_TRIALS`, newest first."""
-    rows = list(zip(session.state.trials, session.remarks, strict=True))[-LAST_TRIALS - 1 :]
+    """List the latest answered or void trials, at most `MAX_LISTED_TRIALS`, newest first."""
+    trials_with_remarks = list(zip(session.state.trials, session.remarks, strict=True))[-MAX_LISTED_TRIALS - 1 :]
     closed_trials = [
         _make_closed_trial(session.state, trial, remark)
-        for trial, remark in rows
+        for trial, remark in trials_with_remarks
         if trial.status is not TrialStatus.OPEN
     ]
-    return tuple(closed_trials[::-1][:LAST_TRIALS])
+    return tuple(closed_trials[::-1][:MAX_LISTED_TRIALS])
 
 
 def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
-    """Row of the table for a trial that is answered or void. remark: reason of a void trial, or another remark."""
+    """Make the table row of an answered or void trial. remark: reason of a void trial, or another remark."""
     # The direction and correctness of a void trial stay hidden, because the same stimulus is presented again. They stay
     # hidden, too, until the health of the device is judged, because the trial may still become void.
     is_revealed = trial.is_valid and not _is_open(state, trial)
@@ -126,20 +127,20 @@ def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> Closed
 
 
 def collect_practice_results(state: SessionState) -> tuple[PracticeResult, ...]:
-    """Results of the practice runs before the current run, over their latest `practice.of_last` answers."""
-    settings, results = state.protocol.practice, []
+    """Collect the results of the practice runs before the current run, over their latest `practice.of_last` answers."""
+    practice_settings, results = state.protocol.practice, []
     for run in state.runs[: state.run]:
         if run.practice:
             practice_state = PracticeState(
                 tuple(bool(trial.correct) for trial in _select_counted_trials(state, run.index))
             )
-            answer_count = min(settings.of_last, len(practice_state.correct))
+            answer_count = min(practice_settings.of_last, len(practice_state.correct))
             results.append(
                 PracticeResult(
                     run.frequency_hz,
-                    count_right_of_last(settings, practice_state),
+                    count_right_of_last(practice_settings, practice_state),
                     answer_count,
-                    is_practice_passed(settings, practice_state),
+                    is_practice_passed(practice_settings, practice_state),
                 )
             )
     return tuple(results)

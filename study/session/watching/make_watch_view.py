@@ -12,8 +12,8 @@ from study.session.state.vibration_dose import compute_a8_mps2
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.followed_trials import (
-    collect_points,
     collect_practice_results,
+    collect_staircase_points,
     find_next_level_n,
     find_shown_run,
     list_last_trials,
@@ -46,8 +46,8 @@ def make_watch_view(
     time."""
     state, shown_run = session.state, find_shown_run(session.state)
     situation = _make_situation(session, live_info, now_utc)
-    live, status = situation.live, situation.standing
-    activity, since_utc = _describe_activity(session, live, status)
+    live_state, status = situation.live, situation.standing
+    activity, since_utc = _describe_activity(session, live_state, status)
     catch_trials = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.is_valid]
     return WatchView(
         utc=now_utc,
@@ -63,7 +63,7 @@ def make_watch_view(
         activity_s=situation.open_s or _compute_seconds_between(since_utc, now_utc),
         runs=tuple(make_watched_run(state, run) for run in state.runs),
         shown_run=shown_run,
-        points=collect_points(state, shown_run),
+        points=collect_staircase_points(state, shown_run),
         next_level_n=find_next_level_n(state, shown_run),
         cap_n=state.protocol.staircase.cap_n,
         open_trial=make_open_trial(state, situation.open_s),
@@ -76,7 +76,7 @@ def make_watch_view(
         forms=session.forms,
         notes=session.notes[::-1],
         gate_radius_mm=state.protocol.gate.radius_mm,
-        live=live if status in RUNNING_STATUSES and situation.is_live_fresh else None,
+        live=live_state if status in RUNNING_STATUSES and situation.is_live_fresh else None,
         alarms=find_alarms(situation, previous_view.alarms if previous_view is not None else ()),
         probes=len(session.probes),
         drifts=live_info.drifts,
@@ -84,22 +84,24 @@ def make_watch_view(
 
 
 def _make_situation(session: FollowedSession, live_info: LiveInfo, now_utc: str) -> Situation:
-    """Collect what the alarms are decided from."""
-    live = _select_live(session, live_info.live)
-    status = _find_status(session, live, live_info.has_writer)
-    exposure = _compute_exposure(session, live, status, now_utc)
-    return Situation(session, live, live_info.problem, status, exposure, now_utc, live_info.drifts)
+    """Collect the state from which the alarms are decided."""
+    live_state = _select_current_live_state(session, live_info.live)
+    status = _determine_status(session, live_state, live_info.has_writer)
+    exposure = _compute_exposure(session, live_state, status, now_utc)
+    return Situation(session, live_state, live_info.problem, status, exposure, now_utc, live_info.drifts)
 
 
-def _select_live(session: FollowedSession, live: LiveState | None) -> LiveState | None:
-    """The live state; None where it is of an earlier sitting. Versions that log the monotonic clock remove the live
-    state before a sitting; for older ones its time is compared with the beginning of the sitting."""
-    is_current = live is not None and (live.monotonic_s is not None or live.utc >= session.sitting_utc)
-    return live if is_current else None
+def _select_current_live_state(session: FollowedSession, live_state: LiveState | None) -> LiveState | None:
+    """Select the live state if it is of the current sitting, otherwise None. Versions that log the monotonic clock
+    remove the live state before a sitting; for older ones its time is compared with the beginning of the sitting."""
+    is_current = live_state is not None and (
+        live_state.monotonic_s is not None or live_state.utc >= session.sitting_utc
+    )
+    return live_state if is_current else None
 
 
-def _find_status(session: FollowedSession, live: LiveState | None, has_writer: bool | None) -> SittingStatus:
-    """Status of the session, by its log, the lock (`LiveInfo.has_writer`) and the live state, in this order."""
+def _determine_status(session: FollowedSession, live_state: LiveState | None, has_writer: bool | None) -> SittingStatus:
+    """Determine the status of the session by its log, the lock (`LiveInfo.has_writer`) and the live state, in order."""
     if session.state.is_finally_ineligible:
         return session.state.sitting.ineligibility or "refused"
     if session.state.closed:
@@ -108,14 +110,14 @@ def _find_status(session: FollowedSession, live: LiveState | None, has_writer: b
         return "stopped"
     if has_writer is False:
         return "not running"
-    if live is not None and live.activity == "pause":
+    if live_state is not None and live_state.activity == "pause":
         return "paused"
-    is_resting = live.activity == "rest" if live is not None else session.state.rest_due_s > 0
+    is_resting = live_state.activity == "rest" if live_state is not None else session.state.rest_due_s > 0
     return "resting" if is_resting else "running"
 
 
 def _describe_reason(session: FollowedSession, status: SittingStatus) -> str:
-    """Reason of the status in words; empty for a running session."""
+    """Describe the reason of the status in words; empty for a running, paused or resting session."""
     match status:
         case "stopped":
             return session.end_reason
@@ -142,29 +144,32 @@ _ACTIVITY_WORDS = {
     "probe": "a probe between two trials",
     "reference": "the reference, hands off the handle",
 }
-"""Each `Activity` in words."""
+"""Each `Activity` in words. "trial" is used only where the log has no open trial, hence "between two trials"."""
 
 
-def _describe_activity(session: FollowedSession, live: LiveState | None, status: SittingStatus) -> tuple[str, str]:
-    """Activity in words, and the UTC time at which it began. The log takes precedence over `live`."""
+def _describe_activity(
+    session: FollowedSession, live_state: LiveState | None, status: SittingStatus
+) -> tuple[str, str]:
+    """Describe the activity in words, with the UTC time at which it began. The log takes precedence over the live
+    state."""
     state = session.state
     if status not in RUNNING_STATUSES:
         return status, session.last_utc
     if state.presented is not None:
         is_unanswered = state.answered is None
         return ("waiting for the answer" if is_unanswered else "measuring"), (state.answered or state.presented).utc
-    if live is None:
+    if live_state is None:
         return ("resting" if status == "resting" else "between two trials"), session.last_utc
-    return _ACTIVITY_WORDS[live.activity], live.since_utc
+    return _ACTIVITY_WORDS[live_state.activity], live_state.since_utc
 
 
 def _compute_exposure(
-    session: FollowedSession, live: LiveState | None, status: SittingStatus, now_utc: str
+    session: FollowedSession, live_state: LiveState | None, status: SittingStatus, now_utc: str
 ) -> Exposure:
-    """Duration of the sitting and daily vibration dose with their limits: at `now_utc` while the session runs,
-    otherwise at the last entry of the log."""
+    """Compute the duration of the sitting and the daily vibration dose, with their limits: at `now_utc` while the
+    session runs, otherwise at the last entry of the log."""
     state, limits = session.state, session.state.protocol.limits
-    sitting = _advance_to_now(state.sitting, live, now_utc) if status in RUNNING_STATUSES else state.sitting
+    sitting = _advance_to_now(state.sitting, live_state, now_utc) if status in RUNNING_STATUSES else state.sitting
     return Exposure(
         elapsed_min=(sitting.sitting_elapsed_s or 0.0) / 60.0,
         limit_min=limits.longest_min,
@@ -173,17 +178,17 @@ def _compute_exposure(
     )
 
 
-def _advance_to_now(sitting: SittingState, live: LiveState | None, now_utc: str) -> SittingState:
+def _advance_to_now(sitting: SittingState, live_state: LiveState | None, now_utc: str) -> SittingState:
     """Advance the sitting to the live state, where that and the log state the session's monotonic clock; otherwise to
     `now_utc`, the wall clock of this computer."""
     has_monotonic_time = (
-        live is not None and live.monotonic_s is not None and sitting.last_moment.monotonic_s is not None
+        live_state is not None and live_state.monotonic_s is not None and sitting.last_moment.monotonic_s is not None
     )
-    if live is not None and has_monotonic_time:
-        return pass_time(sitting, Moment(live.utc, live.monotonic_s))
+    if live_state is not None and has_monotonic_time:
+        return pass_time(sitting, Moment(live_state.utc, live_state.monotonic_s))
     return pass_time(sitting, Moment(now_utc))
 
 
 def _compute_seconds_between(since_utc: str, now_utc: str) -> float:
-    """Seconds between two times; 0 instead of a negative value, which differing clocks of two computers can give."""
+    """Compute the seconds between two times; 0 instead of a negative value, which clocks of two computers can give."""
     return max(0.0, compute_wall_clock_s(since_utc, now_utc))

@@ -20,19 +20,19 @@ and a slow disk may delay it by a second or two."""
 _LIVE_ACTIVITIES = ("demo", "waiting for the handle", "rest", "probe", "reference")
 """Activities during which the session writes `live.json` continuously; it does not while a form or a notice is read."""
 HANDLE_AWAY_LIMIT_S = 2.0
-"""Time (s) above which it is an alarm that the handle is outside the gate before a trial. Chosen."""
+"""Time (s) outside the gate before a trial above which there is an alarm. Chosen: short excursions raise none."""
 ANSWER_ALARM_S = 60.0
 """Time without an answer (s) above which there is an alarm, because the participant may need help. Chosen: answers
 usually take seconds."""
 END_REPORTED_S = 60.0
-"""Time for which the end of a sitting is reported to a viewer who was not there before (s). Chosen."""
+"""Time (s) for which the end of a sitting is reported to a viewer who began to watch after it. Chosen."""
 CATCH_TRIAL_WINDOW, LAPSE_LIMIT = 5, 2
 """Alarm at `LAPSE_LIMIT` wrong answers among the last `CATCH_TRIAL_WINDOW` catch trials, which an attentive participant
-answers correctly, because they are at full level. Chosen."""
+answers correctly, because they are at full level. Chosen: a single lapse raises no alarm."""
 TRIAL_WINDOW, VOID_LIMIT = 10, 3
-"""Alarm at `VOID_LIMIT` void trials among the last `TRIAL_WINDOW` presentations. Chosen."""
+"""Alarm at `VOID_LIMIT` void trials among the last `TRIAL_WINDOW` presentations. Chosen: single ones raise none."""
 WARNING_FRACTION = 0.8
-"""Fraction of a limit (time, dose) from which the experimenter is warned. Chosen."""
+"""Fraction of a limit (time, dose) from which the experimenter is warned. Chosen: its last fifth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +76,14 @@ class Situation:
         return compute_elapsed_s(presentation_moment, Moment(self.now_utc))
 
     def compute_seconds_since(self, utc: str) -> float:
-        """Seconds from this UTC time (ISO 8601) to now; negative for a later one."""
+        """Compute the seconds from this UTC time (ISO 8601) to `now_utc`; negative for a later one."""
         return compute_wall_clock_s(utc, self.now_utc)
 
 
 def find_alarms(situation: Situation, previous_alarms: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
     """Evaluate all checks. Returns the current alarms, most urgent first; an alarm that was among `previous_alarms`
-    keeps its start time."""
+    keeps its start time. The end of a sitting is reported for `END_REPORTED_S`, and permanently to a viewer who saw
+    it."""
     previous_by_kind = {alarm.kind: alarm for alarm in previous_alarms}
     checks = _RUNNING_CHECKS if situation.standing in RUNNING_STATUSES else _ENDED_CHECKS
     current_alarms = [alarm for check in checks if (alarm := check(situation)) is not None]
@@ -92,7 +93,6 @@ def find_alarms(situation: Situation, previous_alarms: tuple[Alarm, ...]) -> tup
         else replace(alarm, since=previous_by_kind[alarm.kind].since)
         for alarm in current_alarms
     ]
-    # The end of a sitting is reported for a limited time, and permanently to a viewer who saw it happen.
     return tuple(
         dated_alarm
         for dated_alarm in dated_alarms
@@ -152,8 +152,7 @@ def _check_sensor(situation: Situation) -> Alarm | None:
 
 
 def _check_handle(situation: Situation) -> Alarm | None:
-    """Alarm where the handle is outside the gate: for longer than `HANDLE_AWAY_LIMIT_S` before a trial, or at any time
-    during a trial."""
+    """Alarm where the handle is outside the gate: longer than `HANDLE_AWAY_LIMIT_S` before a trial, or during one."""
     live, radius_mm = situation.live, situation.session.state.protocol.gate.radius_mm
     if live is None or not situation.is_live_fresh:
         return None
@@ -235,16 +234,18 @@ def _check_void_trials(situation: Situation) -> Alarm | None:
 def _check_computer_load(situation: Situation) -> Alarm | None:
     """Alarm where some of the latest presentations were void because the computer was too busy."""
     remarks = situation.session.remarks[-TRIAL_WINDOW:]
-    voids = sum(map(is_computer_busy, remarks))
-    if not voids:
+    busy_count = sum(map(is_computer_busy, remarks))
+    if not busy_count:
         return None
-    void_text = f"{voids} of the last {len(remarks)} presentations {'was' if voids == 1 else 'were'} void because of it"
+    void_text = (
+        f"{busy_count} of the last {len(remarks)} presentations {'was' if busy_count == 1 else 'were'} "
+        "void because of it"
+    )
     return Alarm("busy", f"The computer is too busy: {void_text}. Close other programs.", situation.session.last_utc)
 
 
 def _check_handle_motion(situation: Situation) -> Alarm | None:
-    """Alarm where the handle moved less than with any hand in some of the latest presentations
-    (`TOO_LITTLE_MOTION`)."""
+    """Alarm where some of the latest presentations have the remark `TOO_LITTLE_MOTION` (less motion than any hand)."""
     remarks = situation.session.remarks[-TRIAL_WINDOW:]
     still_count = sum(TOO_LITTLE_MOTION in remark for remark in remarks)
     if not still_count:
@@ -256,20 +257,20 @@ def _check_handle_motion(situation: Situation) -> Alarm | None:
 
 def _check_drift(situation: Situation) -> Alarm | None:
     """Alarm where device or grip changed by more than the analysis of the session allows."""
-    exceeded_limits = [drift.sentence for drift in situation.drifts if drift.beyond]
-    if not exceeded_limits:
+    drift_sentences = [drift.sentence for drift in situation.drifts if drift.beyond]
+    if not drift_sentences:
         return None
     text = (
-        f"Device or grip has changed by more than the analysis allows: {'; '.join(exceeded_limits)}. "
+        f"Device or grip has changed by more than the analysis allows: {'; '.join(drift_sentences)}. "
         "Pause, and look at both."
     )
     return Alarm("drift", text, situation.session.last_utc)
 
 
 def _find_void_reason(situation: Situation) -> str:
-    """Reason of the latest void trial; at least one must exist."""
-    remarks = zip(situation.trials, situation.session.remarks, strict=True)
-    return [remark for trial, remark in remarks if trial.status is TrialStatus.SPOILED][-1]
+    """Find the reason of the latest void trial; at least one must exist."""
+    trials_with_remarks = zip(situation.trials, situation.session.remarks, strict=True)
+    return [remark for trial, remark in trials_with_remarks if trial.status is TrialStatus.SPOILED][-1]
 
 
 def _check_answer_time(situation: Situation) -> Alarm | None:
@@ -284,8 +285,7 @@ def _check_answer_time(situation: Situation) -> Alarm | None:
 
 
 _END_KINDS = ("gone", "ended")
-"""Kinds of alarms about the end of a sitting: shown for `END_REPORTED_S`, and permanently to a viewer who saw the
-end."""
+"""Kinds of alarms about the end of a sitting, which `find_alarms` reports only for a limited time."""
 _ENDED_CHECKS: tuple[Callable[[Situation], Alarm | None], ...] = (
     _check_log,
     _check_program_ended,

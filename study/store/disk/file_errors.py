@@ -26,9 +26,10 @@ DAMAGE_ERRORS = (
 """Exceptions that libraries raise for damaged files and for files of another format."""
 
 _MAX_PROBLEM_CHARACTERS = 600
-"""Largest number of characters of a problem that are shown. Chosen."""
+"""Largest number of characters of a problem that are shown. Chosen: about eight lines of a terminal."""
 _MAX_LISTED_PROBLEMS = 40
-"""Largest number of problems that are listed; of further ones the number is stated. Chosen."""
+"""Largest number of problems that are listed; of further ones the number is stated. Chosen: a list that can still be
+read."""
 
 
 class UnusableFileError(StudyError):
@@ -106,11 +107,11 @@ def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
     """Limit the problems in number and length: a damaged file may have a million problems or a name of a million
     letters. Of omitted problems the number is added."""
     unlisted_count = len(problems) - _MAX_LISTED_PROBLEMS
-    remaining_count_text = (f"and {unlisted_count} more problems",) if unlisted_count > 0 else ()
+    omission_note = (f"and {unlisted_count} more problems",) if unlisted_count > 0 else ()
     shortened_problems = (
         text if len(text) <= _MAX_PROBLEM_CHARACTERS else f"{text[:_MAX_PROBLEM_CHARACTERS]}…" for text in problems
     )
-    return (*islice(shortened_problems, _MAX_LISTED_PROBLEMS), *remaining_count_text)
+    return (*islice(shortened_problems, _MAX_LISTED_PROBLEMS), *omission_note)
 
 
 def _format_sentence(problem: str) -> str:

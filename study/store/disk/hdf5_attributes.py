@@ -1,7 +1,8 @@
 """Attributes of HDF5 files as Python values, independent of whether they are stored as scalars or as arrays.
 
-Values of another type or number are refused with a message that names the attribute and its object. Called by the
-readers and writers of HDF5 files in `study.store.formats`. `owner` is the file, group or dataset with the attribute.
+Values of another type or number, empty attributes (null dataspace) and those with more than `_MAX_ENTRIES` entries are
+refused with a message that names the attribute and its object. Called by `hdf5_file` and the HDF5 formats in
+`study.store.formats`. `owner` is the file, group or dataset with the attribute.
 """
 
 import math
@@ -13,7 +14,7 @@ import numpy as np
 _MAX_ENTRIES = 1000
 """Largest number of entries of an attribute that is read. Chosen: bounds the memory of a damaged file."""
 _MAX_SHOWN_CHARACTERS = 100
-"""Largest number of characters of a value that a message shows. Chosen."""
+"""Largest number of characters of a value that a message shows. Chosen: about a line."""
 
 
 class AttributeProblemError(ValueError):
@@ -44,7 +45,7 @@ def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None 
             f"{_describe_attribute(owner, name)} is {_shorten_value(stored_value)}; it must be text"
         )
     try:
-        # h5py returns bytes that are not UTF-8 as surrogates, which cannot be encoded again.
+        # h5py returns bytes that are not UTF-8 as surrogates, which cannot be encoded again. The name is checked too.
         encoded_texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
         return tuple(text.decode() for text in encoded_texts[:-1])
     except UnicodeError:
@@ -95,12 +96,12 @@ def _read_value(owner: Any, name: str) -> Any:
 
 
 def _shorten_value(value: Any) -> str:
-    """The value as text for messages, cut to `_MAX_SHOWN_CHARACTERS`."""
+    """Format the value as text for messages, cut to `_MAX_SHOWN_CHARACTERS`."""
     text = repr(np.asarray(value).tolist())
     return text if len(text) <= _MAX_SHOWN_CHARACTERS else f"{text[:_MAX_SHOWN_CHARACTERS]}…"
 
 
 def _describe_attribute(owner: Any, name: str) -> str:
-    """Name of the attribute and of its object, for messages."""
+    """Name the attribute and its object, for messages."""
     owner_name = owner.name.strip("/")
     return f"the attribute '{name}' of {owner_name}" if owner_name else f"the attribute '{name}'"

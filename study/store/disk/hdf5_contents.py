@@ -63,7 +63,8 @@ def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
 
 def _check_dataset(name: str, dataset: Any, size_limit: SizeLimit) -> None:
     """Raise ValueError where the samples lie in other files or are compressed more than once, DeclaredSizeError where
-    the dataset exceeds the rest of the limit, or a chunk exceeds it alone. limit: is reduced by the dataset's size."""
+    the declared sizes with this dataset, or one of its chunks alone, exceed the limit. size_limit: the size of the
+    dataset is added to it."""
     properties = dataset.id.get_create_plist()
     if properties.get_layout() == h5py.h5d.VIRTUAL or properties.get_external_count():
         raise ValueError(f"the samples of {name} lie in other files; copy them into this one")

@@ -72,5 +72,5 @@ def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
 
 
 def _describe_value(value: Any) -> str:
-    """A value for a message; "missing" for None."""
+    """Describe a value for a message; "missing" for None."""
     return "missing" if value is None else repr(value)

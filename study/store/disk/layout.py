@@ -1,7 +1,7 @@
 """Description of an entry of a file format, for the tables of docs/formats.md.
 
-The module of each format in `study.store.formats` lists its entries in a constant `LAYOUT`, from which
-`study.workflows.files.format_docs` makes the tables.
+The modules of the formats with such a table (calibration, identified model, mechanical model, recording) list their
+entries in a constant `LAYOUT` of `study.store.formats`; `study.workflows.files.format_docs` makes the tables from it.
 """
 
 from dataclasses import dataclass

@@ -21,8 +21,8 @@ from study.store.disk.privacy import make_folder
 
 def require_new_folder(folder: Path) -> None:
     """Check that results can be written to `folder`. Raises StudyError where it exists and is not an empty folder, or
-    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable or one of them
-    cannot be read."""
+    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable, or the folder or
+    its parent cannot be examined."""
     try:
         is_empty, exists, has_parent = (
             folder.is_dir() and not any(folder.iterdir()),
@@ -56,7 +56,7 @@ def require_new_folder(folder: Path) -> None:
 def create_new_folder(folder: Path) -> Iterator[Path]:
     """Yield a temporary folder for the results, which is renamed to `folder` at the end of the context; after an
     exception it is removed. Raises StudyError as `require_new_folder` does, at the beginning and before renaming, and
-    CannotWriteError where a folder cannot be created or renamed."""
+    CannotWriteError where a folder cannot be created, synced or renamed."""
     require_new_folder(folder)
     temporary_folder = folder.absolute().with_name(f".{folder.absolute().name}.{secrets.token_hex(4)}.part")
     try:

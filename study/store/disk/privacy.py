@@ -2,7 +2,7 @@
 
 Folders of a study have mode 700 and their files 600, regardless of the umask. A new file elsewhere gets the usual
 rights (666 minus umask) where its folder is open to others, otherwise 600. Called where files and folders are created
-(`study.store`, `study.workflows`); the commands and the screen show its warnings.
+(`study.store`, `study.workflows`, `study.cli`); commands (`study.cli`) and the screen show its warnings.
 """
 
 import contextlib
@@ -53,24 +53,24 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(folder))
 
 
-def close_to_others(folder: Path, *, recursive: bool = False) -> None:
+def restrict_to_owner(folder: Path, *, recursive: bool = False) -> None:
     """Remove the rights of group and others from a folder; recursive: also from all its contents. Links are not
     followed, and files of another account are unchanged. Never raises OSError."""
     with contextlib.suppress(OSError), open_folder(folder.absolute()) as opened_folder:
         _restrict_folder(opened_folder, recursive)
 
 
-def close_data_folder(data_folder: Path) -> None:
-    """Remove the rights of group and others from the data folder and its folders, unless `explain_open_folder` gives a
+def restrict_data_folder(data_folder: Path) -> None:
+    """Remove the rights of group and others from the data folder and its folders, unless `explain_kept_rights` gives a
     reason against it. Raises OSError where the folder cannot be listed."""
-    if not is_open_to_others(data_folder) or explain_open_folder(data_folder):
+    if not is_open_to_others(data_folder) or explain_kept_rights(data_folder):
         return
-    close_to_others(data_folder.resolve())
+    restrict_to_owner(data_folder.resolve())
     for folder in (path for path in data_folder.iterdir() if is_real_folder(path) and is_open_to_others(path)):
-        close_to_others(folder)
+        restrict_to_owner(folder)
 
 
-def explain_open_folder(data_folder: Path) -> str:
+def explain_kept_rights(data_folder: Path) -> str:
     """Explain in words why the rights of others to a data folder are not removed: it belongs to another account, is
     meant to be shared (sticky or set-group bit), or holds the working or home folder. Empty where none of these holds,
     or others have no rights."""
@@ -98,7 +98,7 @@ def format_privacy_warning(folder: Path, reason: str = "") -> str:
 
 def format_data_folder_warning(data_folder: Path) -> str:
     """Format a warning if others have rights to a data folder that a session will not remove; otherwise empty."""
-    reason = explain_open_folder(data_folder)
+    reason = explain_kept_rights(data_folder)
     return format_privacy_warning(data_folder, reason) if reason else ""
 
 

@@ -34,7 +34,7 @@ class OpenedFolder:
     """File descriptor of the folder; None on systems without paths relative to a descriptor (Windows)."""
 
     def list_names(self) -> list[str]:
-        """Names of the entries, sorted. Raises OSError."""
+        """List the names of the entries, sorted. Raises OSError."""
         return sorted(os.listdir(self.path if self.descriptor is None else self.descriptor))  # noqa: PTH208
 
     def erase(self, name: str) -> None:
@@ -63,7 +63,7 @@ class OpenedFolder:
             os.fsync(self.descriptor)
 
     def _format_entry_path(self, name: str) -> str:
-        """Path of an entry for system calls: relative to the descriptor, or complete without one."""
+        """Format the path of an entry for system calls: relative to the descriptor, or complete without one."""
         return name if self.descriptor is not None else str(self.path / name)
 
 
@@ -101,7 +101,7 @@ def _open_without_links(path: Path, parent_descriptor: int | None) -> OpenedFold
 
 
 def _read_file_type(path: Path) -> int:
-    """Type bits of the entry itself (links are not followed); 0 where it does not exist."""
+    """Read the type bits of the entry itself (links are not followed); 0 where it does not exist or cannot be read."""
     try:
         return stat.S_IFMT(path.lstat().st_mode)
     except (OSError, ValueError):  # ValueError: a name that no file can have

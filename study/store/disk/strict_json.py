@@ -1,7 +1,7 @@
 """Parse JSON strictly: NaN, infinity, duplicate keys, lone surrogates, deep nesting and huge numbers are refused.
 
 The JSON module of Python accepts most of them; they would fail later, in other code or in other programs. Called by the
-readers of JSON files (`json_document`, `live_file`, `request_inbox`), of JSON texts in files of other formats, and of
+readers of JSON files (such as `json_document` and `live_file`), of JSON texts in files of other formats, and of
 imported JSON data.
 """
 
@@ -35,15 +35,15 @@ def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
 def _check_document(document: Any) -> None:
     """Raise ValueError for a value deeper than `MAX_DEPTH` and for a text or key with a lone surrogate. Iterative, so
     that deep nesting cannot exceed the recursion limit."""
-    pending = [(document, 0)]
-    while pending:
-        value, depth = pending.pop()
+    pending_values = [(document, 0)]
+    while pending_values:
+        value, depth = pending_values.pop()
         if depth > MAX_DEPTH:
             raise ValueError(f"it is nested more than {MAX_DEPTH} levels deep")
         if isinstance(value, dict):
-            pending += ((member, depth + 1) for entry in value.items() for member in entry)
+            pending_values += ((member, depth + 1) for entry in value.items() for member in entry)
         elif isinstance(value, list):
-            pending += ((member, depth + 1) for member in value)
+            pending_values += ((member, depth + 1) for member in value)
         elif isinstance(value, str):
             try:
                 value.encode()
@@ -54,11 +54,11 @@ def _check_document(document: Any) -> None:
 def _refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Make the dictionary of a JSON object. Raises ValueError for a duplicate key, of which Python would keep the last
     value."""
-    record = dict(pairs)
-    if len(record) < len(pairs):
-        names = [name for name, _ in pairs]
-        raise ValueError(f"a record in it has '{max(names, key=names.count)}' twice")
-    return record
+    json_object = dict(pairs)
+    if len(json_object) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"a record in it has '{max(keys, key=keys.count)}' twice")
+    return json_object
 
 
 def _refuse_constant(constant: str) -> None:
@@ -66,12 +66,13 @@ def _refuse_constant(constant: str) -> None:
     raise ValueError(f"JSON has no {constant}; write null")
 
 
-def _parse_finite(digits: str) -> float:
+def _parse_finite(number_text: str) -> float:
     """Parse a number with fraction or exponent. Raises ValueError where it exceeds the range of float64, which Python
     would read as infinity."""
-    number = float(digits)
+    number = float(number_text)
     if not math.isfinite(number):
-        raise ValueError(f"the number {digits[:30]} is larger than any that is read")
+        # 30 characters identify the number; it may have any length.
+        raise ValueError(f"the number {number_text[:30]} is larger than any that is read")
     return number
 
 

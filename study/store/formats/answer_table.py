@@ -74,7 +74,7 @@ class AnswerTable:
         return ("subject", "session", *(column.name for column in self.columns))
 
     def as_csv(self) -> str:
-        """The table as CSV text, header included."""
+        """Format the table as CSV text, header included."""
         lines = [self.header, *((subject, session, *answers) for subject, session, answers in self.rows)]
         return "".join(format_csv_line(line) + "\n" for line in lines)
 

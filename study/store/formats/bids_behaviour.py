@@ -16,6 +16,7 @@ from study.session.views.form_views import parse_number
 from study.store.disk.csv_rows import format_csv_table, list_columns
 from study.store.disk.text_file import write_text
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
+from study.store.formats.tidy_csv import FACTS_NAME
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 BIDS_VERSION = "1.10.0"
@@ -35,8 +36,6 @@ TASK_DESCRIPTION = (
     "which."
 )
 """`TaskDescription` of the tables' JSON."""
-FACTS_NAME = "facts.json"
-"""Name of the file with the provenance, below `code`; the same as in the export `tidy_csv`."""
 INSTRUCTIONS = "In which of the two directions did the force act? Answer 1 or 2."
 """`Instructions` of the tables' JSON."""
 README = """# {name}
@@ -60,8 +59,8 @@ def write_bids(
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write the dataset, and return the paths of its files. folder: existing and empty. name: of the dataset and, as a
-    label, of the task. facts: provenance as JSON values. Raises CannotWriteError where a file cannot be written, and
-    OSError where a folder cannot."""
+    label, of the task. facts: provenance as JSON values, written below `code` as `FACTS_NAME`. Raises CannotWriteError
+    where a file cannot be written, and OSError where a folder cannot."""
     task, readme = _make_label(name), README.format(name=name, title=_read_title(protocol_text), facts_name=FACTS_NAME)
     paths = [
         _write_json(folder / "dataset_description.json", {
@@ -87,7 +86,7 @@ def write_bids(
         paths += _write_phenotype(folder, table, answers)
     for session in dict.fromkeys(trial.session for trial in trials):
         rows = [trial for trial in trials if trial.session == session]
-        sub, ses = f"sub-{_make_label(rows[0].subject)}", f"ses-{_make_label(session)}"
+        sub, ses = f"sub-{_make_label(rows[0].subject)}", f"ses-{_make_label(session)}"  # BIDS entities
         paths.append(_write_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _format_tsv(rows)))
     return tuple(paths)
 
@@ -171,18 +170,18 @@ def _format_tsv(trials: Sequence[Trial]) -> str:
 
 
 def _read_title(protocol_text: str) -> str:
-    """Title of the protocol; empty where it has none."""
+    """Read the title of the protocol from its TOML text; empty where it has none."""
     return str(tomllib.loads(protocol_text).get("title", ""))
 
 
 def _describe_target(protocol_text: str) -> str:
     """Describe the convergence level of an n-down, 1-up staircase, the n-th root of 1/2 (Levitt 1971); empty where the
     protocol states no `down_after_right`, or not 1 for `up_after_wrong`."""
-    rule = tomllib.loads(protocol_text).get("staircase", {})
-    if rule.get("up_after_wrong") != 1 or "down_after_right" not in rule:
+    staircase_rule = tomllib.loads(protocol_text).get("staircase", {})
+    if staircase_rule.get("up_after_wrong") != 1 or "down_after_right" not in staircase_rule:
         return ""
-    target = 0.5 ** (1 / rule["down_after_right"])
-    return f"A staircase over the amplitude seeks the level at which {100 * target:.2f} % of the answers are right."
+    p_correct = 0.5 ** (1 / staircase_rule["down_after_right"])
+    return f"A staircase over the amplitude seeks the level at which {100 * p_correct:.2f} % of the answers are right."
 
 
 def _describe_column(column: str) -> dict[str, str]:

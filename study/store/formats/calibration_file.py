@@ -2,7 +2,7 @@
 
 A calibration is the device's own kinematics and dynamics over a grid of handle positions: joint angles, Jacobian,
 inertia and gravity force, in SI units. `LAYOUT` lists the contents with shapes and units. Written by
-`hapteq calibrate`; read by `study.devices.rigs_by_name` for simulated devices and by `hapteq twin`.
+`hapteq calibrate`; read by `study.devices.rigs_by_name` for simulated devices, `hapteq twin` and `hapteq validate`.
 """
 
 import json

@@ -47,7 +47,7 @@ class DailyCheck:
 
 def write_daily_check(path: Path, check: DailyCheck) -> None:
     """Write the result of a daily check. Raises AlreadyExistsError where the file exists, CannotWriteError where it
-    cannot be written."""
+    cannot be written, ValueError where `changes` holds NaN or infinity."""
     write_json(path, FORMAT, VERSION, asdict(check), gather_provenance())
 
 

@@ -17,7 +17,7 @@ from protocols.document.loading import Protocol, ProtocolError, load_protocol, p
 from protocols.wording.english import ENGLISH, LANGUAGES
 from protocols.wording.translation import (
     find_language,
-    find_own_texts,
+    find_stated_texts,
     find_table_problems,
     list_languages,
     translate_protocol,
@@ -67,10 +67,10 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
         values = tomllib.loads(text)
     except (ValueError, RecursionError):
         return load_protocol(text, source), text  # raises ProtocolError with the cause
-    language, own_texts = find_language(values), find_own_texts(values)
-    if problems := find_table_problems(own_texts, require_all=False):
+    language, stated_texts = find_language(values), find_stated_texts(values)
+    if problems := find_table_problems(stated_texts, require_all=False):
         raise ProtocolError(source, tuple(problem.prefix_key("text.words") for problem in problems))
-    if language == "en" or own_texts.keys() >= ENGLISH.keys():
+    if language == "en" or stated_texts.keys() >= ENGLISH.keys():
         return load_protocol(text, source), text
     try:
         language_name, table = read_language(language, folder)

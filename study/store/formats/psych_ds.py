@@ -24,9 +24,9 @@ from study.store.formats.trials_file import find_trial_problems
 
 DESCRIPTION_NAME = "dataset_description.json"
 """Name of the dataset's description, as the standard sets it."""
-PROTOCOL_NAME = "materials/protocol.toml"
+PROTOCOL_PATH = "materials/protocol.toml"
 """Path of the protocol within the dataset."""
-ANSWERS_NAME = "data/description-answers_data.csv"
+ANSWERS_PATH = "data/description-answers_data.csv"
 """Path of the answers to questionnaires; written only where the protocol has questions."""
 KIND = "Psych-DS dataset"
 """Name of this kind of folder in messages."""
@@ -56,7 +56,7 @@ class ExportedTrials:
 
 def is_psych_ds(folder: Path) -> bool:
     """Whether the folder contains the description and the protocol of an exported Psych-DS dataset."""
-    return (folder / DESCRIPTION_NAME).is_file() and (folder / PROTOCOL_NAME).is_file()
+    return (folder / DESCRIPTION_NAME).is_file() and (folder / PROTOCOL_PATH).is_file()
 
 
 def write_psych_ds(
@@ -78,9 +78,9 @@ def write_psych_ds(
         write_text(path, format_csv_table(rows, Trial), overwrite=False)
         paths.append(path)
     if answers.columns:
-        paths.append(folder / ANSWERS_NAME)
-        write_text(folder / ANSWERS_NAME, answers.as_csv(), overwrite=False)
-    write_text(folder / PROTOCOL_NAME, protocol_text, overwrite=False)
+        paths.append(folder / ANSWERS_PATH)
+        write_text(folder / ANSWERS_PATH, answers.as_csv(), overwrite=False)
+    write_text(folder / PROTOCOL_PATH, protocol_text, overwrite=False)
     description = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
@@ -97,7 +97,7 @@ def write_psych_ds(
     texts = {"README.md": README.format(name=name), "CHANGES.md": "# 1.0.0\n\nAs exported by hapteq.\n"}
     for file_name, text in texts.items():
         write_text(folder / file_name, text, overwrite=False)
-    return (*paths, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME, *(folder / text_name for text_name in texts))
+    return (*paths, folder / PROTOCOL_PATH, folder / DESCRIPTION_NAME, *(folder / text_name for text_name in texts))
 
 
 def read_psych_ds(folder: Path) -> ExportedTrials:
@@ -118,7 +118,7 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
         )
         raise UnusableFileError(path, KIND, (problem,))
     trials = tuple(trial for file_path in files for trial in read_described_trials(file_path, KIND))
-    return ExportedTrials(trials, read_text(folder / PROTOCOL_NAME), facts, files)
+    return ExportedTrials(trials, read_text(folder / PROTOCOL_PATH), facts, files)
 
 
 def read_described_trials(path: Path, kind: str) -> tuple[Trial, ...]:
@@ -134,7 +134,7 @@ def read_described_trials(path: Path, kind: str) -> tuple[Trial, ...]:
 
 
 def _describe_variable(column: str, description: str, unit: str) -> dict[str, str]:
-    """Description of a column as a schema.org PropertyValue."""
+    """Describe a column as a schema.org PropertyValue; without `unitText` where the unit is empty."""
     variable = {"@type": "PropertyValue", "name": column, "description": description}
     return {**variable, "unitText": unit} if unit else variable
 

@@ -21,7 +21,7 @@ LAYOUT = (
     Entry(
         "hold",
         "attribute, text",
-        "course of the command between samples: " + ", ".join(f"`{h.value}`" for h in Hold),
+        "course of the command between samples: " + ", ".join(f"`{hold.value}`" for hold in Hold),
         False,
     ),
     Entry("command", "(n, m) float32 or float64", "input of the plant; `command[k]` is held until t_(k+1)"),

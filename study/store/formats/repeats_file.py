@@ -25,8 +25,8 @@ KIND = "document of repeats"
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Content of the document. Errors are root mean squares in the band, relative to the reference trajectory (1 = 100
-    %). A play is one repetition of the whole trajectory; between two plays the forces are corrected."""
+    """Content of the document. Errors are root mean squares in the band, as fractions of that of the reference
+    trajectory. A play is one repetition of the whole trajectory; between two plays the forces are corrected."""
 
     trajectory_sha256: str
     """SHA-256 of the samples of the reference trajectory and their rate."""
@@ -63,7 +63,7 @@ REPEATS_VALIDATOR: TypeAdapter[Repeats] = TypeAdapter(Repeats)
 
 
 def get_repeats_path(forces_path: Path) -> Path:
-    """Path of the document that belongs to a table of forces: `NAME.repeats.json` for `NAME.csv`."""
+    """Get the path of the document that belongs to a table of forces: `NAME.repeats.json` for `NAME.csv`."""
     return forces_path.with_suffix(SUFFIX)
 
 
@@ -84,6 +84,6 @@ def read_repeats(path: Path) -> Repeats:
 
 
 def write_repeats(path: Path, repeats: Repeats, provenance: Provenance | None = None) -> None:
-    """Write the document. Raises AlreadyExistsError where the file exists, CannotWriteError where it cannot be
-    written."""
+    """Write the document. Raises AlreadyExistsError where the file exists, CannotWriteError where it cannot be written,
+    ValueError where a number is NaN or infinite."""
     write_json(path, FORMAT, VERSION, asdict(repeats), provenance)

@@ -13,7 +13,7 @@ from pathlib import Path
 from study.errors import StudyError, WrongUseError
 from study.session.views.participant_codes import CODE_RULE, is_code
 from study.store.disk.atomic_write import sync_folder
-from study.store.disk.privacy import PRIVATE_FOLDER, close_data_folder, make_folder
+from study.store.disk.privacy import PRIVATE_FOLDER, make_folder, restrict_data_folder
 from study.store.sessions.event_log import LOG_NAME
 
 FOLDER_PATTERN = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
@@ -107,7 +107,7 @@ def create_session_folder(data: Path, subject: str) -> SessionFolder:
     try:
         is_new = not data.exists()
         make_folder(data, private=True)
-        close_data_folder(data)
+        restrict_data_folder(data)
         for _ in range(1000):
             used_numbers = [
                 parse_session_number(session_folder.name)

@@ -27,15 +27,15 @@ LIVE_VERSION = 1
 
 _ACTIVITIES = get_args(Activity)
 """Values of the field `activity` that a reader accepts."""
-_MAX_BYTES = 1 << 16
+_MAX_FILE_BYTES = 1 << 16
 """Largest file that is read (bytes). Chosen: a file written by hapteq has about 1 kB."""
 
 
-def write_live(folder: Path, live: LiveState) -> None:
+def write_live(folder: Path, live_state: LiveState) -> None:
     """Write the live state into the session's folder, replacing the previous file; NaN and infinity become null. An
     OSError is ignored: a session must not end because its state cannot be displayed. Call only with the session's lock
     held (`session_lock`), because the name of the temporary file is fixed."""
-    values = {name: _replace_nonfinite(value) for name, value in asdict(live).items()}
+    values = {name: _replace_nonfinite(value) for name, value in asdict(live_state).items()}
     text = json.dumps({"format": LIVE_FORMAT, "version": LIVE_VERSION, **values}, allow_nan=False)
     temporary_path = folder / f".{LIVE_NAME}.part"
     # No fsync: only the current state matters, and a slow disk would delay the session.
@@ -51,10 +51,10 @@ def remove_live(folder: Path) -> None:
 
 
 def read_live(folder: Path) -> LiveState | None:
-    """Read the live state from a session's folder; None if the file is missing, unreadable, larger than `_MAX_BYTES`,
-    of another format or version, or has an invalid field. Never raises."""
+    """Read the live state from a session's folder; None if the file is missing, unreadable, larger than
+    `_MAX_FILE_BYTES`, of another format or version, or has an invalid field. Never raises."""
     try:
-        document = load_json(read_regular(folder / LIVE_NAME, _MAX_BYTES))
+        document = load_json(read_regular(folder / LIVE_NAME, _MAX_FILE_BYTES))
     except (OSError, ValueError):
         return None
     if not isinstance(document, dict):

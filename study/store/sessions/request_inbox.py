@@ -2,7 +2,8 @@
 
 The sender writes a file under a temporary name and renames it, so that the session never reads an incomplete request;
 the session reads and removes it. The final name is unique and begins with the kind of request, so that a stop is
-recognised even if its content cannot be read. Sent by `study.workflows.views.send_request`, taken by a running session.
+recognised even if its content cannot be read. Sent by `study.workflows.views` (`send_request`), taken by the session's
+program (`study.workflows.session.conduct_session`).
 """
 
 import errno
@@ -29,7 +30,7 @@ REQUEST_FORMAT = "hapteq-request"
 REQUEST_VERSION = 1
 """Version of the format; others are not read."""
 
-KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
+REQUEST_CLASSES: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
 """Class of each kind of request, by the beginning of the file's name."""
 _STOP_PREFIX = "stop"
 """Beginning of the name of a request to stop: it counts even if its content cannot be read."""
@@ -39,7 +40,7 @@ _SOURCES = get_args(RequestSource)
 """Origins of requests (`who`) that a reader accepts."""
 _MAX_REQUEST_BYTES = 1 << 16
 """Largest number of bytes of a request that are read. Chosen: a note has only a few sentences."""
-_MAX_PER_CALL = 50
+_MAX_TAKEN_PER_CALL = 50
 """Largest number of requests taken in one call. Chosen: many requests at once must not block the session's loop."""
 _request_counter = itertools.count()
 """Makes the names of this program's requests unique, and keeps them in order, within one tick of the clock."""
@@ -57,7 +58,9 @@ class RequestInbox:
     def send(self, request: Request) -> str:
         """Write a request. Returns its name, for `is_unread` and `take_back`. Raises StudyError if it cannot be
         written."""
-        kind = next(kind_name for kind_name, request_class in KINDS.items() if isinstance(request, request_class))
+        kind = next(
+            kind_name for kind_name, request_class in REQUEST_CLASSES.items() if isinstance(request, request_class)
+        )
         unique_key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_request_counter):06d}-{secrets.token_hex(4)}"
         name = f"{kind}-{unique_key}.json"
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
@@ -100,7 +103,7 @@ class RequestInbox:
                 self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
-        """Take and remove up to `_MAX_PER_CALL` requests, stops first, then oldest first. Never raises."""
+        """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first. Never raises."""
         try:
             # listdir takes half the time of Path.iterdir, twenty times a second.
             file_names = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
@@ -110,7 +113,9 @@ class RequestInbox:
             (file_name for file_name in file_names if file_name[0] != "." and file_name not in self._ignored_names),
             key=_make_sort_key,
         )
-        return tuple(request for name in names[:_MAX_PER_CALL] if (request := self._take_request(name)) is not None)
+        return tuple(
+            request for name in names[:_MAX_TAKEN_PER_CALL] if (request := self._take_request(name)) is not None
+        )
 
     def _make_folder(self) -> None:
         """Create the folder. Raises OSError, also for a symbolic link, which may lead outside the session."""
@@ -146,12 +151,13 @@ class RequestInbox:
 
 
 def _make_sort_key(name: str) -> tuple[bool, str]:
-    """Sort key of a file name: stops first, then by the time in the name."""
+    """Make the sort key of a file name: stops first, then by the time in the name."""
     return not name.startswith(_STOP_PREFIX), name.partition("-")[2]
 
 
 def _read_content(path: Path) -> bytes:
-    """Content of a regular file; empty for anything else. A link is not followed, and a named pipe does not block."""
+    """Read the first `_MAX_REQUEST_BYTES` bytes of a regular file; empty for anything else. A link is not followed, and
+    a named pipe does not block."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError:
@@ -173,7 +179,7 @@ def _parse_request(content: bytes) -> Request | None:
         return None
     if not isinstance(document, dict) or document.pop("format", None) != REQUEST_FORMAT:
         return None
-    request_class = KINDS.get(str(document.pop("request", None)))
+    request_class = REQUEST_CLASSES.get(str(document.pop("request", None)))
     if (
         document.pop("version", None) != REQUEST_VERSION
         or request_class is None
@@ -184,7 +190,7 @@ def _parse_request(content: bytes) -> Request | None:
 
 
 def _has_valid_fields(request_class: type[Request], values: dict[str, Any]) -> bool:
-    """Whether the values are exactly the fields of this kind, each of its type, from a known sender."""
+    """Whether the values are exactly the fields of this kind, each of its type, with an accepted origin."""
     field_types = {"who": str, "text": str, "adverse": bool}
     field_names = {field.name for field in fields(request_class)}
     return (

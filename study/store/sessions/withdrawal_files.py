@@ -101,8 +101,8 @@ def read_participant(folder: SessionFolder) -> SessionParticipant | None:
 
 
 def list_remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
-    """Names in the folder of a withdrawn session, except tombstone and lock; names of folders end in a slash. Empty if
-    the folder cannot be read."""
+    """List the names in the folder of a withdrawn session, except tombstone and lock; names of folders end in a slash.
+    Empty if the folder cannot be read."""
     try:
         with open_folder(folder.path) as opened_folder:
             names = [

@@ -21,19 +21,19 @@ LINE_BREAK_REPLACEMENT = "\0"
 """Replaces a line break within a path; no path contains this character."""
 
 
-def note_written_folder(source: Path, folder: Path, always: bool = False) -> None:
+def note_written_folder(source: Path, folder: Path, even_if_searched: bool = False) -> None:
     """Add the absolute path of `folder` to the list, unless it is listed already or a withdrawal would search it: the
     data folder, a folder directly in it, or any folder within a session. Errors of writing the list are ignored.
 
-    source: the data folder, or a session folder in it. always: add `folder` wherever it is, such as for an export,
-    which a withdrawal does not recognise.
+    source: the data folder, or a session folder in it. even_if_searched: add `folder` wherever it is, such as for an
+    export, which a withdrawal does not recognise.
     """
     folder, source = folder.resolve(), source.resolve()
     data_folder = source.parent if FOLDER_PATTERN.fullmatch(source.name) else source
     noted_folders = read_written_folders(data_folder)
     relative_parts = folder.relative_to(data_folder).parts if folder.is_relative_to(data_folder) else None
     is_searched = (
-        not always
+        not even_if_searched
         and relative_parts is not None
         and (len(relative_parts) < 2 or FOLDER_PATTERN.fullmatch(relative_parts[0]) is not None)
     )

@@ -34,17 +34,17 @@ def make_failure_outcome(failure: Failed, at_home: bool, words: Words = ENGLISH_
     )
 
 
-def make_completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outcome:
+def make_completion_outcome(finished: Finished, words: Words = ENGLISH_WORDS) -> Outcome:
     """Make the panel for a finished session: thresholds, warnings, path of the report. words: texts in the
     participant's language."""
-    results = end.results
+    results = finished.results
     sections = (
         ("Thresholds", "\n".join(results.table)),
         ("To know", "\n".join(f"• {warning}" for warning in results.warnings)),
         ("Report", results.report),
     )
     paragraphs = tuple((heading, text) for heading, text in sections if text)
-    title = f"The session is finished: {end.answers} answers"
+    title = f"The session is finished: {finished.answers} answers"
     return Outcome(title, (*_make_addressee_paragraphs(words), *paragraphs), ("look", "home", "quit"), is_problem=False)
 
 

@@ -15,17 +15,18 @@ _STROKES: dict[int, tuple[Point, ...]] = {
 """Corners of the polyline of each digit: (right, up) from its centre, in units of half its height. Drawn by hand."""
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=16)  # a few sizes of the panel
 def draw_large_digit(digit: int, columns: int, rows: int) -> tuple[str, ...]:
     """Draw the digit 1 or 2 as `rows` lines of `columns` braille characters, scaled to the smaller side of the canvas.
     Raises KeyError for another digit."""
     canvas = Canvas(columns, rows)
-    x, y = canvas.centre
+    centre_x, centre_y = canvas.centre
     # In dots: a tenth of the height, but wide enough that a small digit has no gaps.
-    stroke_width = max(2.5, y / 5)
-    half_height = min(x, y) - stroke_width / 2
+    stroke_width = max(2.5, centre_y / 5)
+    half_height = min(centre_x, centre_y) - stroke_width / 2
     corners = [
-        (x + half_height * corner_right, y - half_height * corner_up) for corner_right, corner_up in _STROKES[digit]
+        (centre_x + half_height * corner_right, centre_y - half_height * corner_up)
+        for corner_right, corner_up in _STROKES[digit]
     ]
     for start, end in pairwise(corners):
         canvas.draw_bar(start, end, stroke_width)

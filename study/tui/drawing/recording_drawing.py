@@ -15,14 +15,15 @@ from equalizer.signals.signal import FloatArray
 from study.tui.drawing.braille import Canvas
 
 LABEL_COLUMNS, DRAWING_COLUMNS, DRAWING_ROWS = 24, 54, 2
-"""Width of the label, and width and height of the drawing, in characters. Chosen."""
+"""Width of the label, and width and height of the drawing, in characters. Chosen: both fit into 80 columns."""
 _SHOWN_DECADES = 4.0
-"""Range of amplitudes that a spectrum shows, in decades below its maximum. Chosen."""
+"""Range of amplitudes that a spectrum shows, in decades below its maximum. Chosen: 80 dB."""
 
 
 def draw_time_series(channel: Channel) -> Iterable[str]:
-    """Draw a channel over time: each column of dots spans the lowest to the highest of its samples. The extremes of the
-    whole channel are written at the right, with their unit. Missing samples leave gaps."""
+    """Draw a channel over time, as two lines: each column of dots spans the lowest to the highest of its samples. The
+    extremes of the whole channel are written at the right, with their unit. Missing samples leave gaps; a channel
+    without finite samples gives one line."""
     finite_samples = channel.finite_samples
     if not finite_samples.size:
         yield f"{_format_channel_label(channel)} {'':{DRAWING_COLUMNS}} no samples"
@@ -55,7 +56,8 @@ def _compute_column_ranges(samples: FloatArray, column_count: int) -> list[tuple
 
 def draw_spectra(overview: Overview) -> Iterable[str]:
     """Draw the amplitude spectral densities of command and response channels, the square roots of their power spectral
-    densities, both axes logarithmic. Nothing is drawn without spectra; channels without power are left out."""
+    densities, each as two lines with both axes logarithmic; the lowest frequency of the spectra must be above 0.
+    Nothing is drawn without spectra; channels without power are left out."""
     if overview.spectra is None:
         return
     frequency_hz = overview.spectra.frequency_hz

@@ -173,14 +173,14 @@ class EngineCommands:
         self._link.drop_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
-            connect = partial(self._connect_requests, device_name)
+            connect = partial(self._register_session, device_name)
             yield Participant(display, HumanHand(), self._clock, self._link.requests, connect)
         finally:
             self._link.stop_device = None
 
-    def _connect_requests(self, device_name: str, folder: SessionFolder, device: Device) -> None:
-        """Called when session and device are open: send the session to the screen, and connect the screen's emergency
-        stop to the device."""
+    def _register_session(self, device_name: str, folder: SessionFolder, device: Device) -> None:
+        """Store the folder of the opened session, connect the screen's emergency stop to the device, and send the
+        session to the screen. Called once session and device are open."""
         self.session_folder = folder
         self._link.stop_device = device.stop
         self._link.send(SessionReady(folder.name, str(folder.path), device_name))
@@ -223,8 +223,8 @@ class EngineCommands:
         self._link.drop_replies()
 
         def request_placement(position: str, readings: tuple[float, float, float] | None) -> None:
-            """Ask the user to place the sensor in a position, and wait for the reply. readings: of the position
-            before."""
+            """Ask the user to place the sensor in a position, and wait for the reply. readings: mean raw values of the
+            three axes in the previous position; None before the first."""
             request = PlacementRequest(next(request_numbers), position, readings)
             self._link.send(request)
             while (reply := self._link.wait_for_reply(REPLY_POLL_S)) is None or reply.number != request.number:

@@ -30,6 +30,7 @@ class ScreenLink:
         self._received_count, self._taken_count, self._interrupted_count = 0, 0, 0
         """Numbers of commands received, taken by the main thread, and received before the last interruption. They are
         needed because an interrupted command may not have been begun or taken yet."""
+        # Requests of the screen to the session that runs in this engine.
         self.requests = QueuedRequests()
         self.stop_device: Callable[[], None] | None = None
         """Takes the force of the device off, and may be called from any thread; None while no device is open."""
@@ -88,7 +89,7 @@ class ScreenLink:
             self._replies.get()
 
     def compute_silence_s(self) -> float:
-        """Time since the last message of the screen (s)."""
+        """Compute the time since the last message of the screen (s)."""
         return time.monotonic() - self._last_message_s
 
     def _listen(self) -> None:
@@ -132,5 +133,5 @@ class ScreenLink:
         it may be waiting for a disk or a driver."""
         self._interrupted_count = self._received_count
         self._interrupt()
-        if (stop := self.stop_device) is not None:
-            stop()
+        if (stop_device := self.stop_device) is not None:
+            stop_device()

@@ -55,7 +55,7 @@ class InputQueue:
             and event.key not in IMMEDIATE_KEYS
             and get_arrival_time_s(event) < self._ignored_until_s
         ):
-            # Also a key that a widget did not handle and that bubbles up: the bindings are now those of another screen.
+            # This includes a key that bubbles up from a widget: the bindings now belong to another screen.
             return
         if not _is_user_input(event):
             await self._dispatch(event)

@@ -22,7 +22,8 @@ class LineInput:
 
     def read(self, timeout_s: float) -> str | None:
         """Read the next line, decoded as UTF-8, without surrounding blanks. None if nothing arrives within `timeout_s`
-        (s), or if what arrives first is an incomplete line. Raises EOFError at the end of the input."""
+        (s), or if what arrives first is an incomplete line; the last line of a pipe needs no line end. Raises EOFError
+        at the end of the input."""
         line = self._take_line()
         if line is not None:
             return line
@@ -31,7 +32,7 @@ class LineInput:
             return None
         if self._read_available():
             return self._take_line()
-        if not self._has_line_left():
+        if not self._has_remaining_line():
             raise EOFError
         self._buffer += b"\n"
         return self._take_line()
@@ -42,7 +43,7 @@ class LineInput:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
             self._read_available()
-        return not self._has_line_left()
+        return not self._has_remaining_line()
 
     def discard_early_lines(self) -> None:
         """Discard all input typed at a terminal before this call, complete lines included. Lines of a pipe are kept."""
@@ -61,7 +62,7 @@ class LineInput:
         self._buffer += received_bytes
         return not self._has_reached_end
 
-    def _has_line_left(self) -> bool:
+    def _has_remaining_line(self) -> bool:
         """Whether the buffer holds a line at the end of the input. The last line of a pipe needs no line end; text
         typed at a terminal without Enter is no line."""
         return b"\n" in self._buffer or (self._buffer != b"" and not self.is_interactive)

@@ -111,7 +111,8 @@ def _wait_briefly(conversation: Conversation, sign_of_life: SignOfLife, wait_s: 
 
 
 def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> tuple[int, str]:
-    """Number of the next (step 1) or previous (-1) vibration, unchanged at either end, and a sentence about it."""
+    """Step to the next (step 1) or previous (-1) vibration. Returns its number, unchanged at either end of the range,
+    and a sentence about it."""
     new_vibration = vibration + step
     if new_vibration < 1:
         return vibration, words["line_demo_first"]

@@ -24,14 +24,14 @@ def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignO
     conversation.say("", f"{rest_text} {words.fill_count('runs_left', notice.runs_left)}")
     if notice.progress is not None:
         conversation.say(describe_progress(notice.progress, words))
-    started_s = conversation.clock.now_s()
-    if _count_down(started_s + notice.seconds, conversation, sign_of_life):
+    start_s = conversation.clock.now_s()
+    if _count_down(start_s + notice.seconds, conversation, sign_of_life):
         conversation.discard_early_lines()
         conversation.say_texts("enter_goes_on")
         line = conversation.wait(sign_of_life)
         if line is WaitOver.INPUT_ENDED or (isinstance(line, Line) and line.word == "q"):
             raise KeyboardInterrupt
-    return conversation.clock.now_s() - started_s
+    return conversation.clock.now_s() - start_s
 
 
 def run_pause(
@@ -71,7 +71,7 @@ def run_pause(
 
 
 def _list_pause_keys(has_notes: bool, words: Words) -> str:
-    """Text on the keys of a pause. has_notes: whether notes are offered."""
+    """List the keys of a pause as text. has_notes: whether notes are offered."""
     return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if has_notes else [])))
 
 
@@ -99,8 +99,8 @@ def _take_note(is_adverse: bool, conversation: Conversation, store_note: Callabl
 
 
 def _count_down(until_s: float, conversation: Conversation, sign_of_life: SignOfLife) -> bool:
-    """Write the remaining time every `COUNTDOWN_INTERVAL_S`, until `until_s` on the session's clock (s). False if the
-    sign of life ended the wait."""
+    """Wait until `until_s` on the session's clock (s), and write the remaining time every `COUNTDOWN_INTERVAL_S` while
+    more than that is left. Returns False if the sign of life ended the wait."""
     next_message_s = float("-inf")
     while (remaining_s := until_s - conversation.clock.now_s()) > 1e-9:  # tolerance for rounding of clock times
         now_s = conversation.clock.now_s()

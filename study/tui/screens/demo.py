@@ -1,6 +1,6 @@
 """Screen of the labelled demonstration before the trials, in which a participant feels each direction of motion.
 
-The participant plays both directions at each vibration frequency as often as wanted, with the labels shown, and so
+The participant plays both directions at each vibration frequency, any number of times, with the labels shown, and so
 learns what the answers of the later trials mean. The screen returns one choice at a time; the session plays it. Opened
 by `study.tui.app.sitting_screens`.
 """
@@ -84,7 +84,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         """Do nothing: the binding exists for its entry in the footer; `on_key` handles the answers."""
 
     def action_turn(self, step: int) -> None:
-        """Select the next slower (-1) or faster (1) vibration; at the end of the range, say so."""
+        """Select the next slower (-1) or faster (1) vibration; at the end of the range, only show a message."""
         vibration = self._vibration + step
         if vibration < 1:
             self._redraw(self.words["demo_slowest"])

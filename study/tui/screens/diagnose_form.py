@@ -130,7 +130,7 @@ class DiagnoseForm(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _read_field(self, field: str) -> str:
-        """The text of a field, without surrounding blanks."""
+        """Read the text of a field, without surrounding blanks."""
         return self.query_one(f"#{field}", Input).value.strip()
 
     def _show_message(self, text: str, field: str) -> None:

@@ -134,8 +134,8 @@ class HomeScreen(Screen[None]):
             with Vertical(id="left"):
                 yield NewSessionForm(id="new")
                 yield Static(GUIDE_TEXT, id="guide")
-            with Vertical(id="past") as past:
-                past.border_title = "Sessions"
+            with Vertical(id="past") as session_box:
+                session_box.border_title = "Sessions"
                 yield SessionTable(id="sessions")
                 with VerticalScroll(id="empty"):
                     yield Static(EMPTY_LIST_TEXT)

@@ -16,13 +16,12 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.watching.requests import NoteAsked, RequestSource
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
+from study.tui.screens.note_prompt import MAX_NOTE_CHARACTERS
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
-MAX_NOTE_CHARACTERS = 500
-"""Maximum length of a note. Chosen: a few sentences, so that a line of the log stays readable."""
 WRITERS: tuple[RequestSource, ...] = ("participant", "experimenter")
 """Writers among whom the dialog lets the user choose, in this order."""
 

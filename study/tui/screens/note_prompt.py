@@ -13,7 +13,7 @@ from textual.widgets import Input, Label
 from study.tui.dismiss_screen import dismiss_screen
 
 MAX_NOTE_CHARACTERS = 500
-"""Longest note (characters). Chosen; the same as in `note`."""
+"""Maximum length of a note, in characters. Chosen: a few sentences, so that a line of the log stays readable."""
 
 
 class NotePrompt(ModalScreen[str | None]):

@@ -95,7 +95,7 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         self.show_outcome(self._outcome)
 
     def show_outcome(self, outcome: Outcome) -> None:
-        """Replace the content, such as where the engine does not answer a stop. May be called before the first
+        """Replace the content, for example when the engine does not answer a stop. May be called before the first
         frame."""
         self._outcome, self.words = outcome, outcome.words
         if not self.query("#told"):
@@ -110,7 +110,7 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         self.refresh_bindings()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Allow only the steps that the content offers; other actions always."""
+        """Allow only the steps that the content offers; other actions are always allowed."""
         return action != "decide" or parameters[0] in self._outcome.decisions
 
     def action_enter(self) -> None:

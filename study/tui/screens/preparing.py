@@ -1,5 +1,5 @@
 """Screen that is shown while the device is prepared: current step and elapsed time. It has no progress bar, because the
-duration is unknown. Shown by `study.tui.app.sitting_screens`."""
+duration is unknown. Shown by `study.tui.app.sitting_screens`; the screen `diagnosing` uses `describe_elapsed`."""
 
 import time
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.translated_screen import TranslatedScreen
 
 UPDATE_INTERVAL_S = 0.5
-"""Interval (s) at which the elapsed time is drawn. Chosen."""
+"""Interval (s) at which the elapsed time is drawn. Chosen: half of its resolution, a second."""
 PLACEHOLDER_TEXT = "…"
 """Text that is shown as long as there is no sentence."""
 
@@ -78,7 +78,7 @@ class PreparingScreen(TranslatedScreen[None]):
         self.query_one("#elapsed", Static).update(self._describe_wait())
 
     def _describe_wait(self) -> str:
-        """Elapsed time of the present wait in words; empty without a sentence."""
+        """Describe the elapsed time of the present wait in words; empty without a sentence."""
         return describe_elapsed(self._now_s() - self._start_s, self.words) if self._sentence else ""
 
 

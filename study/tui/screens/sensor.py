@@ -39,7 +39,8 @@ In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
 FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
 """Name, label and placeholder of each field, from top to bottom."""
 DEFAULT_BAUD_RATE = 2_000_000
-"""Rate of the serial line (bit/s) where the field is empty."""
+"""Rate of the serial line (bit/s) where the field is empty. Equal to the default of `baud` in
+`study.devices.force_dimension.lab`; the screens import no device modules."""
 POSITION_COUNT = 6
 """Number of positions of the calibration: each of three axes up and down."""
 
@@ -92,10 +93,10 @@ class SensorScreen(Screen[None]):
     def handle_message(self, message: PlacementRequest | CalibrationComputed | CalibrationStored) -> None:
         """Handle a message of the engine: show the next position, the result, or that the result was written."""
         match message:
-            case PlacementRequest(number=number, position=position, previous_reading=readings):
+            case PlacementRequest(number=number, position=position, previous_reading=reading):
                 self._pending_placement = message
-                if readings is not None:
-                    self._append_reading_line(f"✓ read {', '.join(f'{value:.0f}' for value in readings)}")
+                if reading is not None:
+                    self._append_reading_line(f"✓ read {', '.join(f'{value:.0f}' for value in reading)}")
                 self._show_instruction(
                     f"{number} of {POSITION_COUNT}: lay the sensor down with {position}, let go of it, press Enter."
                 )

@@ -75,7 +75,10 @@ class SessionScreen(Screen[None]):
         Binding("o", "open_report", "Open report"),
         Binding("d", "diagnose", "Diagnose"),
         Binding("x", "withdraw", "Withdraw"),
-        *(Binding(str(n), f"page('{tab}')", tab, show=False) for n, tab in enumerate(PAGES, start=1)),
+        *(
+            Binding(str(page_number), f"page('{tab}')", tab, show=False)
+            for page_number, tab in enumerate(PAGES, start=1)
+        ),
     ]
 
     def __init__(self, view: SessionView) -> None:
@@ -126,7 +129,7 @@ class SessionScreen(Screen[None]):
         self._focus_page()
 
     def _focus_page(self) -> None:
-        """Focus the part of the selected page that scrolls."""
+        """Focus the widget of the selected page that scrolls."""
         page = self.query_one(TabbedContent).active_pane
         if page is not None:
             for scrollable in page.query("VerticalScroll, LongText"):
@@ -154,12 +157,12 @@ class SessionScreen(Screen[None]):
     def action_withdraw(self) -> None:
         """Ask for confirmation, and request the withdrawal where it is given."""
 
-        def act_on_decision(erase: bool | None) -> None:
+        def request_if_confirmed(is_confirmed: bool | None) -> None:
             """Request the withdrawal where the dialog returned True."""
-            if erase:
+            if is_confirmed:
                 self.post_message(CommandRequested(Withdraw(self._view.line.path)))
 
-        self.app.push_screen(WithdrawPrompt(self._view.line.subject), act_on_decision)
+        self.app.push_screen(WithdrawPrompt(self._view.line.subject), request_if_confirmed)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Whether this session allows an action; the footer shows only allowed actions."""

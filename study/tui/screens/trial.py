@@ -85,6 +85,7 @@ class TrialScreen(TranslatedScreen[None]):
         self._time_limit_timer: Timer | None = None
         # Problem shown below the answers; empty for none.
         self._trouble = ""
+        # Whether a question was shown together with this problem, so that the next call of `arm` removes it.
         self._is_trouble_old = False
         self._verdict: bool | None = None
         """Whether the last answer was right; None without feedback."""
@@ -145,8 +146,8 @@ class TrialScreen(TranslatedScreen[None]):
         self._show_message(self._describe_verdict())
 
     def show_trouble(self, sentence: str) -> None:
-        """Show a problem below the answers. It stays until the end of the next trial, so that there is time to read
-        it."""
+        """Show a problem below the answers. So that there is time to read it, the next call of `arm` keeps it, and the
+        call after that removes it."""
         self._trouble = sentence
         self._is_trouble_old = False
         if self._is_composed:

@@ -40,7 +40,7 @@ class WatchController:
 
         def open_confirmed() -> None:
             send_request(NoteAsked("program", VIEW_SHOWN_NOTE))
-            self.open_now(session_folder, send_request)
+            self.open_view(session_folder, send_request)
 
         confirm_view(self._app, Path(session_folder).name, open_confirmed)
 
@@ -49,11 +49,11 @@ class WatchController:
         confirmation; nothing is logged."""
         from study.tui.screens.confirm_view import confirm_view
 
-        confirm_view(self._app, Path(session_folder).name, lambda: self.open_now(session_folder, send_request))
+        confirm_view(self._app, Path(session_folder).name, lambda: self.open_view(session_folder, send_request))
 
-    def open_now(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
+    def open_view(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
         """Open the view without confirmation, unless one is open or being opened. Returns before it is open: a thread
-        starts the reading process, because that takes time. A failure is shown as a notification."""
+        starts the reading process, because that takes time. An OSError is shown as a notification."""
         if self._is_starting or (self._screen is not None and self._screen in self._app.screen_stack):
             return
         self._is_starting = True

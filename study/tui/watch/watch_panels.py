@@ -48,12 +48,12 @@ _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come"
 """Symbol of the state of a run, a single character."""
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
 """Style of a trial's result."""
-BAR_CELLS = 6
-"""Length of a bar in character cells."""
+BAR_LENGTH_CELLS = 6
+"""Length of a bar in character cells (chosen)."""
 
 
-def describe_standing(view: WatchView) -> Content:
-    """Describe the status of the session, its name, and what happens at the moment."""
+def format_status_line(view: WatchView) -> Content:
+    """Format a line with the status of the session, its name, and its present activity."""
     status_text = f"{STATUS_SYMBOLS[view.standing]} {view.standing.upper()}"
     return Content.assemble(
         (status_text, _STATUS_STYLES[view.standing]), "  ", (view.session, "bold"), f"  {describe_activity(view)}"
@@ -80,9 +80,10 @@ def format_runs(view: WatchView, rows: int) -> Content:
 
 def format_trials(view: WatchView, rows: int, columns: int) -> Content:
     """Format the table of the latest trials, newest first: level (N), direction and answer, response time (s),
-    acceleration (m/s²) along the direction and across it. The open trial is listed without its direction. rows,
-    columns: room, in cells."""
+    acceleration (m/s²) along the direction and across it. The open trial is listed without its direction; a legend
+    follows where a trial was not measured and there is room for it. rows, columns: available space, in cells."""
     header = "trial     N shown said           s m/s²  off"
+    # 10 columns: two blanks and the 8 columns from which `_format_trial` writes a remark.
     lines = [Content.styled(f"{header}  remark" if columns > len(header) + 10 else header, MUTED)]
     open_trial = view.open_trial
     if open_trial is not None:
@@ -99,7 +100,7 @@ def format_gauges(view: WatchView) -> Content:
     """Format elapsed time (min) and vibration dose A(8) (m/s²) as bars with numbers; catch trials, handle, sensor,
     device and drift in words."""
     exposure = view.exposure
-    rows: list[tuple[str, Content]] = [
+    labelled_values: list[tuple[str, Content]] = [
         ("Time", _format_bar(exposure.time_share, describe_elapsed_time(exposure))),
         ("A(8)", _format_bar(exposure.dose_share, describe_dose(exposure))),
         ("Catch", Content.styled(describe_catch_trials(view), "bold $text-error" if view.catch_lapses else "")),
@@ -108,16 +109,18 @@ def format_gauges(view: WatchView) -> Content:
         ("Device", Content(describe_device(view))),
     ]
     if view.probes:
-        over_limit = any(drift.beyond for drift in view.drifts)
-        rows.append(("Drift", Content.styled(describe_drifts(view), "bold $text-error" if over_limit else "")))
-    return Content("\n").join(Content.assemble((f"{name:<6} ", MUTED), text) for name, text in rows)
+        has_excessive_drift = any(drift.beyond for drift in view.drifts)
+        labelled_values.append(
+            ("Drift", Content.styled(describe_drifts(view), "bold $text-error" if has_excessive_drift else ""))
+        )
+    return Content("\n").join(Content.assemble((f"{name:<6} ", MUTED), text) for name, text in labelled_values)
 
 
 def format_details(view: WatchView) -> Content:
     """Format participant, device, forms, practice, drift and notes as text, in sections."""
     participant_text = f"simulated '{view.observer}'" if view.observer else "a person"
     answers_text = "1 answer" if view.answers == 1 else f"{view.answers} answers"
-    parts: list[StyledText] = [
+    section_parts: list[StyledText] = [
         *_format_section(
             "Session", [f"{view.subject}, {participant_text}, {answers_text}", view.protocol, f"Device: {view.device}"]
         ),
@@ -141,7 +144,7 @@ def format_details(view: WatchView) -> Content:
             ],
         ),
     ]
-    return Content.assemble(*parts)
+    return Content.assemble(*section_parts)
 
 
 def _format_section(title: str, lines: Sequence[str]) -> list[StyledText]:
@@ -154,12 +157,12 @@ def _describe_outcome(passed: bool) -> str:
     return "passed" if passed else "NOT passed"
 
 
-def _select_runs_near_current(runs: tuple[WatchedRun, ...], rows: int) -> tuple[WatchedRun, ...]:
-    """Select at most `rows` consecutive runs (at least 1), with the current run near their middle; the last runs where
-    there is no current run."""
+def _select_runs_near_current(runs: tuple[WatchedRun, ...], max_runs: int) -> tuple[WatchedRun, ...]:
+    """Select at most `max_runs` consecutive runs (at least 1), with the current run near their middle; the last runs
+    where there is no current run."""
     current_index = next((index for index, run in enumerate(runs) if run.status == "present"), len(runs) - 1)
-    first_index = max(0, min(current_index - rows // 2, len(runs) - rows))
-    return runs[first_index : first_index + max(1, rows)]
+    first_index = max(0, min(current_index - max_runs // 2, len(runs) - max_runs))
+    return runs[first_index : first_index + max(1, max_runs)]
 
 
 def _format_run(view: WatchView, run: WatchedRun) -> Content:
@@ -170,8 +173,8 @@ def _format_run(view: WatchView, run: WatchedRun) -> Content:
 
 
 def _format_trial(trial: ClosedTrial, columns: int) -> Content:
-    """Format a row of the table of trials. The remark is shortened to the room that is left; with less than 8 columns a
-    "!" stands for it. A "+" after the number marks each repetition, up to two."""
+    """Format a row of the table of trials. The remark is cut to the remaining columns; where fewer than 8 remain, "!"
+    marks that there is one. A "+" after the number marks each repetition, up to two."""
     verdict = name_verdict(trial)
     number_text = f"{trial.trial + 1}{'+' * min(trial.attempt, 2)}"
     left_text = (
@@ -210,8 +213,8 @@ def _format_decimal(value: float | None, width: int) -> str:
 def _format_bar(share: float, description: str) -> Content:
     """Format a bar for a share of a limit (from 0; 1 and more fill it), with a description: in the style of a warning
     from 0.8 (chosen: the limit comes near), of an error from 1."""
-    filled_cells = round(min(1.0, share) * BAR_CELLS)
+    filled_cells = round(min(1.0, share) * BAR_LENGTH_CELLS)
     style = "bold $text-error" if share >= 1 else "bold $text-warning" if share >= 0.8 else ""
     return Content.assemble(
-        ("█" * filled_cells, style), ("░" * (BAR_CELLS - filled_cells), MUTED), (f" {description}", style)
+        ("█" * filled_cells, style), ("░" * (BAR_LENGTH_CELLS - filled_cells), MUTED), (f" {description}", style)
     )

@@ -180,7 +180,7 @@ class WatchScreen(Screen[None]):
         if view is None:
             return
         self._redraw()
-        self.query_one("#standing", Static).update(watch_panels.describe_standing(view))
+        self.query_one("#standing", Static).update(watch_panels.format_status_line(view))
         self.query_one("#levels").border_title = format_staircase_title(view)
         self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
         self.query_one("#details", Static).update(watch_panels.format_details(view))

@@ -1,11 +1,12 @@
-"""Containers of the participant's screens (`study.tui.screens`), with lines of readable width: a framed card for short
-text, a scrolling sheet for long text."""
+"""Containers of the screens (`study.tui.screens`), with lines of readable width (74 and 100 columns, chosen): a framed
+card for short text, a scrolling sheet for long text."""
 
 from textual.containers import Vertical, VerticalScroll
 
 
 class Card(Vertical):
-    """Framed box with a title, as high as its content, at most as the screen. The screen's `align` style places it."""
+    """Framed box with a title, as high as its content and at most as high as the screen. The screen's `align` style
+    places it. CSS classes of its widgets: `strong` (bold), `gap` (an empty line above)."""
 
     DEFAULT_CSS = """
     Card {
@@ -17,12 +18,14 @@ class Card(Vertical):
     """
 
     def __init__(self, title: str) -> None:
+        """title: text in the upper edge of the frame."""
         super().__init__()
         self.border_title = title
 
 
 class Sheet(VerticalScroll):
-    """Column that scrolls vertically, for text that is longer than the screen."""
+    """Column that scrolls vertically, for text that is longer than the screen. CSS classes of its widgets: `title`,
+    `strong` (bold), `gap` (an empty line above)."""
 
     DEFAULT_CSS = """
     Sheet {

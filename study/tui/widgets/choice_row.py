@@ -21,9 +21,10 @@ CHOICE_GAP_CELLS = 3
 
 
 class ChoiceRow(Widget, can_focus=True):
-    """Choices side by side, or one below the other where they do not fit. Arrow keys move, Space or a click chooses,
-    Enter chooses and leaves, a digit chooses by number. Nothing is selected unless `chosen`, the index of an earlier
-    answer, is given, and moving over a choice does not select it: an agreement must be intended."""
+    """Choices side by side, or one below the other where they do not fit. Arrow keys move the cursor; Space or a click
+    selects, Enter selects and goes to the next question, a digit or first letter selects (`find_choice`). Nothing is
+    selected unless `chosen`, the index of an earlier answer, is given. Moving the cursor does not select, because
+    consent must be deliberate."""
 
     DEFAULT_CSS = """
     ChoiceRow { height: auto; width: 1fr; }
@@ -72,16 +73,16 @@ class ChoiceRow(Widget, can_focus=True):
         return "" if self.chosen is None else self._choices[self.chosen]
 
     def on_key(self, event: Key) -> None:
-        if event.key in ("up", "down") and self._move_within(1 if event.key == "down" else -1):
+        if event.key in ("up", "down") and self._move_vertically(1 if event.key == "down" else -1):
             event.stop()
         elif event.character and (index := find_choice(self._choices, event.character)) is not None:
             event.stop()
-            self._choose(index)
+            self._select_choice(index)
 
     def on_click(self, event: Click) -> None:
         index = self.find_choice_at(event.x, event.y)
         if index is not None:
-            self._choose(index)
+            self._select_choice(index)
 
     def find_choice_at(self, x: int, y: int) -> int | None:
         """Find the index of the choice drawn in the cell at column x and row y; None between choices."""
@@ -100,7 +101,7 @@ class ChoiceRow(Widget, can_focus=True):
 
     def action_choose(self) -> None:
         if self.cursor is not None:
-            self._choose(self.cursor)
+            self._select_choice(self.cursor)
 
     def action_choose_and_leave(self) -> None:
         self.action_choose()
@@ -112,18 +113,18 @@ class ChoiceRow(Widget, can_focus=True):
 
     def render(self) -> Text:
         text = Text(no_wrap=True)
-        column = row = 0
+        text_column = text_row = 0
         for index, choice_position in enumerate(self._place_choices(self.size.width)):
-            if choice_position[1] > row:
+            if choice_position[1] > text_row:
                 text.append("\n")
-                column, row = 0, choice_position[1]
-            text.append(" " * (choice_position[0] - column))
-            text.append(self._format_label(index), self._choose_style(index))
-            column = choice_position[0] + len(self._format_label(index))
+                text_column, text_row = 0, choice_position[1]
+            text.append(" " * (choice_position[0] - text_column))
+            text.append(self._format_label(index), self._get_label_style(index))
+            text_column = choice_position[0] + len(self._format_label(index))
         return text
 
-    def _choose_style(self, index: int) -> str:
-        """Choose the style of a choice: under the cursor, selected, or plain."""
+    def _get_label_style(self, index: int) -> str:
+        """Get the style of a choice: under the cursor, selected, or plain."""
         if (self.has_focus or self.is_current) and index == self.cursor:
             return str(self.get_component_rich_style("choice-row--cursor"))
         return "bold" if index == self.chosen else ""
@@ -141,16 +142,16 @@ class ChoiceRow(Widget, can_focus=True):
             return [(0, index) for index in range(len(label_widths))]
         return [(sum(label_widths[:index]) + CHOICE_GAP_CELLS * index, 0) for index in range(len(label_widths))]
 
-    def _move_within(self, step: int) -> bool:
+    def _move_vertically(self, step: int) -> bool:
         """Move the cursor through vertically listed choices. Returns False beyond their ends and for choices side by
-        side: then the key is left to the form, which goes to another question."""
+        side; the form then handles the key and goes to another question."""
         new_cursor = move_mark(self.cursor, step, len(self._choices), stop_at_ends=False) if self.stacked else None
         if new_cursor is None:
             return False
         self.cursor = new_cursor
         return True
 
-    def _choose(self, index: int) -> None:
+    def _select_choice(self, index: int) -> None:
         """Select the choice, and post `Chosen`."""
         self.cursor = self.chosen = index
         self.post_message(self.Chosen(self))

@@ -1,4 +1,4 @@
-"""Panel of one of the two answers of a trial: its number, its direction as a thick line, and its description in words.
+"""Panel for one of the two answers of a trial: its number, its direction as a thick line, and its description in words.
 
 Number, words and the heavier frame carry the same information as the colour, so that colour is not needed. Used by the
 screens `trial`, `playing`, `instructions` and `demo`.
@@ -31,9 +31,10 @@ demonstration)."""
 
 
 class DirectionPanel(Widget):
-    """Draws a large digit, the direction as a thick line in its colour, and its description. picture: None for an
-    interval, which has no direction; then only the number is drawn. mark: shown as a word in the frame; taken, saved
-    and now also by a heavier frame."""
+    """Widget with a large digit, the direction as a thick line in its colour, and its description. number: of the
+    answer, 1 or 2. picture: None for an interval, which has no direction; then only the number is drawn. mark: shown as
+    a word in the frame; taken, saved and now also by a heavier frame. words: texts in the language of the
+    participant."""
 
     DEFAULT_CSS = """
     DirectionPanel {
@@ -67,7 +68,7 @@ class DirectionPanel(Widget):
     def render_line(self, y: int) -> Strip:
         width, height = self.size
         base_style = self.rich_style
-        digit_style = base_style + self.get_component_rich_style(
+        direction_style = base_style + self.get_component_rich_style(
             "direction-panel--one" if self.number == 1 else "direction-panel--two", partial=True
         )
         description_lines = self._wrap_description()
@@ -77,12 +78,12 @@ class DirectionPanel(Widget):
                 [Segment(description_lines[y - drawing_height].center(width)[:width], base_style + Style(bold=True))],
                 width,
             )
-        drawing, margin = self._make_drawing()
+        drawing, left_margin = self._make_drawing()
         drawing_row = y - (drawing_height - len(drawing)) // 2
         row_text = drawing[drawing_row] if 0 <= drawing_row < len(drawing) else ""
         digit_row = LARGE_DIGITS[self.number][y] if y < 3 and self.picture is not None else ""
-        text = f" {digit_row}".ljust(margin) + row_text
-        return Strip([Segment(text.ljust(width)[:width], digit_style)], width)
+        text = f" {digit_row}".ljust(left_margin) + row_text
+        return Strip([Segment(text.ljust(width)[:width], direction_style)], width)
 
     def _make_drawing(self) -> tuple[tuple[str, ...], int]:
         """Draw the direction or the number. Returns the rows, and the number of free columns to their left."""

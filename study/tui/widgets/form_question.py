@@ -26,6 +26,7 @@ class FormQuestion(Vertical):
     """
 
     def __init__(self, number: int, field: FormField, words: Words = ENGLISH_WORDS) -> None:
+        """number: of the question, from 1. words: texts in the language of the participant."""
         super().__init__()
         self.field = field
         self._number = number
@@ -34,9 +35,9 @@ class FormQuestion(Vertical):
     def compose(self) -> ComposeResult:
         yield LiteralText(f"{self._number}. {self.field.label}")
         if self.field.choices:
-            row = ChoiceRow(self.field.choices)
-            row.can_focus = False
-            yield row
+            choice_row = ChoiceRow(self.field.choices)
+            choice_row.can_focus = False
+            yield choice_row
         else:
             yield Static(classes="written")
 
@@ -53,15 +54,15 @@ class FormQuestion(Vertical):
             self.scroll_visible(animate=False)
         self.set_class(is_current, "-at")
         if self.field.choices:
-            row = self.query_one(ChoiceRow)
-            row.cursor, row.is_current = entry.marked, is_current
-            row.chosen = self.field.choices.index(entry.answer) if entry.answer in self.field.choices else None
+            choice_row = self.query_one(ChoiceRow)
+            choice_row.cursor, choice_row.is_current = entry.marked, is_current
+            choice_row.chosen = self.field.choices.index(entry.answer) if entry.answer in self.field.choices else None
         else:
             self.query_one(".written", Static).update(self._format_answer(entry, is_current))
 
     def _format_answer(self, entry: FieldEntry, is_current: bool) -> Text:
         """Format the entered text, or a hint (with the range of a number) while nothing is entered. is_current: whether
-        to show the cursor."""
+        the cursor of the form is on this question, so that the text cursor is shown."""
         if not entry.answer:
             hint = self._words["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:

@@ -24,27 +24,27 @@ class LongText(ScrollView, can_focus=True):
         super().__init__(id=id)
         self._lines = lines
         self._wrapped_lines: list[str] = []
-        self._width = 0
+        self._wrap_width = 0
 
     def show(self, lines: tuple[str, ...]) -> None:
         """Show these lines in place of the previous ones."""
-        self._lines, self._width = lines, 0
+        self._lines, self._wrap_width = lines, 0
         self._wrap_lines(self.scrollable_content_region.width)
 
     def on_resize(self) -> None:
         self._wrap_lines(self.scrollable_content_region.width)
 
     def render_line(self, y: int) -> Strip:
-        index = y + self.scroll_offset.y
-        text = self._wrapped_lines[index] if index < len(self._wrapped_lines) else ""
+        line_index = y + self.scroll_offset.y
+        text = self._wrapped_lines[line_index] if line_index < len(self._wrapped_lines) else ""
         width = self.scrollable_content_region.width
         return Strip([Segment(text, self.rich_style)]).adjust_cell_length(width, self.rich_style)
 
     def _wrap_lines(self, width: int) -> None:
         """Wrap all lines to `width` characters and redraw, unless they are wrapped to this width already or it is 0."""
-        if width <= 0 or width == self._width:
+        if width <= 0 or width == self._wrap_width:
             return
-        self._width = width
+        self._wrap_width = width
         self._wrapped_lines = [wrapped_line for line in self._lines for wrapped_line in _wrap_line(line, width)]
         self.virtual_size = Size(width, len(self._wrapped_lines))
         self.refresh()

@@ -25,8 +25,9 @@ PLACEHOLDER_OPTIONS = [("…", "")]
 
 
 class NewSessionForm(Vertical):
-    """Fields of a new session. F5 or the button posts `BeginRequested` if all fields are valid; otherwise a line below
-    names the problem, and the field of the code or of the protocol gets the focus."""
+    """Fields of a new session. F5, the button, or Enter in the field of the code posts `BeginRequested` if all fields
+    are valid; otherwise a line below states the problem, and the field of the code or of the protocol gets the
+    focus."""
 
     DEFAULT_CSS = """
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
@@ -84,7 +85,7 @@ class NewSessionForm(Vertical):
     @on(Input.Submitted, "#code")
     @on(Button.Pressed, "#begin")
     def _submit(self) -> None:
-        """Post `BeginRequested`, or show the problem and focus its field."""
+        """Post `BeginRequested`, or show the problem and focus its field. Does nothing while the button is disabled."""
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
@@ -93,13 +94,15 @@ class NewSessionForm(Vertical):
             self._show_message(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
-        model = self._read_selected("#model") if self._is_equalized else ""
-        self.post_message(BeginRequested(code, self._read_selected("#protocol"), self._read_selected("#device"), model))
+        model = self._read_selected_value("#model") if self._is_equalized else ""
+        self.post_message(
+            BeginRequested(code, self._read_selected_value("#protocol"), self._read_selected_value("#device"), model)
+        )
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
     def _show_problem(self) -> None:
-        """Show the problem of the present entries, a notice on the code, or the protocol's title."""
+        """Show the problem of the present entries, else a notice on the code, else the title of the protocol."""
         if self._home is None:
             return
         code = self._code
@@ -113,7 +116,7 @@ class NewSessionForm(Vertical):
         elif notice := self._describe_earlier_sessions(code):
             self._show_message(notice, "-notice")
         else:
-            protocol_name = self._read_selected("#protocol")
+            protocol_name = self._read_selected_value("#protocol")
             self._show_message(
                 next((entry.title for entry in self._home.protocols if entry.name == protocol_name), ""), ""
             )
@@ -121,7 +124,7 @@ class NewSessionForm(Vertical):
     @property
     def _is_equalized(self) -> bool:
         """Whether the selected protocol equalizes its stimuli, and so needs a model."""
-        protocol_name = self._read_selected("#protocol")
+        protocol_name = self._read_selected_value("#protocol")
         return self._home is not None and any(
             protocol.equalized for protocol in self._home.protocols if protocol.name == protocol_name
         )
@@ -129,7 +132,7 @@ class NewSessionForm(Vertical):
     @property
     def _model_problem(self) -> str:
         """Problem of a missing model, in words; empty if there is none."""
-        if not self._is_equalized or self._read_selected("#model"):
+        if not self._is_equalized or self._read_selected_value("#model"):
             return ""
         return "This protocol needs a model, next to the data: hapteq record, hapteq identify."
 
@@ -140,15 +143,15 @@ class NewSessionForm(Vertical):
 
     def _describe_withdrawal(self, code: str) -> str:
         """Describe the problem of a code whose participant withdrew; empty for other codes."""
-        return next((f"{code} withdrew: this code is not given again." for session in self._list_sessions_of(code)
+        return next((f"{code} withdrew: this code is not given again." for session in self._list_code_sessions(code)
                      if session.standing == "withdrawn"), "")  # fmt: skip
 
     def _describe_earlier_sessions(self, code: str) -> str:
-        """Describe where a valid code is in use: an unfinished session of this protocol, or other sessions; empty for
-        an unused code."""
-        sessions, protocol = self._list_sessions_of(code), self._read_selected("#protocol")
+        """Describe the earlier sessions with a valid code: an unfinished one of this protocol, else their number; empty
+        for an unused code."""
+        sessions, protocol_path = self._list_code_sessions(code), self._read_selected_value("#protocol")
         for session in sessions:
-            if session.standing == "unfinished" and session.protocol == _extract_protocol_name(protocol, self._home):
+            if session.standing == "unfinished" and session.protocol == _extract_protocol_name(protocol_path):
                 return (
                     f"{session.name} of this protocol is not finished. "
                     "Beginning makes another one; r in the list resumes."
@@ -158,11 +161,11 @@ class NewSessionForm(Vertical):
             return f"{code} has {count_text} here already. Is it the same person?"
         return ""
 
-    def _list_sessions_of(self, code: str) -> list[SessionLine]:
+    def _list_code_sessions(self, code: str) -> list[SessionLine]:
         """List the sessions of the participant with this code."""
         return [session for session in self._home.sessions if session.subject == code] if self._home and code else []
 
-    def _read_selected(self, selector: str) -> str:
+    def _read_selected_value(self, selector: str) -> str:
         """Read the selected value of a list; empty without a selection."""
         value = self.query_one(selector, Select).value
         return value if isinstance(value, str) else ""
@@ -173,8 +176,10 @@ class NewSessionForm(Vertical):
         select: Select[str] = self.query_one(selector, Select)
         previous_value = select.value
         values = [value for _, value in options or PLACEHOLDER_OPTIONS]
-        prompts = [Content(replace_unprintable(text).replace("\n", " ")) for text, _ in options or PLACEHOLDER_OPTIONS]
-        select.set_options(zip(prompts, values, strict=True))
+        option_texts = [
+            Content(replace_unprintable(text).replace("\n", " ")) for text, _ in options or PLACEHOLDER_OPTIONS
+        ]
+        select.set_options(zip(option_texts, values, strict=True))
         select.disabled = not options
         select.value = previous_value if previous_value in values else values[0]
 
@@ -208,7 +213,7 @@ def _extract_file_name(path: str) -> str:
     return path.replace("\\", "/").rpartition("/")[2]
 
 
-def _extract_protocol_name(protocol: str, home: HomeView | None) -> str:
+def _extract_protocol_name(name_or_path: str) -> str:
     """Extract the name of a protocol that is given by name or path. Assumes that a file is named after its protocol;
     for other files the notice about an unfinished session is not shown."""
-    return protocol.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")
+    return name_or_path.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")

@@ -36,8 +36,8 @@ class SessionBar(Widget):
         width = self.size.width
         # The bar has at most 40 characters and a quarter of the width (chosen: longer shows no more detail). It shrinks
         # to 8, the shortest bar that shows progress, so that the heading is not cut.
-        available_width = width - len(self.heading) - 1 - len(self._format_progress(0))
-        right_text = self._format_progress(max(8, min(40, width // 4, available_width)))
+        available_bar_width = width - len(self.heading) - 1 - len(self._format_progress(0))
+        right_text = self._format_progress(max(8, min(40, width // 4, available_bar_width)))
         left_text = self.heading[: max(0, width - len(right_text) - 1)]
         gap = " " * (width - len(left_text) - len(right_text))
         style = self.rich_style

@@ -1,7 +1,7 @@
 """Check that this computer meets the requirements of a study: Python and packages, terminal, data folder, privacy.
 
-Each check returns a `DeviceFinding`, with advice where something is wrong; a missing part is a finding, not an error.
-Called by `examine_setup` and `hapteq doctor` (`study.cli.doctor`).
+Each check returns one or more `DeviceFinding`, with advice where something is wrong; a missing part is a finding, not
+an error. Called by `examine_setup`; `hapteq doctor` (`study.cli.doctor`) passes the detected terminal.
 """
 
 import importlib.util
@@ -23,7 +23,7 @@ import study
 from study.session.views.participant_views import DeviceFinding
 from study.store.disk.privacy import format_privacy_warning
 
-HAPTEQ = "hapteq"
+DISTRIBUTION_NAME = "hapteq"
 """Name of the installed distribution."""
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
 """Top-level packages of hapteq, whose generic names another distribution or file could shadow."""
@@ -63,12 +63,17 @@ def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFin
 def check_packages() -> tuple[DeviceFinding, ...]:
     """Check the versions of Python and of the installed packages, against the requirements of the installed hapteq."""
     try:
-        python_requirement, package_requirements = metadata(HAPTEQ)["Requires-Python"], requires(HAPTEQ) or []
+        python_requirement, package_requirements = (
+            metadata(DISTRIBUTION_NAME)["Requires-Python"],
+            requires(DISTRIBUTION_NAME) or [],
+        )
     except PackageNotFoundError:
         advice = "Run `make study` in its folder once: that installs hapteq and what it needs."
-        return (DeviceFinding(HAPTEQ, "not installed, so what it needs is not known", fine=False, advice=advice),)
+        return (
+            DeviceFinding(DISTRIBUTION_NAME, "not installed, so what it needs is not known", fine=False, advice=advice),
+        )
     return (
-        DeviceFinding(HAPTEQ, version(HAPTEQ), fine=True),
+        DeviceFinding(DISTRIBUTION_NAME, version(DISTRIBUTION_NAME), fine=True),
         check_version("Python", platform.python_version(), SpecifierSet(python_requirement)),
         *(
             check_requirement(requirement)
@@ -100,7 +105,7 @@ def check_import_name(
 ) -> DeviceFinding:
     """Check whether `import package_name` gives hapteq's own package. distributions_by_package: distributions by the
     top-level names that they install. package_folder: folder that contains hapteq's packages."""
-    other_distributions = sorted(set(distributions_by_package.get(package_name, ())) - {HAPTEQ})
+    other_distributions = sorted(set(distributions_by_package.get(package_name, ())) - {DISTRIBUTION_NAME})
     if other_distributions:
         advice = (
             "Install hapteq into an environment of its own: "
@@ -118,13 +123,13 @@ def check_import_name(
         or module_spec.origin is None
         or Path(module_spec.origin) != package_folder / package_name / "__init__.py"
     ):
-        origin = (
+        origin_text = (
             "nowhere to be found"
             if module_spec is None or module_spec.origin is None
             else f"taken from {module_spec.origin}"
         )
         advice = "Rename that file, or start hapteq without its folder on PYTHONPATH."
-        return DeviceFinding(f"import {package_name}", origin, fine=False, advice=advice)
+        return DeviceFinding(f"import {package_name}", origin_text, fine=False, advice=advice)
     return DeviceFinding(f"import {package_name}", "hapteq's own", fine=True)
 
 
@@ -168,15 +173,15 @@ def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
 
 
 def check_data_folder(data: Path) -> DeviceFinding:
-    """Check whether sessions can be written below `data`, and whether `MIN_FREE_BYTES` are free. A missing folder is
-    fine: the first session creates it."""
+    """Check whether sessions can be written below `data`, by a temporary file, and whether `MIN_FREE_BYTES` are free. A
+    missing folder is fine: the first session creates it."""
     finding_name = "Data folder"
-    folder = next(
+    nearest_folder = next(
         existing_folder for existing_folder in (data.absolute(), *data.absolute().parents) if existing_folder.exists()
     )
     try:
-        with tempfile.TemporaryFile(dir=folder):
-            free_bytes = shutil.disk_usage(folder).free
+        with tempfile.TemporaryFile(dir=nearest_folder):
+            free_bytes = shutil.disk_usage(nearest_folder).free
     except OSError as error:
         advice = "Choose another folder with --data, or change the rights of this one."
         return DeviceFinding(finding_name, f"{data}: {error.strerror}", fine=False, advice=advice)
@@ -191,7 +196,7 @@ def check_data_folder(data: Path) -> DeviceFinding:
 
 
 def check_privacy(data: Path) -> DeviceFinding:
-    """Check whether other accounts of this computer can read the data folder."""
+    """Check whether other accounts of this computer can read the data folder. A missing folder is fine."""
     finding_name = "Data rights"
     if not data.exists():
         return DeviceFinding(finding_name, f"{data}: not there yet; it will be for this account alone", fine=True)

@@ -22,7 +22,7 @@ from study.session.stimulus.timing_verdict import (
     judge_lateness,
     judge_load,
     judge_missed_ticks,
-    measure_lateness,
+    summarize_lateness,
 )
 from study.session.views.participant_views import DeviceFinding
 
@@ -75,7 +75,7 @@ def check_timing(
         )
     finally:
         health = device.release().health
-    lateness = measure_lateness(lateness_s, rate_hz)
+    lateness = summarize_lateness(lateness_s, rate_hz)
     return Timing(duration_s, health, lateness, _judge_timing(device, duration_s, health, lateness, load_per_processor))
 
 
@@ -85,7 +85,7 @@ def check_computer(
     """Check the computer before a sitting: wake-ups at rate_hz, load, and for a real device the priority of the loop.
     Takes `COMPUTER_CHECK_S`; no device is commanded. load_per_processor: None if unknown."""
     lateness_s = measure_wake_lateness_s(clock, rate_hz, COMPUTER_CHECK_S, lambda done_s: True)
-    lateness_finding = judge_lateness(measure_lateness(np.array(lateness_s), rate_hz), simulated)
+    lateness_finding = judge_lateness(summarize_lateness(np.array(lateness_s), rate_hz), simulated)
     return (lateness_finding, judge_load(load_per_processor), *(() if simulated else (check_loop_priority(),)))
 
 

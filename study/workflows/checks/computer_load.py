@@ -14,5 +14,5 @@ def get_load_per_processor() -> float | None:
         load_average = os.getloadavg()[0]
     except (AttributeError, OSError):  # Windows has no load average
         return None
-    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return load_average / max(processors or 1, 1)
+    processor_count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return load_average / max(processor_count or 1, 1)

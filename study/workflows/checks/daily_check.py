@@ -41,7 +41,7 @@ BASELINE_FOLDER, CHECK_FOLDER = "baselines", "daily_checks"
 
 @dataclass(frozen=True, slots=True)
 class MotionCallbacks:
-    """Callbacks while the device moves by itself."""
+    """Callbacks for the caller of a check or baseline, during which the device moves by itself."""
 
     announce: Callable[[str], None]
     """Receives the notice before it moves; an exception from it keeps the device still."""
@@ -63,8 +63,8 @@ def compute_play_duration_s() -> float:
 
 
 def record_baseline(device_name: str, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
-    """Record the baseline of the daily checks. Returns its name in `get_device_folder` and its SHA-256. Raises
-    StudyError, also where the recording is not good enough for a comparison."""
+    """Record the baseline of the daily checks. Returns its path relative to `get_device_folder()`, and its SHA-256.
+    Raises StudyError, also where the recording is not good enough for a comparison."""
     plan = _plan_recording(device_name, BASELINE_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
         return _record_baseline_on(device, plan, motion_callbacks)
@@ -109,14 +109,15 @@ def require_acceptable_device(device_name: str) -> None:
 
 
 def check_today(device_name: str, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
-    """Play the excitation of the baseline and write what changed. Raises StudyError."""
+    """Play the excitation of the baseline on this device, and write what changed. Raises StudyError."""
     plan = _plan_recording(device_name, CHECK_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
         return check_on_device(device, plan, motion_callbacks)
 
 
 def check_on_device(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
-    """Carry out the check of `check_today` on an open device. A check that breaks off is written as not passed."""
+    """Carry out the check of `check_today` on an open device. An exception after the notice of the motion is written as
+    a check that was not passed, and raised again."""
     baseline, baseline_sha256 = _read_baseline(device.info, plan.protocol)
     notices: list[str] = []
 
@@ -165,8 +166,8 @@ def _write_check(
 
 
 def compare_recordings(baseline: Recording, todays_recording: Recording) -> tuple["Change", ...]:
-    """Compute the changes of friction, gain, response and noise between the accepted recording and today's. Raises
-    DeviceError where one of the recordings does not allow to measure them."""
+    """Compute the changes of friction, gain, response and noise from the recording of the acceptance to today's. Raises
+    DeviceError where they cannot be measured in one of the recordings."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
     from analysis.device_change.compare_devices import compare_devices
     from analysis.device_change.measure_device import NotMeasurableError
@@ -192,7 +193,7 @@ def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
 def _find_last_check(info: DeviceInfo) -> DeviceFinding:
     """Find the newest check of this device and describe it as a finding, fine only if it was passed today (local date)
     and compared with the present baseline; "none yet" without a check. Unreadable files are skipped."""
-    today_date = split_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)[0]
+    local_date = split_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)[0]
     device_option = info.name.replace(".", "")
     advice = f"With no hand on the handle: hapteq doctor --device {device_option} --daily."
     for path in sorted((get_device_folder() / CHECK_FOLDER).glob("*.json"), reverse=True):
@@ -203,7 +204,7 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
         if (check.device, check.details) != (info.name, info.details):
             continue
         time_and_path = f"{format_time_in_zone(check.utc, convert_to_machine_zone)}, {path}"
-        if split_time_in_zone(check.utc, convert_to_machine_zone)[0] != today_date:
+        if split_time_in_zone(check.utc, convert_to_machine_zone)[0] != local_date:
             return DeviceFinding(
                 "Daily check", f"none today; the last one was {time_and_path}", False, advice, warning=True
             )
@@ -264,7 +265,8 @@ def _make_not_comparable_error(error: "NotMeasurableError") -> DeviceError:
 
 
 def _plan_recording(device_name: str, folder_name: str) -> RecordingPlan:
-    """Plan a recording by the shipped protocol, with a new file in this folder beside the acceptance."""
+    """Plan a recording by the shipped protocol, at the centre and with seed 1, into a new file of the folder
+    `folder_name` in `get_device_folder()`. The folder is created."""
     recording_folder = get_device_folder() / folder_name
     recording_folder.mkdir(parents=True, exist_ok=True)
     return RecordingPlan(

@@ -1,4 +1,5 @@
-"""Changes of a device since its acceptance, as findings with numbers and limits. Called by `daily_check`."""
+"""Format the changes of a device since its acceptance as findings, with values, limits and advice. Called by
+`daily_check`."""
 
 import math
 from collections.abc import Sequence
@@ -35,21 +36,21 @@ def make_change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ..
 
 
 def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
-    """Make the finding on one kind of change, over all axes: wrong where one changed, a warning where one could not be
-    decided. friction_changed: whether the friction changed, too, which also changes gain and response."""
+    """Make the finding on one kind of change, over all axes: wrong where an axis changed, a warning where noise hides
+    whether one changed. friction_changed: whether the friction changed too, which also changes gain and response."""
     change_text = f"{'; '.join(_format_change(change) for change in changes)} ({_format_limit(changes[0])})"
-    changed_axes = ", ".join(change.axis for change in changes if change.changed)
+    changed_axes_text = ", ".join(change.axis for change in changes if change.changed)
     cause_text = (
         FRICTION_ADVICE
         if friction_changed and kind in ("gain", "response")
         else f"{CAUSE_ADVICE[kind]} {PERSISTENCE_ADVICE}"
     )
-    advice = f"It changed ({changed_axes}). {cause_text}"
-    if changed_axes:
+    advice = f"It changed ({changed_axes_text}). {cause_text}"
+    if changed_axes_text:
         return DeviceFinding(kind.capitalize(), change_text, fine=False, advice=advice)
-    if unclear_axes := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
+    if unclear_axes_text := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
         return DeviceFinding(
-            kind.capitalize(), change_text, False, f"Not told ({unclear_axes}). {NOISE_ADVICE}", warning=True
+            kind.capitalize(), change_text, False, f"Not told ({unclear_axes_text}). {NOISE_ADVICE}", warning=True
         )
     return DeviceFinding(kind.capitalize(), change_text, fine=True)
 

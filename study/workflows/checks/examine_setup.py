@@ -75,33 +75,33 @@ def examine_setup(
     terminal. timing_s: duration of the timing (s), 0 for none; on_progress: as for `check_timing`. A device that cannot
     be opened, or is lost, results in a finding, not an error."""
     installation = check_installation(data, terminal)
-    report, timing = _examine_device(device_name, timing_s, on_progress)
-    return Examination(installation, report, timing)
+    device_report, timing = _examine_device(device_name, timing_s, on_progress)
+    return Examination(installation, device_report, timing)
 
 
 def _examine_device(
     device_name: str, timing_s: float, on_progress: Callable[[float], None]
 ) -> tuple[DeviceReport, Timing | None]:
-    """Examine the device and its timing. Returns the findings, and None without a timing; a device with a wrong finding
-    of its driver is not opened."""
+    """Examine the device and its timing. Returns the findings, and the timing; None where none is requested (`timing_s`
+    0), the driver reports a wrong finding (the device is then not opened), or the device fails."""
     clock, settings = RealClock(), _make_settings(device_name, timing_s)
     driver_findings = examine_device(device_name)
-    report = DeviceReport(device_name, simulated=False, findings=driver_findings)
+    device_report = DeviceReport(device_name, simulated=False, findings=driver_findings)
     if any(finding.wrong and finding.name not in OPTIONAL_FINDINGS for finding in driver_findings):
-        return report, None
+        return device_report, None
     has_sensor = all(finding.fine for finding in driver_findings if finding.name in OPTIONAL_FINDINGS)
     settings = replace(settings, with_sensor=has_sensor)
     try:
         # The seed only affects the noise of a simulated device.
         with contextlib.closing(open_device(device_name, settings, clock, seed=1)) as device:
             total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(LIMITS_PROTOCOL_NAME).protocol.safety
-            report = check_device(device, clock, settings.place_m, total_cap_n, safety, has_sensor)
-            report = replace(report, findings=(*driver_findings, *report.findings))
+            device_report = check_device(device, clock, settings.place_m, total_cap_n, safety, has_sensor)
+            device_report = replace(device_report, findings=(*driver_findings, *device_report.findings))
             timing = _measure_timing(device, clock, timing_s, on_progress) if timing_s > 0 else None
-            return report, timing
+            return device_report, timing
     except DeviceError as error:
         device_finding = DeviceFinding("Device", f"{error.title}. {error.happened}", fine=False, advice=error.do_now)
-        return replace(report, findings=(*report.findings, device_finding)), None
+        return replace(device_report, findings=(*device_report.findings, device_finding)), None
 
 
 def _measure_timing(device: Device, clock: Clock, duration_s: float, on_progress: Callable[[float], None]) -> Timing:
@@ -142,7 +142,9 @@ def require_sensor(examination: Examination) -> None:
         )
 
 
-def accept(device_name: str, examination: Examination, operator: str, motion_callbacks: MotionCallbacks) -> str:
+def accept_examined_device(
+    device_name: str, examination: Examination, operator: str, motion_callbacks: MotionCallbacks
+) -> str:
     """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
     `operator`; returns a sentence about it. Without an accelerometer no baseline is recorded. Raises DeviceError
     without a timing or with a wrong finding, WrongUseError for a simulated device."""

@@ -15,7 +15,7 @@ from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose
 def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:
     """Run a diagnosis, and return the path of its diagnosis.json. on_progress: called with the name of the step and the
     share done, 0 to 1. Raises StudyError where the diagnosis fails, and UserInterruptError where the user stopped it;
-    no results are written then."""
+    then no results are written."""
     try:
         return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
     except KeyboardInterrupt as interruption:

@@ -1,4 +1,5 @@
-"""`hapteq diagnose`: find the physics that a mechanical model lacks from recordings, and write the result folder.
+"""Find the physics that a mechanical model lacks from recordings, and write the result folder; called by
+`hapteq diagnose` and, for the screens, by `diagnose_at_screen`.
 
 Steps: read and check the input, take or fit the model to compare with, add the virtual spring of a session, run the
 diagnosis (`analysis.diagnosis.diagnose`), write document, improved model, figures and page.
@@ -87,8 +88,8 @@ class DiagnosedRecordings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
-    """Result of a diagnosis before it is written; see `find_answer` and `write_answer`."""
+class UnwrittenDiagnosis:
+    """Result of a diagnosis (`run_diagnosis`) before it is written (`write_result_folder`)."""
 
     findings: Findings
     plan: DiagnosePlan
@@ -112,10 +113,10 @@ class Engine(Protocol):
 def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
     """Run a diagnosis and write its folder. `on_progress(step, share)`, share 0 to 1. Raises StudyError for input that
     cannot be diagnosed; then, and if interrupted, nothing is written."""
-    return write_answer(find_answer(plan, on_progress, engine), on_progress)
+    return write_result_folder(run_diagnosis(plan, on_progress, engine), on_progress)
 
 
-def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
+def run_diagnosis(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> UnwrittenDiagnosis:
     """Run a diagnosis without writing (first part of `diagnose_recordings`), so that its answer can be shown before the
     figures are drawn. Raises StudyError."""
     check_effect_names(plan.excluded_effects)
@@ -123,7 +124,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     on_progress("reading", 0.0)
     for_force_balance = plan.model is None and not plan.clean
     inputs, clean = _read_clean(plan, read_input(plan.sources, plan.seed, for_force_balance, plan.force_constants))
-    kept_laws = _read_effect_laws(plan.effect_files, inputs.recordings)
+    file_laws = _read_effect_laws(plan.effect_files, inputs.recordings)
     on_progress("reading", READ_SHARE)
     has_time_left, guard = _start_time_budget(plan), make_crash_guard()
     first_model = _choose_model(plan, inputs, clean, (has_time_left, guard), on_progress)
@@ -133,7 +134,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     start_share = FITTED_SHARE if plan.model is None else READ_SHARE
     _check_comparison(plan, inputs, model)
     settings = replace(
-        _make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard, kept=kept_laws
+        _make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard, kept=file_laws
     )
     try:
         findings = engine(
@@ -153,7 +154,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
         improved=add_spring(findings.improved, -spring_n_per_m),
         remarks=(*inputs.remarks, *describe_spring(spring_n_per_m), *first_model.remarks, *findings.remarks),
     )
-    return Answer(
+    return UnwrittenDiagnosis(
         findings, plan, (*inputs.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
     )
 
@@ -169,19 +170,19 @@ def _read_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisIn
     return reduced_inputs.diagnosed, reduced_inputs.clean
 
 
-def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
+def write_result_folder(diagnosis: UnwrittenDiagnosis, on_progress: Progress) -> DiagnosedRecordings:
     """Write document, improved model, figures and page atomically (second part of `diagnose_recordings`)."""
     # Imported here because plotting is slow to import, and the answer comes first.
     from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 
     on_progress("writing the report", DIAGNOSED_SHARE)
-    plan = answer.plan
-    for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
+    plan = diagnosis.plan
+    for session_folder in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
         from study.store.sessions.written_elsewhere import note_written_folder
 
-        note_written_folder(session, plan.out)
+        note_written_folder(session_folder, plan.out)
     with create_new_folder(plan.out) as folder:
-        findings = write_diagnosis_into(folder, answer.findings, answer.parents)
+        findings = write_diagnosis_into(folder, diagnosis.findings, diagnosis.parents)
     on_progress("done", 1.0)
     return DiagnosedRecordings(findings, plan.out)
 
@@ -282,8 +283,7 @@ def _scale_progress(on_progress: Progress, start_share: float, end_share: float)
 
 
 def add_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:
-    """Return the model with the stiffness matrix K + k A A', where k = spring_n_per_m (negative: subtracted) and the
-    columns of A are the driven axes."""
+    """Return the model with stiffness K + k A A', k = spring_n_per_m of any sign; columns of A: the driven axes."""
     if spring_n_per_m == 0:
         return model
     axes = compute_driven_axes(model)

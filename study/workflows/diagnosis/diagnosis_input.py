@@ -2,7 +2,8 @@
 
 Recordings are checked for consistent channels, units and rates, converted to forces where a force constant is given,
 and brought into the form in which they can be compared. Refusals of the analysis become StudyErrors.
-Called by `diagnose_recordings` and `fit_first_model`.
+Called by `diagnose_recordings`, `fit_first_model`, `clean_recordings`, `fit_without_model` and
+`study.evaluation.real.diagnose_real`.
 """
 
 from collections.abc import Callable, Sequence
@@ -49,27 +50,27 @@ def read_input(
     convert to one motion per force, as a force balance needs (`one_motion_per_force`). constants: see
     `with_force_constant`; not used for a session, whose commands are forces. A session with reference probes is
     represented by these (`find_references`) instead of its trials. Raises StudyError."""
-    folders = [source for source in sources if source.is_dir()]
-    if folders and len(sources) > 1:
+    session_folders = [source for source in sources if source.is_dir()]
+    if session_folders and len(sources) > 1:
         raise make_not_diagnosable_error(
-            (f"{folders[0]} is a folder: a session is diagnosed alone",), "Give recordings, or one session."
+            (f"{session_folders[0]} is a folder: a session is diagnosed alone",), "Give recordings, or one session."
         )
-    if folders:
+    if session_folders:
         # Imported here, because the modules that read sessions take long to import.
         from study.workflows.diagnosis.join_session_trials import join_session_trials
         from study.workflows.diagnosis.session_references import find_references
 
-        if (references := find_references(folders[0])) is not None:
+        if (references := find_references(session_folders[0])) is not None:
             reference_input = read_input(references.paths, seed, for_force_balance)
             parents, remarks = (references.log, *references.paths), (*references.remarks, *reference_input.remarks)
             return replace(reference_input, parents=parents, remarks=remarks)
-        session = join_session_trials(folders[0], seed)
+        joined_trials = join_session_trials(session_folders[0], seed)
         comparable_trials = _translate_refusal(
-            lambda: prepare_comparison((session.recording,), (session.name,), for_force_balance)
+            lambda: prepare_comparison((joined_trials.recording,), (joined_trials.name,), for_force_balance)
         )
         return DiagnosisInput(
-            comparable_trials.recordings, (session.name,), session.parents,
-            (*session.remarks, *comparable_trials.remarks), session.simulated, session.spring_n_per_m,
+            comparable_trials.recordings, (joined_trials.name,), joined_trials.parents,
+            (*joined_trials.remarks, *comparable_trials.remarks), joined_trials.simulated, joined_trials.spring_n_per_m,
         )  # fmt: skip
     recordings_with_notes = [read_any_recording(source) for source in sources]
     recordings, names = tuple(recording for recording, _ in recordings_with_notes), _name_sources(sources)
@@ -80,10 +81,10 @@ def read_input(
     return DiagnosisInput(prepared_recordings.recordings, names, tuple(sources), remarks, constants=constants)
 
 
-def _translate_refusal(check: Callable[[], Checked]) -> Checked:
-    """Call `check` and return its result. Raises StudyError where it raises NothingToDiagnose."""
+def _translate_refusal(operation: Callable[[], Checked]) -> Checked:
+    """Call `operation` and return its result. Raises StudyError where it raises NothingToDiagnose."""
     try:
-        return check()
+        return operation()
     except NothingToDiagnose as refusal:
         raise make_not_diagnosable_error(refusal.problems) from refusal
 

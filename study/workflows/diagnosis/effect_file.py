@@ -21,7 +21,7 @@ from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
-EFFECT_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+EFFECT_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_]{0,63}")
 """Valid name of an effect, and of its file without `.py`."""
 EFFECT_TEMPLATE = """\"\"\"{about}\"\"\"
 
@@ -48,8 +48,8 @@ ENTRY = LawEntry(
 
 def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
     """Write a law of a diagnosis (folder or JSON) or of a model (TOML) as an effect file. number: which law, in the
-    order of `_read_laws`, at least 1. Raises StudyError if there is no such law, or if the name of `out_path` is not a
-    new valid name."""
+    order of `_read_laws`, at least 1. Raises StudyError if there is no such law, if `out_path` exists, or if its name
+    is not valid or is in the catalogue."""
     laws = _read_laws(source)
     if number > len(laws):
         content_text = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
@@ -58,7 +58,7 @@ def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
         )
     if (
         out_path.suffix != ".py"
-        or not EFFECT_NAME.fullmatch(out_path.stem)
+        or not EFFECT_NAME_PATTERN.fullmatch(out_path.stem)
         or out_path.stem in (*EFFECTS_BY_NAME, DISCOVERED_LAW)
     ):
         raise _make_effect_error(
@@ -83,7 +83,7 @@ def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
 
 def read_entries(paths: Sequence[Path], recordings: Sequence[Recording]) -> tuple[LawEntry, ...]:
     """Load effect files for a diagnosis of these recordings. Raises StudyError for an invalid file, and for a law that
-    reads a signal that a recording lacks."""
+    reads a signal that a recording lacks. Returns the entries in the order of `paths`."""
     entries = tuple(read_entry(path) for path in paths)
     for path, entry in zip(paths, entries, strict=True):
         for recording in recordings:
@@ -100,17 +100,21 @@ def read_entries(paths: Sequence[Path], recordings: Sequence[Recording]) -> tupl
 def read_entry(path: Path) -> LawEntry:
     """Load an effect file by running it. Raises StudyError if it does not exist, fails, or defines no ENTRY with a new
     valid name."""
-    spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
-    if spec is None or spec.loader is None or not path.is_file():
+    module_spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
+    if module_spec is None or module_spec.loader is None or not path.is_file():
         raise _make_effect_error(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
-    module = importlib.util.module_from_spec(spec)
+    module = importlib.util.module_from_spec(module_spec)
     try:
-        spec.loader.exec_module(module)
+        module_spec.loader.exec_module(module)
     except Exception as error:
         raise _make_effect_error(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
     entry = getattr(module, "ENTRY", None)
     catalogue_names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
-    if not isinstance(entry, LawEntry) or entry.name in catalogue_names or not EFFECT_NAME.fullmatch(entry.name):
+    if (
+        not isinstance(entry, LawEntry)
+        or entry.name in catalogue_names
+        or not EFFECT_NAME_PATTERN.fullmatch(entry.name)
+    ):
         raise _make_effect_error(
             f"{path} defines no ENTRY, or one by a name of the catalogue.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",

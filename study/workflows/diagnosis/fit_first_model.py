@@ -27,8 +27,8 @@ ERROR_TITLE = "The model was not made"
 
 @dataclass(frozen=True, slots=True)
 class FirstModelPlan:
-    """Arguments of `fit_first_model`: recordings, model file to write, and the name of a structure of `KINDS`; "auto":
-    the best is chosen."""
+    """Arguments of `fit_and_write_first_model`: recordings, model file to write, and the name of a structure of
+    `KINDS`; "auto": the best is chosen."""
 
     recordings: tuple[Path, ...]
     out: Path
@@ -47,7 +47,7 @@ class FittedFirstModel:
     """Sentences on the input, on the units and on the fit."""
 
 
-def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FittedFirstModel:
+def fit_and_write_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FittedFirstModel:
     """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
     added weight, and where no structure fits; nothing is written then."""
     requested_kind = _parse_structure(plan.structure)

@@ -188,8 +188,8 @@ def _select_planned_command(recording: Recording) -> Signal:
 def _choose_period(period: int, sample_rate_hz: float) -> int:
     """Choose the period of a segment in samples: `COMMON_PERIOD_S` if that is a multiple of the trial's period,
     otherwise the trial's period. period: of the trial, in samples; 0 = not periodic."""
-    repeat_samples = round(COMMON_PERIOD_S * sample_rate_hz)
-    return repeat_samples if period > 0 and repeat_samples % period == 0 else period
+    common_period_samples = round(COMMON_PERIOD_S * sample_rate_hz)
+    return common_period_samples if period > 0 and common_period_samples % period == 0 else period
 
 
 def _prepend_lead(recording: Recording, lead_samples: int) -> dict[str, FloatArray]:
@@ -207,22 +207,25 @@ def _prepend_lead(recording: Recording, lead_samples: int) -> dict[str, FloatArr
 
 def estimate_spring_stiffness(recordings: Sequence[Recording]) -> float:
     """Estimate the stiffness k (N/m) of the virtual spring by least squares from command - excitation = -k position,
-    over all channels. 0 if a recording has no excitation, or no complete position of each channel."""
+    over all channels. 0 if a recording has no excitation, no position or another number of position channels than of
+    commands, if a position is not finite, or if all are 0."""
     force_times_position, squared_position = 0.0, 0.0
     for recording in recordings:
         if recording.excitation is None or recording.position is None:
             return 0.0
-        position = recording.position.samples
-        if position.shape != recording.command.samples.shape or not np.isfinite(position).all():
+        positions_m = recording.position.samples
+        if positions_m.shape != recording.command.samples.shape or not np.isfinite(positions_m).all():
             return 0.0
-        force_times_position -= float(np.sum((recording.command.samples - recording.excitation.samples) * position))
-        squared_position += float(np.sum(position**2))
+        force_times_position -= float(np.sum((recording.command.samples - recording.excitation.samples) * positions_m))
+        squared_position += float(np.sum(positions_m**2))
     return force_times_position / squared_position if squared_position > 0 else 0.0
 
 
-def _concatenate_signal(name: str, trial_signals: Sequence[Mapping[str, FloatArray]], template: Signal) -> Signal:
-    """Concatenate the signal `name` of all trials, with rate, channels and units of `template`."""
-    return replace(template, samples=np.vstack([signals[name] for signals in trial_signals]))
+def _concatenate_signal(
+    name: str, trial_signals: Sequence[Mapping[str, FloatArray]], template_signal: Signal
+) -> Signal:
+    """Concatenate the signal `name` of all trials, with rate, channels and units of `template_signal`."""
+    return replace(template_signal, samples=np.vstack([signals[name] for signals in trial_signals]))
 
 
 def _write_remarks(

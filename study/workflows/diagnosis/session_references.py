@@ -30,7 +30,8 @@ class SessionReferences:
 
 def find_references(session: Path) -> SessionReferences | None:
     """Find the references that were measured without trouble and whose recordings match the log. session: its folder.
-    None where there is none. Raises StudyError where the session cannot be read."""
+    None where there is none, or where the protocol has no probes. Raises StudyError where the session cannot be
+    read."""
     folder = find_session(str(session), session.absolute().parent)
     folded_session = fold_session(folder)
     if not folded_session.state.protocol.probes.is_enabled:
@@ -43,7 +44,7 @@ def find_references(session: Path) -> SessionReferences | None:
     paths = tuple(
         folder.path / event.recording
         for event in measured_probes
-        if event.recording and probe_kinds[event.number] == "reference" and _is_as_logged(folder, event)
+        if event.recording and probe_kinds[event.number] == "reference" and _has_logged_hash(folder, event)
     )
     if not paths:
         return None
@@ -55,7 +56,7 @@ def find_references(session: Path) -> SessionReferences | None:
     return SessionReferences(folder.log, paths, (remark, *_describe_drifts(folder, folded_session)))
 
 
-def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
+def _has_logged_hash(folder: SessionFolder, event: ProbeMeasured) -> bool:
     """Whether the recording exists and has the SHA-256 of the log."""
     path = folder.path / (event.recording or "")
     return path.is_file() and compute_sha256(path) == event.sha256
@@ -63,11 +64,11 @@ def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
 
 def _describe_drifts(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
     """Describe the changes of the device from probe to probe in one remark, also if none was detected."""
-    session = begin_watching(folded_session.state.opened, folded_session.state.protocol)
+    followed_session = begin_watching(folded_session.state.opened, folded_session.state.protocol)
     for event in folded_session.log_contents.events[1:]:
-        session = apply_followed_event(session, event)
-    drift_text = "; ".join(drift.sentence for drift in DriftReader(folder).update(session.probes))
+        followed_session = apply_followed_event(followed_session, event)
+    drift_text = "; ".join(drift.sentence for drift in DriftReader(folder).update(followed_session.probes))
     return (
-        f"In its {len(session.probes)} probes "
+        f"In its {len(followed_session.probes)} probes "
         f"{f'there changed: {drift_text}' if drift_text else 'no change was detected'}.",
     )

@@ -38,9 +38,9 @@ def make_inertia_effects(model: MechanicalModel, calibration: LinkageCalibration
     a' M a is the mass at the actuator's end of the transmission alone; per_m is therefore larger than the slope
     relative to the total mass.
     """
-    slopes, axes = estimate_local_inertia(calibration, np.zeros(3))[1], compute_driven_axes(model)
-    driven_kg = np.einsum("na,nm,ma->a", axes, model.mass, axes)
-    slopes_per_m = _extract_diagonal_slopes(slopes) / driven_kg
+    inertia_slopes, axes = estimate_local_inertia(calibration, np.zeros(3))[1], compute_driven_axes(model)
+    driven_masses_kg = np.einsum("na,nm,ma->a", axes, model.mass, axes)
+    slopes_per_m = _extract_diagonal_slopes(inertia_slopes) / driven_masses_kg
     return tuple(
         ModelEffect("pose_dependent_inertia", axis_name, {"per_m": float(slope_per_m)})
         for axis_name, slope_per_m in zip("xyz", slopes_per_m, strict=True)
@@ -49,22 +49,23 @@ def make_inertia_effects(model: MechanicalModel, calibration: LinkageCalibration
 
 
 def describe_calibration(
-    model: MechanicalModel, identified_kg: FloatArray, calibration: LinkageCalibration
+    model: MechanicalModel, recorded_kg: FloatArray, calibration: LinkageCalibration
 ) -> tuple[str, ...]:
-    """Describe the calibration in two sentences: the masses of the calibration compared with those of the recordings,
-    and the change of inertia that the model contains. identified_kg: (3,), masses along x, y, z from the recordings."""
-    inertia, slopes = estimate_local_inertia(calibration, np.zeros(3))
-    calibrated_kg = np.diag(inertia)
-    largest_relative_difference = float(np.abs(identified_kg / calibrated_kg - 1).max())
+    """Describe the calibration: the masses of the calibration compared with those of the recordings, the change of
+    inertia that the model contains, and what it leaves out. recorded_kg: (3,), masses along x, y, z from the
+    recordings."""
+    inertia_kg, inertia_slopes = estimate_local_inertia(calibration, np.zeros(3))
+    calibrated_kg = np.diag(inertia_kg)
+    largest_relative_difference = float(np.abs(recorded_kg / calibrated_kg - 1).max())
     changing_axes = {effect.axis for effect in model.effects}
     slope_text = ", ".join(
         f"{slope:.3g} kg/m along {axis_name}"
-        for axis_name, slope in zip("xyz", _extract_diagonal_slopes(slopes), strict=True)
+        for axis_name, slope in zip("xyz", _extract_diagonal_slopes(inertia_slopes), strict=True)
         if axis_name in changing_axes
     )
     return (
         f"The calibration of the {calibration.device} says {', '.join(f'{mass_kg:.3g}' for mass_kg in calibrated_kg)} "
-        f"kg at the centre; the recordings say {', '.join(f'{mass_kg:.3g}' for mass_kg in identified_kg)} kg, up to "
+        f"kg at the centre; the recordings say {', '.join(f'{mass_kg:.3g}' for mass_kg in recorded_kg)} kg, up to "
         f"{largest_relative_difference:.0%} apart. "
         "The model has those of the recordings, with all that moves at the handle.",
         f"How its inertia changes is the calibration's, as pose_dependent_inertia: {slope_text or 'nowhere'}. What "
@@ -72,7 +73,7 @@ def describe_calibration(
     )
 
 
-def _extract_diagonal_slopes(slopes: FloatArray) -> FloatArray:
+def _extract_diagonal_slopes(inertia_slopes: FloatArray) -> FloatArray:
     """Extract dM_aa/dx_a, (3,), kg/m: the derivative of the inertia along each axis a with the position along the same
-    axis. slopes: (3, 3, 3), entry [a] is dM/dx_a, the derivative of the inertia matrix."""
-    return np.array([slopes[axis, axis, axis] for axis in range(3)])
+    axis. inertia_slopes: (3, 3, 3), entry [a] is dM/dx_a, the derivative of the inertia matrix."""
+    return np.array([inertia_slopes[axis, axis, axis] for axis in range(3)])

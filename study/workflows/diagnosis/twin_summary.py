@@ -33,7 +33,7 @@ def summarise_twin(twin: WrittenTwin) -> dict[str, Any]:
         "band_hz": list(fit.band_hz),
         "held_out": fit.held_out,
         "noise": fit.noise,
-        "channels": [asdict(error) for error in fit.errors],
+        "channels": [asdict(channel_error) for channel_error in fit.errors],
         "notes": list(twin.notes),
     }
 
@@ -52,11 +52,11 @@ def format_twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
     if modes_hz := _compute_modes_hz(twin):
         modes_text = ", ".join(f"{frequency_hz:.3g}" for frequency_hz in modes_hz)
         lines.append(f"{model.coordinates} coordinates; modes of the bodies on the driven axes: {modes_text} Hz")
-    for error in fit.errors:
-        held_out_text = "" if error.held_out is None else f", {error.held_out:.1%} on held-out samples"
-        noise_text = "" if error.noise is None else f" (noise {error.noise:.1%})"
+    for channel_error in fit.errors:
+        held_out_text = "" if channel_error.held_out is None else f", {channel_error.held_out:.1%} on held-out samples"
+        noise_text = "" if channel_error.noise is None else f" (noise {channel_error.noise:.1%})"
         lines.append(
-            f"{error.channel}: error {error.fit:.1%}{held_out_text}{noise_text}, {fit.band_hz[0]:g} to "
+            f"{channel_error.channel}: error {channel_error.fit:.1%}{held_out_text}{noise_text}, {fit.band_hz[0]:g} to "
             f"{fit.band_hz[1]:g} Hz"
         )
     return tuple(lines)
@@ -76,7 +76,7 @@ def _format_values(values: FloatArray) -> str:
 
 
 def _format_deviation(tolerance: Tolerance | None, parameter_name: str) -> str:
-    """Format the standard deviation of a parameter in brackets; empty where it is not known. parameter_name: field of
-    `Tolerance`."""
+    """Format the standard deviation of a parameter in brackets, in the unit of the parameter; empty where it is not
+    stated. parameter_name: field of `Tolerance`."""
     deviation = None if tolerance is None else getattr(tolerance, parameter_name)
     return "" if deviation is None else f" (± {deviation:.2g})"

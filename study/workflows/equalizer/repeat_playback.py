@@ -64,9 +64,9 @@ def repeat_playback(
         try:
             total_s = (plan.repeats + 1) * plan.reference.signal.duration_s
             announce_motion(device, plan.settings.limits.stimulus_cap_n, total_s, before_moving)
-            _play_all(plan, device, states, play_results, on_progress)
+            _play_and_correct(plan, device, states, play_results, on_progress)
         except KeyboardInterrupt as interruption:
-            saved_text = _write_best(plan, states, play_results)
+            saved_text = _save_best_forces(plan, states, play_results)
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError(
                     "The force may still be on", Fault.FORCE_LEFT.sentence, RESTART_ADVICE, saved_text
@@ -76,7 +76,7 @@ def repeat_playback(
             )
             raise UserInterruptError("Interrupted", explanation, RESTART_ADVICE, saved_text) from interruption
         except DeviceError as error:
-            error.saved = _write_best(plan, states, play_results)
+            error.saved = _save_best_forces(plan, states, play_results)
             raise
         write_best_forces(plan, states[-1], interrupted=False)
         return make_result(plan, states[-1], play_results)
@@ -108,7 +108,7 @@ def make_not_repeated_error(explanation: str, advice: str) -> StudyError:
     return StudyError("Nothing was repeated", explanation, advice, saved="Nothing moved.")
 
 
-def _play_all(
+def _play_and_correct(
     plan: RepeatPlan,
     device: Device,
     states: list[IterationState],
@@ -169,7 +169,7 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
         ) from error
 
 
-def _write_best(plan: RepeatPlan, states: list[IterationState], play_results: list[PlaybackResult]) -> str:
+def _save_best_forces(plan: RepeatPlan, states: list[IterationState], play_results: list[PlaybackResult]) -> str:
     """Write the best forces so far after an interruption or a fault, if there are any and the plan has an output.
     Returns a sentence on what was written."""
     if plan.out is None or not (states and states[-1].residuals):

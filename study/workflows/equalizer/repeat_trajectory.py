@@ -147,7 +147,7 @@ def format_repeat_lines(result: RepeatedTrajectory) -> tuple[str, ...]:
 
 
 def _compute_peak_n(repeated: RepeatResult) -> float:
-    """Compute the largest magnitude of the force vector over the samples (N)."""
+    """Compute the largest magnitude (N) of the force vector over the samples of the best forces."""
     return float(np.linalg.norm(repeated.forces.signal.samples, axis=1).max())
 
 

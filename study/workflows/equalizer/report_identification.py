@@ -48,8 +48,8 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
 
 
 def collect_findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> IdentificationFindings:
-    """Collect the content of the page. on_progress: called with the share done, 0 to 1; the comparison of orders takes
-    the time."""
+    """Collect the content of the page. on_progress: called with the share done, 0 to 1, of the comparison of orders,
+    which takes most of the time."""
     coupling_onset = find_coupling_onset(device.estimate)
     # Bands begin at 1 Hz or above, as by default in `compute_frequency_bands`.
     lowest_hz, highest_hz = max(1.0, float(device.estimate.frequency_hz[0])), float(device.estimate.frequency_hz[-1])
@@ -71,7 +71,7 @@ def _compare_lower_orders(device: IdentifiedDevice, on_progress: Callable[[float
     estimate has too few spectral lines for it."""
     requested_order = device.plan.order
     orders = sorted({order for order in (10, 14, 16, 20, 26) if order <= requested_order} | {requested_order})
-    # With a tighter bound on the decay time than the device needs, no order could fit its slowly decaying resonances.
+    # The slowest pole beyond the ordinary bound on the decay time: with a tighter bound no order could fit it.
     decay_bound_s = DECAY_BOUND_RATIO * device.identified.relaxed[0].decay_s if device.identified.relaxed else None
     settings = IdentificationSettings(
         device.plan.band_hz, requested_order, device.plan.longest_decay_s or decay_bound_s

@@ -29,7 +29,9 @@ def check_model_channels(validations: Sequence[Validation]) -> tuple[Validation,
         for validation in _select_valid(validations, "mechanical model ")
     }
     return tuple(
-        replace(validation, problems=(*validation.problems, *_find_problems(models[validation.path], recordings)))
+        replace(
+            validation, problems=(*validation.problems, *_find_channel_problems(models[validation.path], recordings))
+        )
         if validation.path in models
         else validation
         for validation in validations
@@ -43,15 +45,15 @@ def _select_valid(validations: Sequence[Validation], kind_prefix: str) -> Iterat
     )
 
 
-def _find_problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
+def _find_channel_problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
     """Find effects that cannot be placed on the axes and channels of a recording; yields a sentence on the first such
     effect of each recording. Recordings with another number of commands or responses are not compared."""
     # Imported here: loading the catalogue of effects takes longer than checking most files.
     from equalizer.effects.placing import PlacingError, place_recorded_effects
 
     for path, recording in recordings:
-        commands, responses = recording.command.channels, recording.response.channels
-        if (len(commands), len(responses)) != (model.inputs, model.outputs):
+        command_names, response_names = recording.command.channels, recording.response.channels
+        if (len(command_names), len(response_names)) != (model.inputs, model.outputs):
             continue
         try:
             place_recorded_effects(model, recording)

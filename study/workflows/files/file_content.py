@@ -1,7 +1,8 @@
 """Content of a file, read and parsed once, in the forms that the recognisers of `hapteq validate` need.
 
 A file is a folder, an HDF5 file (only its format attribute is read here), or text, which is also parsed as JSON and as
-TOML. Text above a size limit is not parsed. Called by `validate`.
+TOML. Text above a size limit is not parsed. `validate` reads a file with `read_file_content`; `recognisers` and
+`session_recognisers` get the `FileContent`.
 """
 
 import csv
@@ -50,9 +51,9 @@ class FileContent:
             return ()
 
 
-def open_content(path: Path) -> FileContent:
+def read_file_content(path: Path) -> FileContent:
     """Read the content of a file or folder. Raises CannotReadError where it cannot be read, UnusableFileError where its
-    name ends as an HDF5 file's but its content is none."""
+    name ends in .h5 or .hdf5 but it is not an HDF5 file."""
     try:
         if path.is_dir():
             return FileContent(path, is_folder=True)

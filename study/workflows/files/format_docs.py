@@ -33,7 +33,7 @@ from study.store.formats import identified_model_file, mechanical_model_file, re
 from study.store.formats.calibration_file import ABOUT as CALIBRATION_ABOUT
 from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
-from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
+from study.store.sessions.request_inbox import REQUEST_CLASSES, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files import format_text
 from study.workflows.files.importing_docs import compose_importing_page
 
@@ -79,7 +79,7 @@ def make_document_schema(payload: Mapping[str, Any], format_name: str, version: 
 
 def make_request_schema() -> dict[str, Any]:
     """Make the JSON schema of a request to a running session, with one alternative for each kind of request."""
-    schemas = {kind: TypeAdapter(request_type).json_schema() for kind, request_type in KINDS.items()}
+    schemas = {kind: TypeAdapter(request_type).json_schema() for kind, request_type in REQUEST_CLASSES.items()}
     for kind, schema in schemas.items():
         schema["properties"]["request"] = {"const": kind}
         schema["required"].append("request")

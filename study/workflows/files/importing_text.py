@@ -87,7 +87,7 @@ role = "test"
 """
 """Example of an import map (TOML)."""
 
-_COMMANDS = """\
+_COMMANDS_AND_RESULT = """\
 # Importing recordings of others
 
 This page is generated from the code (`python -m study.workflows.files.format_docs docs`): change the code, not the
@@ -213,7 +213,7 @@ _TIME = f"""\
   before `command[k]`. With `"band-limited"` or `"linear"`, both are samples of the same instant."""
 """Section on time stamps, clocks, rates and resampling."""
 
-_PARTS = """\
+_PARTS_AND_EXAMPLE = """\
 ## Parts and segments
 
 * **Parts.** Several files, or several groups of arrays in one file (`prefix`), follow one another in the recording; the
@@ -228,7 +228,7 @@ Two loggers write a table each: `drive_3.csv` with the columns `t,counts,current
 `time [s],velocity [mm/s],load cell [V]`."""
 """Section on parts and segments, and the introduction of the example."""
 
-INTRODUCTION = "\n\n".join((_COMMANDS, _FILES, _CHANNELS, _TIME, _PARTS))
+INTRODUCTION = "\n\n".join((_COMMANDS_AND_RESULT, _FILES, _CHANNELS, _TIME, _PARTS_AND_EXAMPLE))
 """Text of the page up to the example of a map."""
 
 EXPRESSIONS = (

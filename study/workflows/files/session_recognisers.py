@@ -8,8 +8,7 @@ SHA-256 in the log, and the tables are compared with what the log gives.
 from dataclasses import MISSING, fields
 from pathlib import Path
 
-from protocols.document.lock import LOCK_FORMAT as LOCK_FORMAT
-from protocols.document.lock import LockError, lock_from_json
+from protocols.document.lock import LOCK_FORMAT, LockError, lock_from_json
 from study.errors import StudyError
 from study.local_clock import convert_to_machine_zone
 from study.session.facts.events import SESSION_FORMAT, TrialMeasured
@@ -29,10 +28,10 @@ from study.workflows.files.file_content import FileContent
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import find_result_problems
 
-KIND = "session"
+SESSION_KIND = "session"
 """Name of a session folder or log in messages."""
 
-DOCUMENTS = {
+DOCUMENT_KINDS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
     "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
     SEAL_FORMAT: ("seal of a session log", ("session", "lines", "bytes", "head", "sha256")),
@@ -48,10 +47,10 @@ DOCUMENTS = {
 
 
 def recognise_session(content: FileContent) -> str | None:
-    """Recognise a session folder, or a log by its name or by the session format in its first 1000 characters. For a
-    log it is replayed, without checks of recordings and tables. Returns the session in words; None for other files.
-    Raises UnusableFileError for a damaged session, and for a log with another name than `LOG_NAME`: the folder's own
-    log would be replayed in its place."""
+    """Recognise a session folder, or a session log by its name or by the session format in its first 1000 characters
+    (the first line of a log states it). A log alone is replayed, without checks of recordings and tables. Returns the
+    session in words; None for other files. Raises UnusableFileError for a damaged session, and for a log with another
+    name than `LOG_NAME`: the log of its folder would be replayed in its place."""
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
@@ -73,11 +72,12 @@ def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
 
 
 def recognise_document(content: FileContent) -> str | None:
-    """Recognise a JSON document of `DOCUMENTS`. Returns its kind in words; None for others. Raises UnusableFileError
-    where a key is missing, for an invalid seal, and for a withdrawal whose erasing is not finished."""
-    if content.json_format not in DOCUMENTS:
+    """Recognise a JSON document of `DOCUMENT_KINDS`. Returns its kind in words; None for others. Raises
+    UnusableFileError where a key is missing, for an invalid seal, and for a withdrawal whose erasing is not
+    finished."""
+    if content.json_format not in DOCUMENT_KINDS:
         return None
-    kind, required_keys = DOCUMENTS[content.json_format]
+    kind, required_keys = DOCUMENT_KINDS[content.json_format]
     if content.json_format == WITHDRAWAL_FORMAT:
         problem = "the erasing is not finished; `hapteq withdraw` continues it"
         raise UnusableFileError(content.path, kind, (problem,))
@@ -111,7 +111,7 @@ def _check_session(folder: SessionFolder, path: Path) -> str:
         *_describe_result_problems(folder, folded_session),
     ]
     if problems:
-        raise UnusableFileError(path, KIND, tuple(problems))
+        raise UnusableFileError(path, SESSION_KIND, tuple(problems))
     return _describe_session(folded_session)
 
 
@@ -122,10 +122,10 @@ def _replay_log(folder: SessionFolder, path: Path) -> FoldedSession:
     except UnusableFileError:
         raise
     except StudyError as error:
-        raise UnusableFileError(path, KIND, (error.happened.rstrip("."),)) from error
+        raise UnusableFileError(path, SESSION_KIND, (error.happened.rstrip("."),)) from error
     if folded_session.log_contents.torn_bytes:
         torn_line = f"its last line is torn ({folded_session.log_contents.torn_bytes} bytes); hapteq resume mends it"
-        raise UnusableFileError(path, KIND, (torn_line,))
+        raise UnusableFileError(path, SESSION_KIND, (torn_line,))
     return folded_session
 
 
@@ -147,9 +147,11 @@ def _describe_result_problems(folder: SessionFolder, folded_session: FoldedSessi
     """Describe result files that contradict the log, and a missing seal. A missing table is not an error, because it
     can be written from the log."""
     problem_texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded_session.seal_due else []
-    for result in find_result_problems(folder, folded_session.state):
-        if not result.missing:
-            problem_texts += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
+    for result_problem in find_result_problems(folder, folded_session.state):
+        if not result_problem.missing:
+            problem_texts += [
+                f"{result_problem.file} {problem}; the log alone is read" for problem in result_problem.problems
+            ]
     return problem_texts
 
 
@@ -157,14 +159,16 @@ def _describe_session(folded_session: FoldedSession) -> str:
     """Describe a session: participant, protocol, number of answers, end, state of checksums and seal, and steps of the
     clock."""
     state = folded_session.state
-    person = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
+    participant = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end_text = state.sitting.ineligibility or ("finished" if state.closed else "not finished")
     clock_step_text = "".join(
         f". Before {format_time_in_zone(step.utc, convert_to_machine_zone)}: {step.sentence}"
         for step in state.sitting.clock_steps
     ).rstrip(".")
     seal_text = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
-    summary = f"session {state.opened.session} of {person}, {state.protocol.name}, {state.answers} answers, {end_text}"
+    summary = (
+        f"session {state.opened.session} of {participant}, {state.protocol.name}, {state.answers} answers, {end_text}"
+    )
     return f"{summary}; log {folded_session.log_contents.chain.describe()}{seal_text}{clock_step_text}"
 
 

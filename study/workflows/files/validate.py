@@ -21,7 +21,7 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import MAX_TOML_BYTES, find_long_key
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import FOLDER_PATTERN
-from study.workflows.files.file_content import FileContent, open_content
+from study.workflows.files.file_content import FileContent, read_file_content
 from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_recording
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
 
@@ -83,7 +83,7 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     if _is_foreign(path):
         return _validate_foreign(path)
     try:
-        content = open_content(path)
+        content = read_file_content(path)
         for recognise in recognisers:
             kind = recognise(content)
             if kind is not None:

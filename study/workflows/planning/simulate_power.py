@@ -166,7 +166,7 @@ def _read_finished_chunks(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[
             rows.append(json.loads(line))
         except ValueError:
             continue
-    if not rows or rows[0].get("plan") != _summarise_plan(plan):
+    if not rows or rows[0] != json.loads(_format_plan_line(plan)):
         raise StudyError(
             "This folder holds another power simulation",
             f"{path} was begun with other people, another rule, contrast, seed or number of studies.",

@@ -13,7 +13,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from equalizer.signals.joining import join, list_dropped_signals
+from equalizer.signals.joining import join_recordings, list_dropped_signals
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.read_arrays import Arrays
@@ -41,7 +41,7 @@ from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.recording_layout import FORMAT
 from study.workflows.output_paths import require_new_outputs
 
-Progress = Callable[[float], None]
+ProgressCallback = Callable[[float], None]
 """Called with the share of the work that is done, 0 to 1."""
 
 
@@ -74,19 +74,19 @@ def require_new_output(out_path: Path) -> None:
     require_new_outputs(out_path, title="Nothing was imported", kind="recordings")
 
 
-def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> ImportedRecording:
+def import_recording(plan: ImportPlan, on_progress: ProgressCallback = lambda share: None) -> ImportedRecording:
     """Import a recording and write it to `plan.out`, with the files' hashes and the map in its metadata. on_progress:
     share done, 0 to 1. Raises StudyError; nothing is written then."""
     require_new_output(plan.out)
-    foreign = read_foreign(plan.files, plan.map, on_progress)
-    provenance = gather_provenance(parents=foreign.files).as_dict()
-    import_metadata: dict[str, Any] = {"map": foreign.map, "notes": list(foreign.notes)}
-    if foreign.map_hash:
-        import_metadata["map_sha256"] = foreign.map_hash
-    meta = {**foreign.recording.meta, "import": import_metadata, "provenance": provenance}
-    recording = replace(foreign.recording, meta=meta)
+    foreign_recording = read_foreign(plan.files, plan.map, on_progress)
+    provenance = gather_provenance(parents=foreign_recording.files).as_dict()
+    import_metadata: dict[str, Any] = {"map": foreign_recording.map, "notes": list(foreign_recording.notes)}
+    if foreign_recording.map_hash:
+        import_metadata["map_sha256"] = foreign_recording.map_hash
+    meta = {**foreign_recording.recording.meta, "import": import_metadata, "provenance": provenance}
+    recording = replace(foreign_recording.recording, meta=meta)
     write_recording(plan.out, recording)
-    return ImportedRecording(plan.out, recording, foreign.map, foreign.notes)
+    return ImportedRecording(plan.out, recording, foreign_recording.map, foreign_recording.notes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +103,7 @@ class ForeignRecording:
 
 
 def read_foreign(
-    files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None
+    files: Sequence[Path], map_name: str | None, on_progress: ProgressCallback = lambda share: None
 ) -> ForeignRecording:
     """Import files into a single recording in memory; nothing is written. map_name: as `ImportPlan.map`. Raises
     StudyError, and MapNeededError where no map is found and headers do not suffice."""
@@ -140,14 +140,14 @@ def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path,
     return tuple(data_files)
 
 
-def _import_by_map(map_file: MapFile, files: Sequence[Path], on_progress: Progress) -> ForeignRecording:
+def _import_by_map(map_file: MapFile, files: Sequence[Path], on_progress: ProgressCallback) -> ForeignRecording:
     """Import files by a map; its hash becomes part of the result."""
     built_recording = build_recording(map_file.map, files, on_progress)
     map_hash = hashlib.sha256(map_file.text.encode()).hexdigest()
     return ForeignRecording(built_recording.recording, tuple(files), map_file.name, map_hash, built_recording.notes)
 
 
-def _import_by_found_map(folder: Path, on_progress: Progress) -> ForeignRecording:
+def _import_by_found_map(folder: Path, on_progress: ProgressCallback) -> ForeignRecording:
     """Import a folder by the only map that fits it; without a fitting map, by the headers of its files. Raises
     WrongUseError where its maps make several recordings."""
     matching_maps = find_maps_for_folder(folder)
@@ -177,7 +177,7 @@ def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
         return ForeignRecording(recordings[0], tuple(files), "recording", "", ())
     parts = [{"file": path.name, **recording.meta} for path, recording in zip(files, recordings, strict=True)]
     try:
-        joined_recording = join(recordings, {"parts": parts})
+        joined_recording = join_recordings(recordings, {"parts": parts})
     except ValueError as error:
         raise ImportRefusedError(
             files[0].name, str(error), "Import recordings of one device, rate and hold."
@@ -188,15 +188,16 @@ def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
     return ForeignRecording(joined_recording, tuple(files), "recording", "", tuple(notes))
 
 
-def _import_by_header(files: Sequence[Path], on_progress: Progress) -> ForeignRecording:
+def _import_by_header(files: Sequence[Path], on_progress: ProgressCallback) -> ForeignRecording:
     """Import files by the header of the first file, else by the only shipped map that fits them. Raises MapNeededError
     with a draft of a map where neither suffices."""
     arrays = read_without_map(files[0])
     import_map = make_header_map(arrays)
     if import_map is None and (shipped_map := find_map_for_files(files)) is not None:
-        imported = _import_by_map(shipped_map, files, on_progress)
+        foreign_recording = _import_by_map(shipped_map, files, on_progress)
         return replace(
-            imported, notes=(f"Imported by our map '{shipped_map.name}', which fits these files.", *imported.notes)
+            foreign_recording,
+            notes=(f"Imported by our map '{shipped_map.name}', which fits these files.", *foreign_recording.notes),
         )
     if import_map is None:
         raise MapNeededError(files[0].name, "; ".join(find_header_problems(arrays)), make_map_skeleton(arrays))
@@ -204,7 +205,7 @@ def _import_by_header(files: Sequence[Path], on_progress: Progress) -> ForeignRe
 
 
 def _import_by_header_map(
-    import_map: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress
+    import_map: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: ProgressCallback
 ) -> ForeignRecording:
     """Import files by a map derived from headers. arrays: those of the first file. Raises MapNeededError, with a draft
     of a map, for a problem that only a written map can solve."""

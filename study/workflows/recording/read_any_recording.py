@@ -25,7 +25,7 @@ def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
     if path.suffix.lower() not in FOREIGN_ENDINGS and not (path.is_file() and is_hdf5(path)):
         return read_recording(path), ()
     try:
-        imported = read_foreign((path,), None)
+        foreign_recording = read_foreign((path,), None)
     except MapNeededError as map_error:
         raise StudyError(
             map_error.title,
@@ -33,4 +33,7 @@ def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
             f"hapteq import {path} --out REC.h5 > MAP.toml prints one: complete it, import with --map MAP.toml, and "
             "give REC.h5.",
         ) from map_error
-    return imported.recording, (f"{path.name} is no hapteq recording: it was imported in memory.", *imported.notes)
+    return foreign_recording.recording, (
+        f"{path.name} is no hapteq recording: it was imported in memory.",
+        *foreign_recording.notes,
+    )

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from equalizer.signals.joining import join
+from equalizer.signals.joining import join_recordings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import hash_protocol
 from study.devices.clock import RealClock, VirtualClock
@@ -154,7 +154,7 @@ def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
 def _write_takes(plan: RecordingPlan, device: Device, takes: list[RecordedTake], interrupted: bool) -> WrittenRecording:
     """Join the pieces into one recording with a segment each, and write it."""
     piece_recordings = [replace(take.recording, segments=(take.piece.segment,)) for take in takes]
-    write_recording(plan.out, join(piece_recordings, _make_metadata(plan, device, takes, interrupted)))
+    write_recording(plan.out, join_recordings(piece_recordings, _make_metadata(plan, device, takes, interrupted)))
     return WrittenRecording(plan.out, tuple(warning for take in takes for warning in list_warnings(take)))
 
 

@@ -1,7 +1,8 @@
 """Analysis of a folder of sessions (`hapteq analyze`): thresholds.csv, detection.csv, anova.json, figures, HTML report.
 
 The sessions that belong together are selected (`collect_sessions`), analysed (`analyse_study`: thresholds, hierarchical
-model, analysis of variance) and written with their provenance. `write_results` does this at the end of a session.
+model, analysis of variance) and written with their provenance. Also called by `hapteq rehearse`, and by `write_results`
+at the end of a session.
 """
 
 import errno
@@ -19,14 +20,14 @@ from study.errors import StudyError
 from study.local_clock import format_local_now
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
-from study.store.disk.privacy import close_to_others, make_folder
+from study.store.disk.privacy import make_folder, restrict_to_owner
 from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.picture_files import write_pictures
-from study.workflows.results.analysis_files import PAGE_NAME, list_analysis_outputs
+from study.workflows.results.analysis_files import PAGE_NAME, STATISTICS_NAME, list_analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.export_study import collect_exported, is_exported
@@ -42,35 +43,38 @@ def analyze_data(
     where rows contradict their protocol, or where files cannot be written.
     """
     data, out_folder, ellipsoid = Path(data), Path(out_folder), None if ellipsoid is None else Path(ellipsoid)
-    collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
+    collected_trials = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
-        analysis = analyse_study(collected.trials, collected.protocol, collected.exclusions)
+        analysis = analyse_study(collected_trials.trials, collected_trials.protocol, collected_trials.exclusions)
     except ValueError as error:
         raise StudyError(
             "The data contradict their protocol", f"{error}.", "Nothing was written; look at the sessions named."
         ) from error
     ellipses = _compute_ellipses(ellipsoid)
-    input_paths = [*collected.input_paths, *([ellipsoid] if ellipsoid else [])]
+    input_paths = [*collected_trials.input_paths, *([ellipsoid] if ellipsoid else [])]
     provenance = gather_provenance(
-        protocol_hash=collected.protocol_hash,
-        seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
+        protocol_hash=collected_trials.protocol_hash,
+        seeds={
+            folder.name: seed for folder, seed in zip(collected_trials.sessions, collected_trials.seeds, strict=True)
+        },
         parents=input_paths,
     )
     pictures = draw_study_pictures(analysis, ellipses)
     _create_private_folder(out_folder, data)
     note_written_folder(data, out_folder)
-    _write_files(out_folder, analysis, pictures, ellipses, provenance, collected)
+    _write_files(out_folder, analysis, pictures, ellipses, provenance, collected_trials)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
         table=tuple(format_threshold_lines(analysis)),
-        warnings=(*collected.result_file_notes, *collected.exclusions, *analysis.warnings),
+        warnings=(*collected_trials.result_file_notes, *collected_trials.exclusions, *analysis.warnings),
         report=out_folder / PAGE_NAME,
     )
 
 
 def format_threshold_lines(analysis: StudyAnalysis) -> list[str]:
-    """Format the table of thresholds for the terminal: one line per frequency, means in N, with medians and the
-    declared contrast."""
+    """Format the table of thresholds for the terminal: one line per frequency with the mean (N), then medians and the
+    declared contrast; a single line where no test run is complete. Detection thresholds follow where a detection run is
+    complete."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
         declared_lines = describe_declared(analysis.declared_result)
@@ -134,7 +138,7 @@ def _create_private_folder(folder: Path, data: Path) -> None:
     except OSError as error:
         raise CannotWriteError(folder, error) from error
     if folder.resolve() != data.resolve():
-        close_to_others(folder, recursive=True)
+        restrict_to_owner(folder, recursive=True)
 
 
 def _write_files(
@@ -143,7 +147,7 @@ def _write_files(
     pictures: tuple[Picture, ...],
     ellipses: tuple[EllipsoidResult, ...],
     provenance: Provenance,
-    collected: CollectedTrials,
+    collected_trials: CollectedTrials,
 ) -> None:
     """Remove figures and report of an earlier analysis, then write all files. Raises CannotWriteError."""
     figure_folder = folder / "figures"
@@ -162,25 +166,25 @@ def _write_files(
         write_thresholds(folder / DETECTION_NAME, analysis.detection)
     document = make_anova_document(analysis)
     format_name, version = document.pop("format"), document.pop("version")
-    write_json(folder / "anova.json", format_name, version, document, provenance, overwrite=True)
+    write_json(folder / STATISTICS_NAME, format_name, version, document, provenance, overwrite=True)
     write_pictures(figure_folder, pictures)
-    origin = _list_origin(provenance, collected)
+    origin = _list_origin(provenance, collected_trials)
     report_html = render_study_report(
-        analysis, pictures, origin, format_local_now(), ellipses, collected.model_qualities
+        analysis, pictures, origin, format_local_now(), ellipses, collected_trials.model_qualities
     )
     write_text(folder / PAGE_NAME, report_html, overwrite=True)
 
 
-def _list_origin(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
+def _list_origin(provenance: Provenance, collected_trials: CollectedTrials) -> dict[str, str]:
     """List label and text of the entries of the report's last section, on the origin of the results."""
     return {
-        "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
-        "locked before the data": collected.lock_statement,
-        "device": ", ".join(collected.devices) or "none",
-        "participants": ", ".join(collected.observers) or "people",
-        "sessions": ", ".join(folder.name for folder in collected.sessions) or "none",
-        "left out": " ".join(collected.exclusions) or "nothing",
-        "seeds": ", ".join(str(seed) for seed in collected.seeds) or "none",
+        "protocol": f"{collected_trials.protocol.name}, hash {collected_trials.protocol_hash}",
+        "locked before the data": collected_trials.lock_statement,
+        "device": ", ".join(collected_trials.devices) or "none",
+        "participants": ", ".join(collected_trials.observers) or "people",
+        "sessions": ", ".join(folder.name for folder in collected_trials.sessions) or "none",
+        "left out": " ".join(collected_trials.exclusions) or "nothing",
+        "seeds": ", ".join(str(seed) for seed in collected_trials.seeds) or "none",
         "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
         "command": " ".join(provenance.command),
     }

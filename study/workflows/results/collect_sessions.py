@@ -97,7 +97,7 @@ def _group_model_qualities(
         if (equalized := state.opened.equalized) is not None:
             model_key = (equalized.sha256, equalized.quality or NOT_STORED)
             names_by_model.setdefault(model_key, []).append(folder.name)
-    return tuple((conjoin(names), sentence) for (_, sentence), names in names_by_model.items())
+    return tuple((conjoin(names), quality_sentence) for (_, quality_sentence), names in names_by_model.items())
 
 
 def _list_folders(data: Path) -> tuple[SessionFolder, ...]:

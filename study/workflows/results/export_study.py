@@ -26,7 +26,7 @@ from study.store.formats.bids_behaviour import write_bids
 from study.store.formats.psych_ds import (
     DESCRIPTION_NAME,
     KIND,
-    PROTOCOL_NAME,
+    PROTOCOL_PATH,
     is_psych_ds,
     read_psych_ds,
     write_psych_ds,
@@ -76,7 +76,7 @@ def export_study(
             folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), metadata, answers
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
-    note_written_folder(data, out_folder, always=True)
+    note_written_folder(data, out_folder, even_if_searched=True)
     return ExportResult(out_folder, names, len(collected.trials), collected.exclusions)
 
 
@@ -155,7 +155,7 @@ def collect_exported(folder: Path) -> CollectedTrials:
     has_psych_ds = is_psych_ds(folder)
     dataset = read_psych_ds(folder) if has_psych_ds else tidy_csv.read_tidy_csv(folder)
     path, kind = (
-        folder / (PROTOCOL_NAME if has_psych_ds else tidy_csv.PROTOCOL_NAME),
+        folder / (PROTOCOL_PATH if has_psych_ds else tidy_csv.PROTOCOL_NAME),
         KIND if has_psych_ds else tidy_csv.KIND,
     )
     metadata_path = folder / (DESCRIPTION_NAME if has_psych_ds else tidy_csv.FACTS_NAME)

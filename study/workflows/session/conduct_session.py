@@ -48,9 +48,8 @@ from study.workflows.trial.sitting import (
 )
 
 
-# Default of `Participant.on_session_opened`.
-def _ignore_opened(folder: SessionFolder, device: Device) -> None:
-    return None
+def _ignore_opened_session(folder: SessionFolder, device: Device) -> None:
+    """Do nothing: default of `Participant.on_session_opened`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ class Participant:
     clock: Clock
     requests: RequestPort = field(default_factory=QueuedRequests)
     """Requests from within this program: notes typed at the display, a stop from another screen."""
-    on_session_opened: Callable[[SessionFolder, Device], None] = _ignore_opened
+    on_session_opened: Callable[[SessionFolder, Device], None] = _ignore_opened_session
     """Called once with the session's folder, whose lock is held, and the device, which may be stopped from any
     thread."""
 

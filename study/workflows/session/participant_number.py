@@ -22,16 +22,16 @@ from study.store.sessions.session_lock import hold_places_lock
 from study.store.sessions.withdrawal_files import SessionParticipant, read_intent, read_participant
 from study.workflows.trial.sitting import Sitting, log_and_apply
 
-PLACE_TAKEN = b'"event":"place_taken"'
-"""Bytes of a log line whose event assigns the participant number."""
+PLACE_TAKEN_BYTES = b'"event":"place_taken"'
+"""Part of a log line whose event assigns the participant number."""
 NUMBER_PATTERN = re.compile(rb'"participant_number":(\d{1,6})\b')
 """Participant number in a log: in the first line, or in the event that replaces it. The last occurrence counts."""
 PROTOCOL_NAME_PATTERN = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
 """Name of the protocol in the first line of a log, which contains the protocol's TOML text as a JSON string."""
-PERSON_OBSERVER = b'"observer":null'
-"""Bytes in the first line of the log of a person's session."""
-TRIAL_PRESENTED = b'"event":"trial_presented"'
-"""Bytes of a log line that presents a trial; the first such line ends the preparation."""
+PERSON_OBSERVER_BYTES = b'"observer":null'
+"""Part of the first line of the log of a person's session."""
+TRIAL_PRESENTED_BYTES = b'"event":"trial_presented"'
+"""Part of a log line that presents a trial; the first such line ends the preparation."""
 
 
 def find_participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
@@ -89,7 +89,7 @@ def _read_damaged_log(folder: SessionFolder) -> SessionParticipant | None:
     if protocol_name is None or not numbers:
         return None
     return SessionParticipant(
-        protocol_name[1].decode(errors="replace"), PERSON_OBSERVER not in first_line, int(numbers[-1])
+        protocol_name[1].decode(errors="replace"), PERSON_OBSERVER_BYTES not in first_line, int(numbers[-1])
     )
 
 
@@ -102,11 +102,11 @@ def _read_assigned_number(folder: SessionFolder, session_opened: SessionOpened) 
     chain = Chain()
     try:
         for line in read_regular(folder.log).split(b"\n")[:-1]:
-            if TRIAL_PRESENTED in line:
+            if TRIAL_PRESENTED_BYTES in line:
                 return session_opened.participant_number
-            chain, event = verify_checksum(chain, line)
-            if PLACE_TAKEN in line and isinstance(number_event := parse_event(event), PlaceTaken):
-                return number_event.participant_number
+            chain, event_bytes = verify_checksum(chain, line)
+            if PLACE_TAKEN_BYTES in line and isinstance(assignment_event := parse_event(event_bytes), PlaceTaken):
+                return assignment_event.participant_number
     except OSError:
         return None
     except ValueError:  # damaged before the first trial: the number expected at the opening was most likely assigned

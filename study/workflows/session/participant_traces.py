@@ -22,7 +22,7 @@ from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, Session
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME
-from study.workflows.results.analysis_files import ANALYSIS_NAME, list_analysis_outputs
+from study.workflows.results.analysis_files import ANALYSIS_NAME, STATISTICS_NAME, list_analysis_outputs
 
 UNFINISHED_PATTERN = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
 """Name of an unfinished file or folder from an interrupted write."""
@@ -48,12 +48,12 @@ class Traces:
 
 
 def find_traces(data: Path, subject: str, proved_names: Collection[str] = ()) -> Traces:
-    """Search `data`, a resolved path, without changing it. proved_names: names of session folders that were proved
-    before an interrupted withdrawal erased their logs."""
+    """Find the data of a participant in `data`, a resolved path, without changing it. proved_names: names of session
+    folders that were proved before an interrupted withdrawal erased their logs."""
     sessions, derived, doubtful = [], [], []
     for path in sorted(data.iterdir()):
-        match = FOLDER_PATTERN.fullmatch(path.name)
-        if match is not None and match["subject"] == subject:
+        name_match = FOLDER_PATTERN.fullmatch(path.name)
+        if name_match is not None and name_match["subject"] == subject:
             # A folder that was proved earlier counts only without new content, for which nothing is proved.
             if is_session_of(path, subject) or (path.name in proved_names and _is_emptied_session(path)):
                 sessions.append(path.name)
@@ -102,7 +102,7 @@ def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
     """Whether the analysis in this folder contains this subject, by its tables, its statistics, or the names of its
     figures; None where no file of it can be read."""
     table_results = [_is_subject_in_table(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
-    table_results.append(_is_subject_in_statistics(folder / "anova.json", subject))
+    table_results.append(_is_subject_in_statistics(folder / STATISTICS_NAME, subject))
     if any(table_results):
         return True
     figure_pattern = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
@@ -112,7 +112,8 @@ def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
-    """Session and subject in the first line of the log, which need not be a valid event; None if it cannot be read."""
+    """Read session and subject from the first line of the log, which need not be a valid event; None if it cannot be
+    read."""
     if not is_real_file(folder.log):
         return None
     try:
@@ -153,16 +154,16 @@ def _find_analysis_traces(folder: Path, subject: str, is_separate: bool) -> tupl
     """Find proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. is_separate:
     `folder` is not the data folder itself, so that its unfinished files belong to the analysis."""
     analysis_paths = list(list_analysis_outputs(folder))
-    names_subject = is_subject_in_analysis(folder, subject) if analysis_paths else False
+    is_subject_named = is_subject_in_analysis(folder, subject) if analysis_paths else False
     proved_paths, doubtful_paths = (
-        (analysis_paths if names_subject else []),
-        (analysis_paths if names_subject is None and folder.name == ANALYSIS_NAME else []),
+        (analysis_paths if is_subject_named else []),
+        (analysis_paths if is_subject_named is None and folder.name == ANALYSIS_NAME else []),
     )
     searched_folders = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
     for path in (path for searched_folder in searched_folders for path in sorted(searched_folder.iterdir())):
         if UNFINISHED_PATTERN.fullmatch(path.name) is None or path.is_symlink():
             continue
-        if (names_subject and is_separate) or _has_session_name(path, subject):
+        if (is_subject_named and is_separate) or _has_session_name(path, subject):
             proved_paths.append(path)
         else:
             doubtful_paths.append(path)

@@ -33,7 +33,7 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
             case FillIn(form=form):
                 state = present_form(state, form, sitting)
             case CheckDevice():
-                state = _check_device(state, sitting)
+                state = _check_device_and_computer(state, sitting)
         state = write_notes(state, sitting)
         if sitting.supervisor.stop_requester is not None:
             return state, f"the {sitting.supervisor.stop_requester} stopped the session"
@@ -86,7 +86,7 @@ def make_ineligible_error(state: SessionState) -> StudyError:
     )
 
 
-def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
+def _check_device_and_computer(state: SessionState, sitting: Sitting) -> SessionState:
     """Check device and computer once, and log the findings and whether the experimenter continues. The preparation
     repeats the check until the experimenter does."""
     sitting.supervisor.start_activity("preparing")

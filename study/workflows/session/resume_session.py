@@ -28,7 +28,7 @@ from study.session.state.state import SessionState
 from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import compute_vector_at_angle
 from study.session.views.count_text import format_answer_count
-from study.store.disk.privacy import close_data_folder, close_to_others
+from study.store.disk.privacy import restrict_data_folder, restrict_to_owner
 from study.store.disk.provenance import list_versions
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, remove_incomplete_line
@@ -55,8 +55,8 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
     Raises StudyError where it cannot be resumed: it is running in another program, finished or withdrawn, its log is
     damaged, it was begun on another kind of device (real or simulated), or the participant refused or was excluded.
     """
-    close_data_folder(folder.path.parent)
-    close_to_others(folder.path, recursive=True)  # earlier versions wrote files that other accounts could read
+    restrict_data_folder(folder.path.parent)
+    restrict_to_owner(folder.path, recursive=True)  # earlier versions wrote files that other accounts could read
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         # A stop request of the interrupted sitting must not end this sitting, and its live state is outdated. Requests

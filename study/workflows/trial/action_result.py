@@ -46,7 +46,7 @@ def make_early_end_result(state: SessionState, reply: Unanswered) -> ActionResul
 
 
 def check_end_request(state: SessionState, sitting: Sitting) -> ActionResult | None:
-    """Check for requests that arrived while no stimulus was played: returns the result of a stop or pause; None without
+    """Check for requests that arrived while no stimulus was played. Returns the result of a stop or pause; None without
     either."""
     sitting.supervisor.listen()
     reply = sitting.supervisor.resolve(Unanswered("", ends_sitting=False, repeat_requested=True))
@@ -57,7 +57,7 @@ def check_end_request(state: SessionState, sitting: Sitting) -> ActionResult | N
     )
 
 
-def find_leaving_reason(fault: Fault) -> str:
+def find_fault_end_reason(fault: Fault) -> str:
     """Find the reason why the sitting ends after this fault: the text of a fault after which the device must be opened
-    again; empty for other faults."""
+    again; empty for other faults, and without one."""
     return fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""

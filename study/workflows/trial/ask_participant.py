@@ -98,19 +98,19 @@ def _await_reply(question: Question, sitting: Sitting) -> Reply:
             return reply
 
 
-def _wait_in_interval(title: str, number: int, duration_s: float, sitting: Sitting) -> Unanswered | None:
-    """Wait `duration_s` (s) during an interval or gap. None when it has passed; else why the wait ended: a button
-    pressed too early makes the trial void (`VoidCause.EARLY`). title, number: of the interval; empty and 0 in a gap."""
+def _wait_in_interval(title: str, interval_number: int, duration_s: float, sitting: Sitting) -> Unanswered | None:
+    """Wait `duration_s` (s) during an interval or gap. None when it has passed; else why the wait ended: an answer
+    before the question makes the trial void (`VoidCause.EARLY`). title, interval_number: empty and 0 in a gap."""
     reply = sitting.display.show_playing(
-        PlayingNotice(title, number, duration_s, picture=None), sitting.supervisor.keep_alive
+        PlayingNotice(title, interval_number, duration_s, picture=None), sitting.supervisor.keep_alive
     )
     if reply is None and sitting.supervisor.keep_alive():
         return None
-    final_reply = sitting.supervisor.resolve(reply or Unanswered("the stimulus ended early", ends_sitting=False))
+    resolved_reply = sitting.supervisor.resolve(reply or Unanswered("the stimulus ended early", ends_sitting=False))
     return (
         Unanswered("answered before both intervals", ends_sitting=False, cause=VoidCause.EARLY)
-        if isinstance(final_reply, Answered)
-        else final_reply
+        if isinstance(resolved_reply, Answered)
+        else resolved_reply
     )
 
 

@@ -21,7 +21,7 @@ from study.session.views.participant_views import (
 from study.workflows.trial.action_result import (
     ActionResult,
     check_end_request,
-    find_leaving_reason,
+    find_fault_end_reason,
     make_early_end_result,
 )
 from study.workflows.trial.sitting import Sitting, log_and_apply
@@ -41,12 +41,12 @@ def demonstrate(state: SessionState, sitting: Sitting) -> ActionResult:
         if isinstance(choice, DemoDone):
             return ActionResult(log_and_apply(state, DemoFinished(utc=sitting.clock.utc()), sitting))
         vibration = choice.vibration
-        outcome = _play_demonstration(state, choice, sitting)
-        state = outcome.state
-        if outcome.end_reason or outcome.pause:
-            return outcome
-        if outcome.void:
-            sitting.display.trouble(f"That was cut short: {outcome.void}.")
+        demonstration_result = _play_demonstration(state, choice, sitting)
+        state = demonstration_result.state
+        if demonstration_result.end_reason or demonstration_result.pause:
+            return demonstration_result
+        if demonstration_result.void:
+            sitting.display.trouble(f"That was cut short: {demonstration_result.void}.")
         else:
             felt_stimuli = (*felt_stimuli, (choice.vibration, choice.number))
 
@@ -64,7 +64,8 @@ def _make_menu(state: SessionState, felt_stimuli: tuple[tuple[int, int], ...], v
 
 
 def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting) -> ActionResult:
-    """Log and play one stimulus at its roved level (`draw_demo_level_n`); returns how the demonstration continues."""
+    """Log and play one stimulus at its roved level (`draw_demo_level_n`). Returns how the demonstration continues;
+    `void` where the stimulus ended early."""
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
     level_n = draw_demo_level_n(protocol.demo, state.opened.seed, state.sitting.demo_count)
@@ -92,12 +93,14 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
     notice = PlayingNotice(f"Direction {choice.number}", choice.number, protocol.demo.seconds, picture)
     reply = sitting.display.show_playing(notice, sitting.supervisor.keep_alive)
     fault = sitting.device.release().health.fault
-    if end_reason := find_leaving_reason(fault):
+    if end_reason := find_fault_end_reason(fault):
         return ActionResult(state, end_reason=end_reason, fault=fault)
-    final_reply = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
-    if isinstance(final_reply, Unanswered):
-        outcome = make_early_end_result(state, final_reply)
+    resolved_reply = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
+    if isinstance(resolved_reply, Unanswered):
+        early_end_result = make_early_end_result(state, resolved_reply)
         return (
-            outcome if fault is Fault.NONE or outcome.end_reason else ActionResult(state, void=fault.value, fault=fault)
+            early_end_result
+            if fault is Fault.NONE or early_end_result.end_reason
+            else ActionResult(state, void=fault.value, fault=fault)
         )
     return ActionResult(state)

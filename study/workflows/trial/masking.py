@@ -34,8 +34,8 @@ def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | 
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
-    samples = make_masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
-    attenuated_samples = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
+    noise_samples = make_masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
+    attenuated_samples = np.rint(noise_samples * 10 ** (settings.level_db / 20)).astype(np.int16)
     with contextlib.closing(make_masking_sound(attenuated_samples, SAMPLE_RATE_HZ)) as sound:
         yield sound
 
@@ -82,7 +82,7 @@ def stop_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def _log_masking(
-    state: SessionState, sitting: Sitting, sound: SoundOutput, playing: bool, trouble: str = ""
+    state: SessionState, sitting: Sitting, sound_output: SoundOutput, playing: bool, trouble: str = ""
 ) -> SessionState:
     """Log whether the noise plays, with its settings, and return the new state. trouble: why it does not play; empty
     where it plays or was stopped as planned."""
@@ -90,7 +90,7 @@ def _log_masking(
     event = MaskingPlayed(
         utc=sitting.clock.utc(),
         playing=playing,
-        output=sound.output,
+        output=sound_output.output,
         level_db=settings.level_db,
         low_hz=settings.low_hz,
         high_hz=settings.high_hz,

@@ -25,7 +25,7 @@ from study.store.sessions.trial_recordings import name_probe_recording, save_tri
 from study.workflows.trial.action_result import (
     ActionResult,
     check_end_request,
-    find_leaving_reason,
+    find_fault_end_reason,
     make_early_end_result,
 )
 from study.workflows.trial.present_trial import await_handle
@@ -145,11 +145,13 @@ def _play_reference_commands(state: SessionState, sitting: Sitting) -> ActionRes
             Unanswered("the reference was cut short", ends_sitting=False, repeat_requested=True)
         )
         outcome = make_early_end_result(state, reply) if isinstance(reply, Unanswered) else ActionResult(state)
-        return replace(outcome, end_reason=outcome.end_reason or find_leaving_reason(fault), fault=fault)
+        return replace(outcome, end_reason=outcome.end_reason or find_fault_end_reason(fault), fault=fault)
     recording = None if play_result.recording is None else replace(play_result.recording, segments=segments)
     trouble = "" if recording is not None else play_result.health.fault.value
     state = _save_and_log_measurement(state, recording, commands.duration_s, trouble, sitting).state
-    return ActionResult(state, end_reason=find_leaving_reason(play_result.health.fault), fault=play_result.health.fault)
+    return ActionResult(
+        state, end_reason=find_fault_end_reason(play_result.health.fault), fault=play_result.health.fault
+    )
 
 
 def _play_and_measure(state: SessionState, kind: ProbeKind, level_n: float, sitting: Sitting) -> _MeasuredProbe:
@@ -244,7 +246,7 @@ def _conclude_probe(
     or after a fault that requires to open the device again. reply: why the playback ended early; None where it was
     complete."""
     fault = play_result.health.fault
-    if end_reason := find_leaving_reason(fault):
+    if end_reason := find_fault_end_reason(fault):
         return ActionResult(state, end_reason=end_reason, fault=fault)
     resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
     outcome = make_early_end_result(state, resolved) if isinstance(resolved, Unanswered) else ActionResult(state)

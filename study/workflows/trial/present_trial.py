@@ -22,7 +22,7 @@ from study.session.state.state import SessionState, count_repeats_left
 from study.session.stimulus.delivered import has_too_little_motion, measure_delivered
 from study.session.stimulus.stimulus import PLANE_AXES, compute_direction_vector
 from study.session.views.participant_views import HandleView, Question, Task, Unanswered, make_direction_picture
-from study.workflows.trial.action_result import ActionResult, find_leaving_reason, make_early_end_result
+from study.workflows.trial.action_result import ActionResult, find_fault_end_reason, make_early_end_result
 from study.workflows.trial.ask_participant import StimulusReply, ask_participant
 from study.workflows.trial.judge_trial import get_void_cause, judge_trial
 from study.workflows.trial.masking import is_masked
@@ -182,7 +182,7 @@ def _log_answered_trial(
     recording = play_result.recording if verdict.is_measurable else None
     delivered = measure_delivered(recording, unit_vector, due_trial.frequency_hz) if recording is not None else None
     fault = play_result.health.fault
-    end_reason = find_leaving_reason(fault)
+    end_reason = find_fault_end_reason(fault)
     if verdict.void_reason:
         state = log_and_apply(
             state,
@@ -216,7 +216,7 @@ def _log_void_trial(
     state = log_and_apply(state, make_void_event(due_trial, (reason, cause), health, sitting), sitting)
     if reply.ends_sitting:
         return ActionResult(state, end_reason=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
-    if end_reason := find_leaving_reason(fault):
+    if end_reason := find_fault_end_reason(fault):
         return ActionResult(state, end_reason=end_reason, void=reason, fault=fault)
     if reply.pause:
         return ActionResult(state, pause=reply.reason)

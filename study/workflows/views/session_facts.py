@@ -11,7 +11,8 @@ from study.session.views.local_time import Zone, format_time_in_zone
 from study.workflows.results.fold_session import FoldedSession
 
 _HASH_DIGITS = 12
-"""Number of digits of the protocol's hash that are shown; as many select a protocol in `collect_sessions`."""
+"""Number of digits of the protocol's hash that are shown: as many as select a protocol in
+`collect_sessions`."""
 
 
 def list_session_facts(folded_session: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
@@ -51,7 +52,8 @@ def _name_end_time(state: SessionState) -> str:
 
 
 def _describe_number(state: SessionState) -> str:
-    """Describe the number of the participant in the counterbalanced order of the protocol, from 1."""
+    """Describe the number of the participant in the counterbalanced order of the protocol, from 1; in words where none
+    is assigned yet."""
     if not state.has_final_place:
         return "without a place in the order of this protocol"
     return f"number {state.opened.participant_number + 1} of this protocol"

@@ -1,8 +1,8 @@
 """Stream the signals of a running session's device over the lab streaming layer (LSL): force, acceleration, motion and
 status of the control loop at every tick, in addition to the session's markers.
 
-A separate program (`hapteq stream`, `study.cli.stream`) reads them from the telemetry ring buffer of the loop, so that
-streaming never delays the loop. `stream_session` calls `SignalStreams.push` repeatedly.
+A separate program (`hapteq stream`, `study.cli.stream`) makes the `SignalStreams`, and `stream_session` calls `push`
+repeatedly. It reads the telemetry ring buffer of the loop, so that streaming never delays the loop.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Write an experimenter's or participant's note into the log of a session (`hapteq note`).
+"""Write an experimenter's or participant's note into the log of a session. Called by `hapteq note` (`study.cli.note`).
 
 A log has a single writer. While a session runs, its program is that writer, and the note is sent to it as a request;
 otherwise the note is appended directly, with the session's lock held.

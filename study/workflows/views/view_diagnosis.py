@@ -19,7 +19,7 @@ from analysis.wording import MISSING, conjoin, format_p
 from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView
 from study.session.views.printable import make_printable
-from study.store.formats.diagnosis_file import MODEL_NAME, read_diagnosis
+from study.store.formats.diagnosis_file import MODEL_NAME, PAGE_NAME, read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
@@ -33,11 +33,11 @@ named effects, and the noise between repeats."""
 def make_diagnosis_view(path: Path) -> DiagnosisView:
     """Make the view of a diagnosis. path: its document; the improved model and the HTML report are searched for in the
     same folder. Raises CannotReadError or UnusableFileError where the document cannot be used."""
-    diagnosis, device = read_diagnosis(path), _read_device(path.parent / MODEL_NAME)
-    report_path = path.parent / "report.html"
+    diagnosis, device_wording = read_diagnosis(path), _read_device(path.parent / MODEL_NAME)
+    report_path = path.parent / PAGE_NAME
     view = DiagnosisView(
         path=str(path),
-        verdict=describe_verdict(diagnosis, device=device),
+        verdict=describe_verdict(diagnosis, device=device_wording),
         sentences=tuple(sentence for effect in diagnosis.effects for sentence in _describe_named_effect(effect)),
         rivals=tuple(sentence for effect in diagnosis.effects for sentence in describe_rivals(effect)),
         mismatch=_tabulate_mismatches(diagnosis.mismatch),
@@ -46,7 +46,7 @@ def make_diagnosis_view(path: Path) -> DiagnosisView:
         next_experiment=_describe_next_experiment(diagnosis),
         report=str(report_path) if report_path.is_file() else "",
         notes=_list_notes(diagnosis),
-        candidates=describe_candidates(diagnosis, device),
+        candidates=describe_candidates(diagnosis, device_wording),
     )
     return make_printable(view)
 
@@ -89,7 +89,8 @@ def _format_mismatch_row(mismatch: Mismatch) -> tuple[str, ...]:
 
 
 def _format_error_row(sample_set: str, errors: Errors) -> tuple[str, ...]:
-    """Format a row of the table of errors, under `ERROR_HEADER`. sample_set: name of the set of samples."""
+    """Format a row of the table of errors (1 = 100 %) under `ERROR_HEADER`; a dash for an error that is not known.
+    sample_set: name of the set of samples."""
     values = (errors.before, errors.retuned, errors.after, errors.noise)
     return (sample_set, *(MISSING if value is None else f"{value:.4f}" for value in values))
 

@@ -19,7 +19,7 @@ from study.session.views.local_time import Zone, format_time_in_zone, to_utc
 from study.session.views.printable import make_printable
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_valid_events
-from study.workflows.results.analysis_files import ANALYSIS_NAME
+from study.workflows.results.analysis_files import ANALYSIS_NAME, PAGE_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import list_due_results
 from study.workflows.views.session_facts import list_session_facts
@@ -74,23 +74,24 @@ def _make_full_view(folder: SessionFolder, folded_session: FoldedSession, zone: 
 def _list_log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
     """List sentences on an incomplete last line, on results that are missing or out of date, and on missing
     checksums."""
-    due_files = ", ".join(list_due_results(folder, folded_session))
+    due_files_text = ", ".join(list_due_results(folder, folded_session))
     remarks = (
         (
             folded_session.log_contents.torn_bytes,
             "A crash left the last line of the log incomplete; it is removed when the session is resumed.",
         ),
-        (due_files, f"Missing or not as the log gives it: {due_files}. hapteq resume writes it."),
+        (due_files_text, f"Missing or not as the log gives it: {due_files_text}. hapteq resume writes it."),
         (
             not folded_session.log_contents.chain.first_checksum_line,
             "The log contains no checksums: an older version wrote it.",
         ),
     )
-    return tuple(text for is_due, text in remarks if is_due)
+    return tuple(text for has_problem, text in remarks if has_problem)
 
 
 def _make_damaged_view(folder: SessionFolder, error: StudyError, zone: Zone) -> SessionView:
-    """Make the view of a damaged session: its line, the problem, and the events that can be read."""
+    """Make the view of a damaged session: its line in the list of sessions, the problem, and the events that can be
+    read."""
     line = make_session_line(folder)
     if line.standing != "unreadable":  # the line reads only parts of the log, and did not find the damage
         line = SessionLine(
@@ -107,8 +108,8 @@ def _make_minimal_view(
 ) -> SessionView:
     """Make the view of a withdrawn or damaged session, without thresholds and staircases."""
     facts = (("participant", line.subject), ("folder", str(folder.path)))
-    notes = warnings or ((line.remark,) if line.remark else ())
-    return SessionView(line, facts, (), notes, (), events, _find_report(folder), _list_figures(folder))
+    shown_warnings = warnings or ((line.remark,) if line.remark else ())
+    return SessionView(line, facts, (), shown_warnings, (), events, _find_report(folder), _list_figures(folder))
 
 
 def _analyse_session(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
@@ -183,7 +184,7 @@ def _make_staircase(state: SessionState, run: Run, threshold: Threshold | None) 
 
 def _find_report(folder: SessionFolder) -> str:
     """Find the path of the report of the session's analysis; empty if there is none."""
-    report_path = folder.path / ANALYSIS_NAME / "report.html"
+    report_path = folder.path / ANALYSIS_NAME / PAGE_NAME
     return str(report_path) if report_path.is_file() else ""
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.figures.delivered import draw_delivered
+from analysis.figures.delivered_acceleration import draw_delivered_acceleration
 from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
@@ -19,7 +19,7 @@ from analysis.psychophysics.threshold_table import tabulate_thresholds
             "There is no completed run to draw.",
         ),
         (lambda rule: draw_staircases((), rule), "There is no run to draw."),
-        (lambda rule: draw_delivered(()), "No trial has a measured acceleration."),
+        (lambda rule: draw_delivered_acceleration(()), "No trial has a measured acceleration."),
         (lambda rule: draw_ellipsoids(()), "There is no ellipsoid to draw."),
     ],
 )

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.look.imposed_motion import LARGEST_MISFIT, compute_law_misfit, is_imposed
+from analysis.look.imposed_motion import LARGEST_MISFIT, compute_law_misfit, is_motion_imposed
 
 T = np.arange(20_000) / 1000
 NOISE = np.random.default_rng(3).standard_normal(len(T))
@@ -40,18 +40,18 @@ STEPS = np.sign(np.sin(2 * np.pi * 0.3 * T))
 def test_a_motion_by_ramps_or_sines_is_imposed_on_what_answers_with_another_force(motion):
     measured = motion + 0.002 * NOISE
     assert compute_law_misfit(measured) < LARGEST_MISFIT
-    assert is_imposed(measured, hysteretic_force(motion))
+    assert is_motion_imposed(measured, hysteretic_force(motion))
 
 
 @pytest.mark.parametrize("force", [TRIANGLE, SINE, SWEEP, STEPS, 5 * NOISE, smooth(9 * NOISE)])
 def test_the_motion_of_a_driven_device_is_not_imposed(force):
     motion = driven_motion(force)
-    assert not is_imposed(motion + 0.001 * np.std(motion) * NOISE, force)
+    assert not is_motion_imposed(motion + 0.001 * np.std(motion) * NOISE, force)
 
 
 def test_where_both_follow_a_law_or_neither_does_nothing_is_said():
-    assert not is_imposed(SINE + 0.001 * NOISE, 3 * SINE + 0.02 * NOISE)
-    assert not is_imposed(smooth(NOISE), hysteretic_force(smooth(NOISE)))
+    assert not is_motion_imposed(SINE + 0.001 * NOISE, 3 * SINE + 0.02 * NOISE)
+    assert not is_motion_imposed(smooth(NOISE), hysteretic_force(smooth(NOISE)))
 
 
 @pytest.mark.parametrize("values", [np.ones(500), np.full(500, np.nan), T[:20]])

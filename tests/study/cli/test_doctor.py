@@ -17,7 +17,7 @@ from study.devices.device import Fault, Health
 from study.devices.force_dimension import findings
 from study.devices.force_dimension.usb import UsbDevice
 from study.errors import ExitCode
-from study.session.stimulus.timing_verdict import judge_lateness, judge_load, measure_lateness
+from study.session.stimulus.timing_verdict import judge_lateness, judge_load, summarize_lateness
 from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.check_timing import Timing
@@ -254,7 +254,7 @@ def examination(timing: Timing) -> Examination:
 
 
 def measured(late_ms: float, load: float, simulated: bool) -> Timing:
-    lateness = measure_lateness(np.full(2000, late_ms / 1000.0), 1000.0)
+    lateness = summarize_lateness(np.full(2000, late_ms / 1000.0), 1000.0)
     return Timing(2.0, HEALTH, lateness, (judge_lateness(lateness, simulated), judge_load(load)))
 
 

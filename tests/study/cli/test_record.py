@@ -48,7 +48,7 @@ MOVING = {
     "study.workflows.equalizer.repeat_trajectory.repeat_trajectory": EQUALIZE,
     "study.workflows.equalizer.play_contact.play_contact": CONTACT,
     "study.workflows.diagnosis.write_twin.write_twin": ("twin", "--out", "m.toml"),
-    "study.workflows.checks.examine_setup.accept": ("doctor", "--timing", "0", "--accept", "Ada"),
+    "study.workflows.checks.examine_setup.accept_examined_device": ("doctor", "--timing", "0", "--accept", "Ada"),
     "study.workflows.checks.daily_check.check_today": ("doctor", "--timing", "0", "--daily"),
 }
 

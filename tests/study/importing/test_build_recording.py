@@ -35,6 +35,7 @@ def test_nothing_is_reported_where_nothing_was_done(files):
         ({"value": "u[:10]"}, "Channel 'ax': y has 400 samples, but clock 'clock' has 10."),
         ({"value": "u[0:2] + y"}, "shapes (2,) and (400,) cannot be combined"),
         ({"value": "1 / (u - u)"}, "Channel 'fx': 1 / (u - u) holds infinite values; a missing sample is NaN"),
+        ({"value": "1 / 0"}, "Channel 'fx': 1 / 0 holds infinite values; a missing sample is NaN"),
         (
             {"value": "log(0) * (u + 3)"},
             "Channel 'fx': log(0) * (u + 3) holds infinite values; a missing sample is NaN",

@@ -30,6 +30,7 @@ unit = "mm"
         ("nothing + fx", "Computed channel 'x': there is no array 'nothing'"),
         ("fx[:7]", "Computed channel 'x': fx[:7] has the shape (7,), but the recording has 400 samples."),
         ("1e9 ** (50 + abs(fx))", "Computed channel 'x': 1e9 ** (50 + abs(fx)) holds infinite values."),
+        ("log(0)", "Computed channel 'x': log(0) holds infinite values."),
         ("loop", "Computed channel 'x': the definition of 'loop' refers to itself."),
         ("integral(fx[:7])", "7 samples are not the recording's 400"),
     ],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS
-from study.devices.force_dimension.lab import read_lab
+from study.devices.force_dimension.lab import read_lab_settings
 from study.tui.app.app import HapteqApp
 from study.tui.app.start_options import StartOptions
 from tests.study.devices.accelerometer.pty_board import SCALE, Board
@@ -71,7 +71,7 @@ def test_by_keys_from_the_start_screen_to_the_lab_s_file(tmp_path, lab_file):
             await person.until("SensorScreen", "Written into")
 
         run(tmp_path / "data", story)
-    sensor = read_lab().accelerometer
+    sensor = read_lab_settings().accelerometer
     assert sensor is not None and sensor.port == board.path
     np.testing.assert_allclose(sensor.sensitivity, SCALE * np.eye(3), atol=0.5)
     np.testing.assert_allclose(sensor.bias, 32_768, atol=2)

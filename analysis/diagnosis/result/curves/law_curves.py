@@ -31,7 +31,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 _EXTRAPOLATED_SHARE = 0.25
-"""Share of the visited range by which a formula is drawn beyond it, on either side. Chosen by hand."""
+"""Share of the measured range of a variable by which a formula is drawn beyond it, on either side. Chosen by hand."""
 _MAIN_CORRELATION_RATIO = 0.5
 """Correlation ratio of a law's force with one variable from which the curve is drawn against it alone.
 Chosen by hand."""
@@ -50,18 +50,18 @@ class _Variable:
 
 
 def compute_law_signature(
-    evidence: Evidence, placed_effect: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
+    evidence: Evidence, placed_effect: PlacedEffect, axes: tuple[str, ...], unit_system: UnitSystem
 ) -> Signature | None:
-    """Compute the curve of a discovered law along the measured motion; for a law of the command, of its change of the
-    command. None where it is no discovered law, acts on a response, or depends on a signal other than time, motions and
-    commands. axes: names."""
+    """Compute the curve of a discovered law along the measured motion; for a law of the command, of the change of the
+    command. None where the effect is no discovered law, or its law acts on a response, depends on no variable, or
+    depends on a signal other than time, motions and commands. axes: names of the axes."""
     if placed_effect.effect.law is None or placed_effect.effect.law.acts_on == "response":
         return None
     law = with_law_values(placed_effect.effect.law, placed_effect.values)
     if law.acts_on == "command":
         command = COMMAND_PREFIX + derive_axis_letters(axes)[placed_effect.sites[0]]
         law = replace(law, expression=f"({law.expression}) - {command}", acts_on="force", units=())
-    variables = _list_variables(evidence, axes, system)
+    variables = _list_variables(evidence, axes, unit_system)
     if not law.variables or not set(law.variables) <= variables.keys():
         return None
     rate_hz, axis = evidence.sample_rate_hz, placed_effect.sites[0]
@@ -73,7 +73,7 @@ def compute_law_signature(
     variable = variables[max(correlation_ratios, key=lambda name: correlation_ratios[name])]
     abscissa, visited_range = variable.name, None
     if max(correlation_ratios.values()) < _MAIN_CORRELATION_RATIO:  # only the variables together explain most of it
-        variable = _Variable(f"force of the law ({system.force})", force)
+        variable = _Variable(f"force of the law ({unit_system.force})", force)
         abscissa, law_abscissa, law_force = variable.name, *_make_identity_line(force[is_used])
     elif len(law.variables) == 1 and not has_memory(law):
         law_abscissa, law_force, visited_range = _evaluate_extrapolated(law, variable.values[is_used], rate_hz)
@@ -84,7 +84,7 @@ def compute_law_signature(
         placed_effect.effect.name,
         axes[axis],
         abscissa,
-        f"missing force ({system.force})",
+        f"missing force ({unit_system.force})",
         bin_centres,
         mean,
         spread,
@@ -94,19 +94,19 @@ def compute_law_signature(
     )
 
 
-def _list_variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
+def _list_variables(evidence: Evidence, axes: tuple[str, ...], unit_system: UnitSystem) -> Mapping[str, _Variable]:
     """List signals by their names in a formula: time, then position, velocity, acceleration and command of each
     axis."""
-    rate_hz, length = evidence.sample_rate_hz, system.length
+    rate_hz, length = evidence.sample_rate_hz, unit_system.length
     variables = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
     for index, (axis, letter) in enumerate(zip(axes, derive_axis_letters(axes), strict=True)):
         velocity = evidence.axis_velocity[:, index]
         motions = (evidence.axis_position[:, index], velocity, np.gradient(velocity) * rate_hz)
         kinds = (("position", length), ("velocity", f"{length}/s"), ("acceleration", f"{length}/s^2"))
-        for prefix, values, (kind, unit) in zip(DERIVATIVE_PREFIXES, motions, kinds, strict=True):
-            variables[prefix + letter] = _Variable(f"{kind} of {axis} ({unit})", np.asarray(values))
+        for prefix, motion, (kind, unit) in zip(DERIVATIVE_PREFIXES, motions, kinds, strict=True):
+            variables[prefix + letter] = _Variable(f"{kind} of {axis} ({unit})", np.asarray(motion))
         variables[COMMAND_PREFIX + letter] = _Variable(
-            f"command of {axis} ({system.force})", evidence.command[:, index]
+            f"command of {axis} ({unit_system.force})", evidence.command[:, index]
         )
     return variables
 
@@ -114,8 +114,8 @@ def _list_variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSyste
 def _evaluate_extrapolated(
     law: Law, visited_values: FloatArray, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """Evaluate a formula of one variable over the visited range and `_EXTRAPOLATED_SHARE` of it on either
-    side. Returns abscissa, value, and visited range. visited_values: (n,)."""
+    """Evaluate a formula of one variable over the range of its measured values (n,) and `_EXTRAPOLATED_SHARE` of it on
+    either side. Returns abscissa, force where it is finite, and the measured range."""
     low, high = float(visited_values.min()), float(visited_values.max())
     margin = _EXTRAPOLATED_SHARE * (high - low)
     abscissa = np.linspace(low - margin, high + margin, _LINE_POINTS)
@@ -124,7 +124,7 @@ def _evaluate_extrapolated(
     return abscissa[is_finite], law_force[is_finite], (low, high)
 
 
-def _make_identity_line(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return abscissa and ordinate of the straight line y = x over the range of the law's force (n,)."""
-    ends = np.array([values.min(), values.max()])
-    return ends, ends
+def _make_identity_line(law_force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Make abscissa and ordinate (2,) of the straight line y = x over the range of the law's force (n,)."""
+    range_ends = np.array([law_force.min(), law_force.max()])
+    return range_ends, range_ends

@@ -1,8 +1,8 @@
 """Signature curve of a named effect: the residual of the model without it, against the variable that it depends on.
 
 For forces of the mechanism and the actuator the residual is the missing force, for sensors the error of a channel. The
-fitted law is drawn with it: simulated, and averaged over bins of the same kind. Effects without such a variable are
-shown as the spectrum of the residual. Called by `examine_fits`.
+fitted law is part of the curve: simulated, and averaged over bins of the same kind. An effect without such a variable
+has the spectrum of the residual. Called by `examine_fits`; the `figures.diagnosis.signature` module draws the curves.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ from equalizer.signals.unit_system import LINEAR, UnitSystem
 Abscissa = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
 """Variable of a curve; "growth": running rms over time, for an error that grows."""
 
-ABSCISSA: Mapping[str, Abscissa] = {
+ABSCISSA_BY_EFFECT: Mapping[str, Abscissa] = {
     "coulomb_friction": "velocity",
     "asymmetric_friction": "velocity",
     "stribeck_friction": "velocity",
@@ -60,13 +60,13 @@ ABSCISSA: Mapping[str, Abscissa] = {
     "clock_drift": "growth",
 }
 """Variable of each effect's curve; an effect that is not listed is shown as a spectrum ("frequency")."""
-_FREQUENCY_LINES = 1024
+_SPECTRAL_LINES = 1024
 """Number of spectral lines before they are averaged in twelfths of an octave. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class CurveNames:
-    """Names and units on the axes of a curve."""
+    """Axis and channel names, and units, for the labels of a curve."""
 
     axes: tuple[str, ...]
     """Names of the driven axes."""
@@ -75,17 +75,19 @@ class CurveNames:
     unit: str
     """Unit of the response."""
     system: UnitSystem = LINEAR
+    """Units of motion and force."""
 
 
 def compute_signature(
     evidence: Evidence, complete_prediction: FloatArray, placed_effect: PlacedEffect, names: CurveNames, hold: Hold
 ) -> Signature:
     """Compute the curve of one effect. evidence: of the final model with all its effects except this one.
-    complete_prediction: (n, p), prediction of the final model with all its effects."""
+    complete_prediction: (n, p), prediction of the final model with all its effects. hold: of the commands between
+    samples."""
     law_signature = compute_law_signature(evidence, placed_effect, names.axes, names.system)
     if law_signature is not None:
         return law_signature
-    action, abscissa = placed_effect.effect.action, ABSCISSA.get(placed_effect.effect.name, "frequency")
+    action, abscissa = placed_effect.effect.action, ABSCISSA_BY_EFFECT.get(placed_effect.effect.name, "frequency")
     if abscissa in ("velocity", "position", "acceleration") and not isinstance(action, (OnCommand, OnResponse)):
         return _compute_motion_signature(evidence, placed_effect, abscissa, names, hold)
     if abscissa == "command" and isinstance(action, OnCommand):
@@ -129,21 +131,21 @@ def _compute_motion_signature(
 
 
 def _compute_abscissa(position: FloatArray, velocity: FloatArray, abscissa: Abscissa, rate_hz: float) -> FloatArray:
-    """Compute (n,): position, velocity or acceleration of an axis."""
+    """Compute position, velocity or acceleration (n,) of an axis; its acceleration by differences of the velocity."""
     if abscissa == "acceleration":
         return np.asarray(np.gradient(velocity) * rate_hz)
     return velocity if abscissa == "velocity" else position
 
 
 def _compute_equivalent_force(evidence: Evidence, with_effect: SimulationResult, hold: Hold) -> FloatArray:
-    """Compute (n, m), N (N m): the force on the model without the effect that would cause the same responses, by
-    deconvolution."""
+    """Compute by deconvolution the force (n, m), in N or N m, that causes the same responses of the model without the
+    effect."""
     without_effect = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
     response_changes, noise_levels = [with_effect.response - without_effect.response], [evidence.noise]
     if evidence.position_noise is not None:
         response_changes.append(with_effect.position - without_effect.position)
         noise_levels.append(evidence.position_noise)
-    # The least rms keeps the prior of the deconvolution positive for an axis without command.
+    # 1e-12 N keeps the prior of the deconvolution positive for an axis without command.
     expected_force = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
     noise = np.concatenate(noise_levels)
     return estimate_missing_force(
@@ -171,12 +173,11 @@ def _compute_command_signature(evidence: Evidence, placed_effect: PlacedEffect, 
 def _compute_reading_signature(
     evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: CurveNames
 ) -> Signature:
-    """Compute the curve of a channel's error over the predicted reading that explains most of it. change: (n, p), by
-    the effect."""
+    """Compute the curve of a channel's error over the predicted reading of a channel, for the pair in which that
+    reading explains most of the change (n, p) of the readings by the effect."""
     is_used = evidence.used > 0
     predictions = evidence.predicted[is_used]
-    # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
-    # other.
+    # Projection of the change of one channel on the unit vector of the reading of another; 1e-300 avoids 0 / 0.
     projections = np.abs(change[is_used].T @ predictions) / np.maximum(np.sqrt(np.sum(predictions**2, axis=0)), 1e-300)
     channel, predictor = np.unravel_index(int(np.argmax(projections)), projections.shape)
     errors = (evidence.response - evidence.predicted)[:, channel]
@@ -193,21 +194,21 @@ def _compute_reading_signature(
 def _compute_time_signature(
     evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: CurveNames, abscissa: Abscissa
 ) -> Signature:
-    """Compute the curve over time of the error of the channel with the largest change; its running rms where it grows
-    with time ("growth")."""
+    """Compute the curve over time of the error of the channel with the largest change (n, p) relative to the noise; of
+    its running rms where the abscissa is "growth"."""
     is_used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
     channel = int(np.argmax(np.sqrt(np.mean(change[is_used] ** 2, axis=0)) / evidence.noise))
-    errors, seconds = (evidence.response - evidence.predicted)[:, channel], np.arange(len(change)) / rate_hz
+    errors, times_s = (evidence.response - evidence.predicted)[:, channel], np.arange(len(change)) / rate_hz
     ordinate = f"error of {names.channels[channel]} ({names.unit})"
     if abscissa == "growth":
-        bin_centres, mean, spread = compute_running_rms(seconds, errors, is_used)
+        bin_centres, mean, spread = compute_running_rms(times_s, errors, is_used)
         law_abscissa, law_values, _ = compute_running_rms(
-            seconds, np.hypot(change[:, channel], evidence.noise[channel]), is_used
+            times_s, np.hypot(change[:, channel], evidence.noise[channel]), is_used
         )
         ordinate = f"rms {ordinate}"
     else:
-        bin_centres, mean, spread = compute_bin_means(seconds, errors, is_used, rate_hz)
-        law_abscissa, law_values = compute_law_bin_means(seconds[is_used], change[is_used, channel])
+        bin_centres, mean, spread = compute_bin_means(times_s, errors, is_used, rate_hz)
+        law_abscissa, law_values = compute_law_bin_means(times_s[is_used], change[is_used, channel])
     return Signature(
         placed_effect.effect.name,
         names.channels[channel],
@@ -224,17 +225,17 @@ def _compute_time_signature(
 def _compute_frequency_signature(
     evidence: Evidence, change: FloatArray, placed_effect: PlacedEffect, names: CurveNames
 ) -> Signature:
-    """Compute the spectrum of the error of the channel with the largest change, and that of the change by the effect.
-    change: (n, p)."""
+    """Compute the spectrum of the error of the channel with the largest change relative to the noise, and that of the
+    change (n, p) of the prediction by the effect."""
     rate_hz, is_used = evidence.sample_rate_hz, evidence.used > 0
     errors = evidence.response - evidence.predicted
     channel = int(np.argmax(np.sqrt(np.mean(change[is_used] ** 2, axis=0)) / evidence.noise))
-    frequency_hz, measured, spread = _compute_spectrum(errors[is_used, channel], rate_hz)
-    _, law_values, _ = _compute_spectrum(change[is_used, channel], rate_hz)
+    frequency_hz, amplitude_density, spread = _compute_spectrum(errors[is_used, channel], rate_hz)
+    _, law_density, _ = _compute_spectrum(change[is_used, channel], rate_hz)
     return Signature(
         placed_effect.effect.name, names.channels[channel], "frequency (Hz)",
         f"error of {names.channels[channel]}, amplitude density ({names.unit}/√Hz)",
-        frequency_hz, measured, spread, frequency_hz, law_values,
+        frequency_hz, amplitude_density, spread, frequency_hz, law_density,
     )  # fmt: skip
 
 
@@ -242,17 +243,21 @@ def _compute_spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, F
     """Compute frequency (Hz), amplitude density (unit/√Hz) in twelfths of an octave, and its standard error.
     Half-overlapping Hann windows count as 1.5 independent ones per window length; the relative error of an amplitude is
     half that of its power."""
-    length = min(2 * _FREQUENCY_LINES, len(signal))
-    lines_hz, power = estimate_spectral_density(signal, rate_hz, length)
-    window_count = max(1.0, 1.5 * len(signal) / length)
+    window_samples = min(2 * _SPECTRAL_LINES, len(signal))
+    lines_hz, power = estimate_spectral_density(signal, rate_hz, window_samples)
+    window_count = max(1.0, 1.5 * len(signal) / window_samples)
     edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
-    bin_of_line = np.digitize(lines_hz[1:], edges)
-    groups = [power[1:][bin_of_line == k] for k in np.unique(bin_of_line)]
+    bin_by_line = np.digitize(lines_hz[1:], edges)
+    binned_power = [power[1:][bin_by_line == bin_index] for bin_index in np.unique(bin_by_line)]
     centres_hz = np.array(
-        [float(np.exp(np.mean(np.log(lines_hz[1:][bin_of_line == k])))) for k in np.unique(bin_of_line)]
+        [float(np.exp(np.mean(np.log(lines_hz[1:][bin_by_line == bin_index])))) for bin_index in np.unique(bin_by_line)]
     )
-    mean = np.array([float(np.sqrt(group.mean())) for group in groups])
-    return centres_hz, mean, mean / 2 / np.sqrt(window_count * np.array([len(group) for group in groups]))
+    amplitude = np.array([float(np.sqrt(power_of_bin.mean())) for power_of_bin in binned_power])
+    return (
+        centres_hz,
+        amplitude,
+        amplitude / 2 / np.sqrt(window_count * np.array([len(power_of_bin) for power_of_bin in binned_power])),
+    )
 
 
 def _find_strongest_site(sites: tuple[int, ...], force: FloatArray) -> int:

@@ -23,11 +23,11 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import QUADRATIC_DAMPING
 
 
-def _add_to_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
+def _add_to_handle(device: Device, axis: int, mass_kg: float, damping_n_s_per_m: float) -> Device:
     """Add a mass (kg) and a viscous damping (N s/m) to one axis of the handle; returns a new device."""
     mass, damping_matrix = device.bench.mass.copy(), device.bench.damping.copy()
     mass[axis, axis] += mass_kg
-    damping_matrix[axis, axis] += damping
+    damping_matrix[axis, axis] += damping_n_s_per_m
     return replace(device, bench=replace(device.bench, mass=mass, damping=damping_matrix))
 
 
@@ -122,8 +122,8 @@ def _draw_backlash(context: EffectContext) -> dict[str, float]:
 
 def _build_backlash(device: Device, axis: int, values: Values) -> Device:
     """Set the play of the device, replacing an earlier one."""
-    names = ("motor_mass", "gap", "contact_stiffness", "contact_damping")
-    return replace(device, play=np.array([axis, *(values[name] for name in names)]))
+    parameter_names = ("motor_mass", "gap", "contact_stiffness", "contact_damping")
+    return replace(device, play=np.array([axis, *(values[name] for name in parameter_names)]))
 
 
 EFFECTS = (

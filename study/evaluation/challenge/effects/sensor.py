@@ -58,9 +58,9 @@ def _build_clipping(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_misalignment(context: EffectContext) -> dict[str, float]:
     """Draw an angle of 0.1 to 15 degrees, and the rotation vector (degrees)."""
-    degrees = context.interpolate_log(0.1, 15.0)
-    rotation_deg = degrees * context.draw_direction()
-    return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, rotation_deg), strict=True))
+    angle_deg = context.interpolate_log(0.1, 15.0)
+    rotation_deg = angle_deg * context.draw_direction()
+    return {"degrees": angle_deg} | dict(zip(("about_x", "about_y", "about_z"), map(float, rotation_deg), strict=True))
 
 
 def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
@@ -130,8 +130,8 @@ def _draw_hum(context: EffectContext) -> dict[str, float]:
     """Draw the amplitude, 0.01 to 1 m/s^2; frequency, 50 or 60 Hz up to 0.05 Hz off; phase (rad); shares of the
     channels."""
     mains_hz = float(context.random.choice((50.0, 60.0))) + context.random.uniform(-0.05, 0.05)
-    phase = context.random.uniform(0.0, 2 * np.pi)
-    return {"amplitude": context.interpolate_log(0.01, 1.0), "frequency": mains_hz, "phase": phase} | _draw_shares(
+    phase_rad = context.random.uniform(0.0, 2 * np.pi)
+    return {"amplitude": context.interpolate_log(0.01, 1.0), "frequency": mains_hz, "phase": phase_rad} | _draw_shares(
         context
     )
 
@@ -171,9 +171,9 @@ def _build_lost_samples(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_cross_axis(context: EffectContext) -> dict[str, float]:
     """Draw shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
-    angle = context.random.uniform(0.0, 2 * np.pi)
+    angle_rad = context.random.uniform(0.0, 2 * np.pi)
     share = context.interpolate_log(0.003, 0.15)
-    return {"from_next": float(share * np.cos(angle)), "from_after_next": float(share * np.sin(angle))}
+    return {"from_next": float(share * np.cos(angle_rad)), "from_after_next": float(share * np.sin(angle_rad))}
 
 
 def _build_cross_axis(device: Device, axis: int, values: Values) -> Device:

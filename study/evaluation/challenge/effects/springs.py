@@ -40,10 +40,13 @@ def _build_hardening_stiffness(device: Device, axis: int, values: Values) -> Dev
 def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
     """Draw k2 such that k2 x at the end of the travel is 0.5 to 30 % of the ground's stiffness."""
     # Above 50 % the tangent stiffness would be negative there.
-    stiffness = context.bench.stiffness[context.axis, context.axis]
+    ground_stiffness_n_per_m = context.bench.stiffness[context.axis, context.axis]
     return {
         "k2": float(
-            context.draw_sign() * context.interpolate_log(0.005, 0.3) * stiffness / context.travel_m[context.axis]
+            context.draw_sign()
+            * context.interpolate_log(0.005, 0.3)
+            * ground_stiffness_n_per_m
+            / context.travel_m[context.axis]
         )
     }
 

@@ -71,7 +71,7 @@ def _compute_penetration(motion: AxisMotion, stop_position: float) -> FloatArray
     return np.asarray(np.sign(displacement) * np.maximum(np.abs(displacement) - stop_position, 0.0))
 
 
-def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_end_stops(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Draw the position of the stops, 40 to 90 % of the largest excursion, and their stiffness."""
     stop_position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
     stiffness = compute_force_level(motion, strength) / max(
@@ -89,11 +89,13 @@ def _draw_asymmetric_friction(motion: AxisMotion, strength: float, random: np.ra
 
 def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
     """Compute the command (n,) with Coulomb friction of a different level in each direction."""
-    sign = _smooth_sign(motion)
-    return motion.command + np.where(sign > 0, values["level_positive"], values["level_negative"]) * sign
+    smoothed_sign = _smooth_sign(motion)
+    return (
+        motion.command + np.where(smoothed_sign > 0, values["level_positive"], values["level_negative"]) * smoothed_sign
+    )
 
 
-def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_elastoplastic_friction(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Draw the friction level, 1.2 times `compute_force_level` (chosen), and the stiffness of the bristle, which slips
     after 1 to 15 % of the travel."""
     slip_distance = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
@@ -101,14 +103,14 @@ def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Genera
     return {"level": level, "stiffness": level / slip_distance}
 
 
-def _add_bristles(motion: AxisMotion, values: Values) -> FloatArray:
+def _add_elastoplastic_friction(motion: AxisMotion, values: Values) -> FloatArray:
     """Compute the command (n,) with elastoplastic friction: a spring whose force is limited to +-level, from 0 at the
     start."""
-    force, forces = 0.0, np.empty(len(motion.q))
+    force, friction_forces = 0.0, np.empty(len(motion.q))
     for index, travel_step in enumerate(np.diff(motion.q, prepend=motion.q[0])):
         force = min(max(force + values["stiffness"] * travel_step, -values["level"]), values["level"])
-        forces[index] = force
-    return motion.command + forces
+        friction_forces[index] = force
+    return motion.command + friction_forces
 
 
 FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
@@ -117,13 +119,13 @@ FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
     _make_scaled_injection("quadratic_damping", lambda motion: motion.v * np.abs(motion.v)),
     _make_scaled_injection("coulomb_friction", _smooth_sign),
     ForceInjection("asymmetric_friction", _draw_asymmetric_friction, _add_asymmetric_friction),
-    ForceInjection("presliding_hysteresis", _draw_bristles, _add_bristles, memory=True),
+    ForceInjection("presliding_hysteresis", _draw_elastoplastic_friction, _add_elastoplastic_friction, memory=True),
     _make_scaled_injection("added_stiffness", _centre_position),
     _make_scaled_injection("hardening_stiffness", lambda motion: _centre_position(motion) ** 3),
     ForceInjection("cogging", _draw_cogging, _add_cogging),
     ForceInjection(
         "end_stop",
-        _draw_stop,
+        _draw_end_stops,
         lambda motion, values: motion.command + values["stiffness"] * _compute_penetration(motion, values["position"]),
     ),
     *DRIVE_INJECTIONS,

@@ -1,8 +1,9 @@
-"""Faults of sensor, clock and line applied to readings of a real device.
+"""Faults of sensor, clock, mains and data link applied to readings of a real device.
 
 Every function takes the readings (n, p), the sample rate (Hz), the parameters by name and a random generator, and
-returns new readings (n, p), n >= 1. Amplitudes are in the unit of the readings. Called by `injections`, which draws the
-parameters. Arguments that a fault does not need are ignored.
+returns new readings (n, p), n >= 1. Amplitudes are in the unit of the readings. A missing reading (NaN) stays missing;
+in `apply_lag`, all later readings of its channel become NaN, too. Called by `injections`, which draws the parameters.
+Arguments that a fault does not need are ignored.
 """
 
 from collections.abc import Mapping
@@ -18,8 +19,10 @@ def apply_lag(
     readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
     """Apply a first-order low-pass with the corner frequency `bandwidth` (Hz), at rest at the first reading."""
-    smoothing = 1.0 - np.exp(-2 * np.pi * parameters["bandwidth"] / rate_hz)
-    filtered, _ = lfilter([smoothing], [1.0, smoothing - 1.0], readings, axis=0, zi=(1.0 - smoothing) * readings[:1])
+    smoothing_factor = 1.0 - np.exp(-2 * np.pi * parameters["bandwidth"] / rate_hz)
+    filtered, _ = lfilter(
+        [smoothing_factor], [1.0, smoothing_factor - 1.0], readings, axis=0, zi=(1.0 - smoothing_factor) * readings[:1]
+    )
     return np.asarray(filtered)
 
 
@@ -66,18 +69,18 @@ def lose_samples(
     lost."""
     is_lost = random.random(len(readings)) < parameters["fraction"]
     is_lost[0] = False
-    source_index = np.maximum.accumulate(np.where(is_lost, 0, np.arange(len(readings))))
-    return np.asarray(readings[source_index])
+    source_indices = np.maximum.accumulate(np.where(is_lost, 0, np.arange(len(readings))))
+    return np.asarray(readings[source_indices])
 
 
 def shift_clock(
     readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Apply a clock error: readings taken at t (1 + 1e-6 ppm), interpolated linearly; past the end, the last
-    reading."""
-    index = np.arange(len(readings), dtype=np.float64)
-    read_index = index * (1.0 + 1e-6 * parameters["ppm"])
-    return np.column_stack([np.interp(read_index, index, channel) for channel in readings.T])
+    """Apply a clock error of `ppm` (parts per million): reading k is taken at the time k (1 + 1e-6 ppm) / rate_hz, by
+    linear interpolation; before the first reading and after the last, their values are repeated."""
+    indices = np.arange(len(readings), dtype=np.float64)
+    read_indices = indices * (1.0 + 1e-6 * parameters["ppm"])
+    return np.column_stack([np.interp(read_indices, indices, channel) for channel in readings.T])
 
 
 def rotate_readings(
@@ -85,8 +88,8 @@ def rotate_readings(
 ) -> FloatArray:
     """Rotate exactly three channels, as a misaligned sensor, by `degrees` about the unit vector (about_x, about_y,
     about_z)."""
-    axis = np.array([parameters["about_x"], parameters["about_y"], parameters["about_z"]])
-    return np.asarray(Rotation.from_rotvec(np.radians(parameters["degrees"]) * axis).apply(np.array(readings)))
+    unit_vector = np.array([parameters["about_x"], parameters["about_y"], parameters["about_z"]])
+    return np.asarray(Rotation.from_rotvec(np.radians(parameters["degrees"]) * unit_vector).apply(np.array(readings)))
 
 
 def scale_readings(
@@ -100,9 +103,9 @@ def delay_readings(
     readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
     """Delay the readings by `offset` (s; negative: advance), interpolated linearly; the end values are repeated."""
-    index = np.arange(len(readings), dtype=np.float64)
+    indices = np.arange(len(readings), dtype=np.float64)
     return np.column_stack(
-        [np.interp(index - parameters["offset"] * rate_hz, index, channel) for channel in readings.T]
+        [np.interp(indices - parameters["offset"] * rate_hz, indices, channel) for channel in readings.T]
     )
 
 
@@ -130,8 +133,8 @@ def add_noise(
 def apply_play(
     readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Apply a hysteresis (play operator) with the total width `gap`, from the first reading. A missing reading (NaN)
-    stays missing."""
+    """Apply a hysteresis (play operator) with the total width `gap`: the output follows the reading at a distance of at
+    most half the gap, beginning at the first reading. A missing reading (NaN) stays missing."""
     output, previous, half_gap = np.empty_like(readings), readings[0], 0.5 * parameters["gap"]
     for index, reading in enumerate(readings):
         is_finite = np.isfinite(reading)
@@ -147,7 +150,7 @@ def apply_play(
 def mix_channels(
     readings: FloatArray, rate_hz: float, parameters: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
-    """Apply a cross-axis sensitivity: the first channel also reads the second, scaled to the standard deviation of the
+    """Apply a cross-axis sensitivity: add to the first channel the second, scaled to the standard deviation of the
     first, times `from_next`. At least two channels; the second must vary."""
     output = readings.copy()
     output[:, 0] += parameters["from_next"] * readings[:, 1] * np.nanstd(readings[:, 0]) / np.nanstd(readings[:, 1])

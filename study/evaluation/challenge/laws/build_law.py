@@ -39,16 +39,16 @@ class LawTruth:
     memory: bool
     """Whether the law depends on earlier motion or commands."""
     numbers: dict[str, float]
-    """Size k, parameters a and b, sign s."""
+    """By symbol of the formula: "k", magnitude of the size; parameters "a" and "b"; sign "s", +1 or -1."""
 
 
 def build_law(
     device: Device, kind: LawKind, baseline: tuple[Motion, FloatArray], axis_pair: tuple[int, int], strength: float,
     random: Random,
 ) -> tuple[Device, LawTruth]:  # fmt: skip
-    """Draw the parameters of a law and build it in; returns the device and its label. baseline: motion and commands
-    (samples, 3), N, without the law. axis_pair: the axis of the law, and another axis, which may be the same for a law
-    of one axis. strength: 0 to 1, between the two rms ratios above, geometrically."""
+    """Draw the parameters of a law and add it to a device; returns the device and the label. baseline: motion and
+    commands (samples, 3), N, without the law. axis_pair: the axis of the law, and another axis, which may be the same
+    for a law of one axis. strength: 0 to 1, between the two rms ratios above, geometrically."""
     baseline_motion, command = baseline
     axis, other_axis = axis_pair
     peaks = PeakValues(
@@ -61,7 +61,7 @@ def build_law(
     sign = float(random.choice((-1.0, 1.0)))
     rms_ratio = WEAKEST_RMS_RATIO * (STRONGEST_RMS_RATIO / WEAKEST_RMS_RATIO) ** strength
     if kind.change is not None:
-        device, law_size = _build_change(
+        device, law_size = _build_signal_law(
             device, kind, (baseline_motion, command), axis_pair, (parameter_a, parameter_b, sign, rms_ratio)
         )
     else:
@@ -80,7 +80,8 @@ def build_law(
 
 
 def _make_truth(kind: LawKind, axis_pair: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
-    """Make the label of a law. axis_pair: as in `build_law`; numbers: see `LawTruth.numbers`."""
+    """Make the label of a law: per axis on which it acts, the variables by their names on that axis. axis_pair: as in
+    `build_law`; numbers: see `LawTruth.numbers`."""
     axis_pairs = (axis_pair, axis_pair[::-1]) if kind.mutual else (axis_pair,)
     variables = tuple(
         tuple(_substitute_axes(variable_set, axis, other_axis) for variable_set in kind.variables)
@@ -105,18 +106,18 @@ def _substitute_axes(variable_set: str, axis: int, other_axis: int) -> str:
     return " ".join(sorted(names))
 
 
-def _build_change(
+def _build_signal_law(
     device: Device,
     kind: LawKind,
     baseline: tuple[Motion, FloatArray],
     axis_pair: tuple[int, int],
-    law_numbers: tuple[float, float, float, float],
+    law_parameters: tuple[float, float, float, float],
 ) -> tuple[Device, float]:
-    """Build in a law that changes commands or readings; returns the device and the size of the law. law_numbers:
-    parameters a and b, sign s, and rms of the change relative to the signal. A law with a > 0 has the size
-    `SATURATING_LAW_SIZE`, so that neither sign nor rms ratio is used."""
+    """Add a law that changes commands or readings to a device; returns the device and the size of the law.
+    law_parameters: parameters a and b, sign s, and rms of the change relative to the signal. A law with a > 0 has the
+    size `SATURATING_LAW_SIZE`, so that neither sign nor rms ratio is used."""
     compute_change, (axis, other_axis), (motion, command) = kind.change, axis_pair, baseline
-    parameter_a, parameter_b, sign, rms_ratio = law_numbers
+    parameter_a, parameter_b, sign, rms_ratio = law_parameters
     assert compute_change is not None
     signal = motion.acceleration if kind.acts_on == ("response",) else command
     unit_change_rms = _compute_rms(compute_change(signal[:, axis], signal[:, other_axis], parameter_a, parameter_b))

@@ -1,4 +1,4 @@
-"""Draw the cases of a bank of laws: devices with a law outside the catalogue, and controls without such a law.
+"""Draw and generate the cases of a bank of laws: devices with a law outside the catalogue, and controls without one.
 
 A turn of twenty cases has twelve with a law, four with nothing missing, three with an effect of the catalogue and one
 with an additional linear mode, in random order. All laws, and all effects, are used before any is used again. Called by
@@ -61,6 +61,7 @@ class LawDraw:
     seed: int
     """Seed of its device: seed of the bank + number."""
     kind: LawBankKind
+    """Kind of what is concealed."""
     concealed: str
     """Name of the concealed law or effect; empty for nothing."""
     strength: float
@@ -68,6 +69,7 @@ class LawDraw:
     model: ModelOrigin
     """Origin of the model, calibrated or retuned."""
     settings: CaseSettings
+    """Driven axes, recording, nuisance effects and integration steps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,19 +101,20 @@ class LawCase:
 
 
 def draw_law(seed: int, case_number: int, brief: bool = False) -> LawDraw:
-    """Draw the case of a number. The same seed and number give the same case. brief: periods of half the length."""
+    """Draw the settings of the case with this number, from 0. The same seed and number give the same case. brief:
+    periods of 1000 samples in place of 2000."""
     # 41 to 43, and 44 below: arbitrary fixed numbers that make the random sequences of a seed independent.
     turn_number, turn_index = divmod(case_number, len(TURN_KINDS))
     kind_order = np.random.default_rng([seed, 41, turn_number]).permutation(len(TURN_KINDS))
     kind = TURN_KINDS[kind_order[turn_index]]
     random = np.random.default_rng([seed, 42, case_number])
-    earlier_cases = turn_number * CASES_PER_TURN[kind] + sum(
+    earlier_case_count = turn_number * CASES_PER_TURN[kind] + sum(
         TURN_KINDS[bank_kind] == kind for bank_kind in kind_order[:turn_index]
     )
     concealed_names = tuple(law_kind.name for law_kind in LAW_KINDS) if kind == "law" else DECOY_EFFECTS
     name_index = int(
-        np.random.default_rng([seed, 43, earlier_cases // len(concealed_names)]).permutation(len(concealed_names))[
-            earlier_cases % len(concealed_names)
+        np.random.default_rng([seed, 43, earlier_case_count // len(concealed_names)]).permutation(len(concealed_names))[
+            earlier_case_count % len(concealed_names)
         ]
     )
     concealed = {
@@ -123,6 +126,7 @@ def draw_law(seed: int, case_number: int, brief: bool = False) -> LawDraw:
     has_two_axes = (kind == "law" and LAWS_BY_NAME[concealed].axes == 2) or random.random() > SINGLE_AXIS_FRACTION
     axes = tuple(sorted(int(axis) for axis in random.choice(3, 2 if has_two_axes else 1, replace=False)))
     model = cast(ModelOrigin, str(random.choice(["calibrated", "retuned"])))
+    # Three periods of each multisine, nuisance effects at factor 1.
     settings = CaseSettings(axes, 1000 if brief else 2000, 3, 1.0, STEPS_PER_SAMPLE, LOUD_N)
     return LawDraw(
         case_number, seed + case_number, kind, concealed, float(random.uniform(LOWEST_STRENGTH, 1.0)), model, settings
@@ -130,12 +134,12 @@ def draw_law(seed: int, case_number: int, brief: bool = False) -> LawDraw:
 
 
 def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
-    """Generate the drawn case. name: device name in recording and model. Raises ValueError where the motion diverges
-    or becomes too large at each strength that `_build_stable_law` tries."""
+    """Generate the drawn case. name: device name in recording and model. Raises ValueError where the motion with the
+    law diverges or is too large at each strength that `_build_stable_law` tries."""
     if law_draw.kind != "law":
         effects = (law_draw.concealed,) if law_draw.concealed else ()
-        strengths = law_draw.strength if effects else None
-        return LawCase(draw_case(law_draw.seed, effects, law_draw.model, strengths, name, law_draw.settings), None, ())
+        strength = law_draw.strength if effects else None
+        return LawCase(draw_case(law_draw.seed, effects, law_draw.model, strength, name, law_draw.settings), None, ())
     random, settings = np.random.default_rng([law_draw.seed, 44]), law_draw.settings
     bench, plan = draw_bench(random), draw_plan(random, settings)
     baseline = add_nuisance_effects(Device(bench, steps=settings.steps), settings.extras, law_draw.seed)
@@ -159,22 +163,23 @@ def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
         compute_detectability(baseline, device, (motion_pairs[0], motion_pairs[1]), settings),
     )
     return LawCase(
-        case, truth, tuple(_make_fresh_motion(device, settings, random, level) for level in (FRESH_LEVEL_N, LOUD_N))
+        case, truth, tuple(_make_fresh_motion(device, settings, random, level_n) for level_n in (FRESH_LEVEL_N, LOUD_N))
     )
 
 
 def _build_stable_law(
     law_draw: LawDraw, baseline: Device, base_motion: tuple[Motion, DrivePlan], random: np.random.Generator
 ) -> tuple[Device, Motion, LawTruth]:
-    """Build in a law at the drawn strength, or at a half or a quarter of it where the motion would diverge, or reach
-    three times the largest position without the law. Raises ValueError where it does at all three. The parameters a
-    and b are the same for each. base_motion: motion without the law, and its plan."""
+    """Add a law to the device at the drawn strength, or at a half or a quarter of it where the motion would diverge, or
+    reach three times the largest position without the law. Returns the device, its motion and the label. Raises
+    ValueError where it does at all three strengths; the parameters a and b are the same for each. base_motion: motion
+    without the law, and its plan."""
     (motion, plan), axes = base_motion, law_draw.settings.axes
-    first_index = int(random.integers(len(axes)))
-    axis_pair = (axes[first_index], axes[(first_index + 1) % len(axes)])
-    state = random.bit_generator.state
+    axis_index = int(random.integers(len(axes)))
+    axis_pair = (axes[axis_index], axes[(axis_index + 1) % len(axes)])
+    random_state = random.bit_generator.state
     for strength in (law_draw.strength, law_draw.strength / 2, law_draw.strength / 4):
-        random.bit_generator.state = state
+        random.bit_generator.state = random_state
         device, truth = build_law(
             baseline, LAWS_BY_NAME[law_draw.concealed], (motion, plan.command), axis_pair, strength, random
         )
@@ -187,7 +192,7 @@ def _build_stable_law(
     raise ValueError(f"the device runs away with the law '{law_draw.concealed}', seed {law_draw.seed}")
 
 
-def _refuse_further_recording(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+def _refuse_further_recording(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:
     """Refuse a further recording of a device with a law, as `Case.record_again`: such cases have no further
     experiments. Always raises ValueError."""
     raise ValueError("a device with a law is not recorded again")

@@ -1,7 +1,7 @@
 """The bench of the blind test as a MuJoCo model: a handle on three slides, attached oscillators, concealed effects.
 
-`mujoco_case` draws its cases: a second physics engine, so that cases do not depend on hapteq's own simulation alone.
-Dry friction is the engine's own friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
+Called by `mujoco_case`: with a second physics engine, cases do not depend on hapteq's own simulation alone.
+Dry friction is MuJoCo's friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
 dead band; backlash is a motor body behind a tendon with limits; a hand and added masses are armature, damping and
 stiffness of the slides; saturation, gain and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
 """
@@ -18,12 +18,13 @@ from study.evaluation.challenge.bench import Bench, Oscillators
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 
 STEPS_PER_SAMPLE = 10
-"""Integration steps per sample. Chosen: the integrator is of fourth order, so that fewer steps than in `device` do."""
+"""Integration steps per sample. Chosen: the integrator is of fourth order, so that fewer steps than in `device`
+suffice."""
 STEP_S = 1.0 / (RATE_HZ * STEPS_PER_SAMPLE)
 """Step of integration (s)."""
 HANDLE_MASS_RATIO = 0.4
 """Mass of the handle's body over that of the lightest axis. The rest of an axis's mass is armature, the inertia of that
-joint alone. Chosen: the armature stays positive beside a motor of up to 0.4 of the axis's mass."""
+joint alone. Chosen: with a motor of up to 0.4 of the axis's mass, the armature stays positive."""
 CONTACT_IMPEDANCE = 0.01
 """MuJoCo's constraint impedance (0 to 1) of a contact: small, so that the contact force is that of a spring and a
 damper with their nominal values. Chosen."""
@@ -49,7 +50,7 @@ class MujocoBench:
     force_n: FloatArray
     """Constant force on the handle (N)."""
     gain: FloatArray
-    """Force per command."""
+    """Force per command (N/N)."""
     limit_n: FloatArray
     """Saturation of the force (N); 0 = none."""
     lag_s: float = 0.0
@@ -84,7 +85,7 @@ def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray
     written.
 
     The delay consists of whole samples and remaining integration steps. command: (samples, 3), N. Raises ValueError
-    where the motion is not finite or reaches 1 m.
+    where the motion is not finite or reaches 1 m, the bound of a diverging motion (chosen).
     """
     model = mujoco.MjModel.from_xml_string(_format_mjcf(bench))
     data = mujoco.MjData(model)
@@ -121,6 +122,7 @@ def _format_mjcf(bench: MujocoBench) -> str:
     differ."""
     root = Xml.Element("mujoco")
     _add_element(root, "compiler", {"autolimits": "true"})
+    # Solver tolerance and iterations are chosen: the residual of friction and contacts is negligible.
     solver_options = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
     _add_element(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | solver_options)
     world = _add_element(root, "worldbody")
@@ -212,7 +214,8 @@ def _add_actuators(parent: Xml.Element, bench: MujocoBench) -> None:
 
 def _add_slide(body: Xml.Element, name: str, direction: FloatArray, attributes: Mapping[str, float]) -> None:
     """Add a sliding joint along a direction (3,); attributes (MJCF names) that are zero are left out. Dry friction is a
-    nearly rigid constraint with a time constant of two steps and a damping ratio of 1 (chosen)."""
+    nearly rigid constraint with a time constant of two steps, a damping ratio of 1 and an impedance of 0.999 to 0.9999
+    (chosen)."""
     joint = _add_element(
         body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{component:.15g}" for component in direction)}
     )

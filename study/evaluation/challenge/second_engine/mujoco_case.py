@@ -44,7 +44,8 @@ def draw_mujoco_case(
     seed: int, effects: Sequence[str], origin: ModelOrigin, strength: Sequence[float], name: str, settings: CaseSettings
 ) -> Case:
     """Draw a case as `challenge.draw_case.draw_case` does, with the motion from MuJoCo. Raises ValueError for an effect
-    that is neither in `BUILDERS` nor in `SENSOR_EFFECTS`, and where the motion diverges."""
+    that is neither in `BUILDERS` nor in `SENSOR_EFFECTS`, and where the motion diverges. The last element of the seed,
+    2, is arbitrary: it makes the random sequence independent of that of `draw_case`."""
     if unknown_effects := set(effects) - set(BUILDERS) - set(SENSOR_EFFECTS):
         raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown_effects))}")
     random = np.random.default_rng([seed, len(effects), 2])
@@ -52,7 +53,7 @@ def draw_mujoco_case(
     baseline = make_baseline_bench(drawn_bench)
     bench = linearise(baseline)
     base_motion = simulate_motion(baseline, plan.command)
-    device, measured, truth = baseline, Device(bench), []
+    true_bench, measured, truth = baseline, Device(bench), []
     peak = np.minimum(np.abs(base_motion[0]).max(axis=0), RANGE_MPS2)
     for effect, level in zip((EFFECTS[effect_name] for effect_name in effects), strength, strict=True):
         axis = settings.axes[int(random.integers(len(settings.axes)))]
@@ -61,11 +62,11 @@ def draw_mujoco_case(
         if effect.name in SENSOR_EFFECTS:
             measured = effect.build(measured, axis, values)
         else:
-            device = BUILDERS[effect.name](device, axis, values)
+            true_bench = BUILDERS[effect.name](true_bench, axis, values)
         if effect.name == "transport_delay":
-            values = {"delay": device.delay_s}
+            values = {"delay": true_bench.delay_s}
         truth.append(make_truth(effect, axis, values))
-    motion = simulate_motion(device, plan.command) if device is not baseline else base_motion
+    motion = simulate_motion(true_bench, plan.command) if true_bench is not baseline else base_motion
     response, position = read_sensor(measured.sensor, *motion, RATE_HZ, random)
     if origin == "calibrated":
         nominal, tolerance = draw_calibration(bench, random, settings.axes)
@@ -73,11 +74,11 @@ def draw_mujoco_case(
         nominal, tolerance = retune(bench, response, plan, settings.axes)
     recording = make_recording(name, plan, response, position, settings)
 
-    def record_again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+    def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:  # `RecordAgain`
         repeat_plan = make_further_plan(command, kind, settings)
-        loaded_bench = replace(device, mass_kg=device.mass_kg + added_kg)
+        loaded_bench = replace(true_bench, mass_kg=true_bench.mass_kg + added_kg)
         measured_motion = simulate_motion(loaded_bench, repeat_plan.command)
-        readings = read_sensor(measured.sensor, *measured_motion, RATE_HZ, np.random.default_rng([seed, noise]))
+        readings = read_sensor(measured.sensor, *measured_motion, RATE_HZ, np.random.default_rng([seed, noise_seed]))
         return replace(make_recording(name, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
 
     detectability = compute_detectability(Device(bench), measured, (base_motion, motion), settings) if effects else 0.0
@@ -92,7 +93,8 @@ def _add_on_axis(table: FloatArray, axis: int, value: float) -> FloatArray:
 
 
 def _build_end_stop(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
-    """Set one end stop, the other end at a distance that no motion reaches (1 m), or two at equal distances."""
+    """Set one end stop, with the other end at 1 m, which `simulate_motion` does not let a motion reach; or, where
+    `opposite` is set, two at equal distances."""
     position_m, distant_stop_m = values["position"], 1.0
     lower_m, upper_m = (-distant_stop_m, position_m) if position_m > 0.0 else (position_m, distant_stop_m)
     if values["opposite"]:
@@ -129,18 +131,26 @@ def _build_hand_impedance(bench: MujocoBench, axis: int, values: Values) -> Mujo
 
 
 BUILDERS: dict[str, BuildEffect] = {
-    "coulomb_friction": lambda b, axis, v: replace(b, friction_n=_add_on_axis(b.friction_n, axis, v["level"])),
-    "viscous_damping": lambda b, axis, v: replace(b, damping=_add_on_axis(b.damping, axis, v["damping"])),
-    "added_mass": lambda b, axis, v: replace(b, mass_kg=_add_on_axis(b.mass_kg, axis, v["mass"])),
-    "constant_force": lambda b, axis, v: replace(b, force_n=_add_on_axis(b.force_n, axis, v["force"])),
+    "coulomb_friction": lambda bench, axis, values: replace(
+        bench, friction_n=_add_on_axis(bench.friction_n, axis, values["level"])
+    ),
+    "viscous_damping": lambda bench, axis, values: replace(
+        bench, damping=_add_on_axis(bench.damping, axis, values["damping"])
+    ),
+    "added_mass": lambda bench, axis, values: replace(bench, mass_kg=_add_on_axis(bench.mass_kg, axis, values["mass"])),
+    "constant_force": lambda bench, axis, values: replace(
+        bench, force_n=_add_on_axis(bench.force_n, axis, values["force"])
+    ),
     "end_stop": _build_end_stop,
-    "backlash": lambda b, axis, v: replace(b, play=(axis, v)),
+    "backlash": lambda bench, axis, values: replace(bench, play=(axis, values)),
     "extra_mode": _build_extra_mode,
     "hand_impedance": _build_hand_impedance,
-    "force_gain": lambda b, axis, v: replace(b, gain=_add_on_axis(b.gain, axis, v["gain"] - 1.0)),
-    "force_saturation": lambda b, axis, v: replace(b, limit_n=_add_on_axis(b.limit_n, axis, v["limit"])),
-    "amplifier_lag": lambda b, axis, v: replace(b, lag_s=v["time_constant"]),
-    "transport_delay": lambda b, axis, v: with_delay(b, v["delay"]),
+    "force_gain": lambda bench, axis, values: replace(bench, gain=_add_on_axis(bench.gain, axis, values["gain"] - 1.0)),
+    "force_saturation": lambda bench, axis, values: replace(
+        bench, limit_n=_add_on_axis(bench.limit_n, axis, values["limit"])
+    ),
+    "amplifier_lag": lambda bench, axis, values: replace(bench, lag_s=values["time_constant"]),
+    "transport_delay": lambda bench, axis, values: with_delay(bench, values["delay"]),
 }
 """Effects that MuJoCo simulates, by name."""
 SENSOR_EFFECTS = ("sensor_lag", "sensor_gain")

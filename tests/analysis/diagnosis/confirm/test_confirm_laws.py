@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.laws import _make_stop_reader
+from analysis.diagnosis.balance.laws import _make_stop_converter
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (
@@ -250,7 +250,7 @@ def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     [(0.04, 1.0, 0.05), (-0.02, 1.0, 0.0), (-0.04, -1.0, -0.05), (0.02, -1.0, 0.0)],
 )
 def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, pushing_at_m):
-    values = _make_stop_reader(side)(np.array([800.0]), (position_m,), 1.0)
+    values = _make_stop_converter(side)(np.array([800.0]), (position_m,), 1.0)
     judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
     assert can_be_simulated(0, judged)
 

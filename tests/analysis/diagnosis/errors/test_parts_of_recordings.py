@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import convert_to_force_driven
 from analysis.diagnosis.data.observed_parts import name_parts, observe_parts
 from analysis.diagnosis.errors.choose_measure import make_measure
-from equalizer.signals.joining import join
+from equalizer.signals.joining import join_recordings
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, make_model
@@ -15,7 +15,7 @@ from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, make_model
 
 def test_parts_made_one_after_another_are_compared_apart(controlled_recording: Recording) -> None:
     n = len(controlled_recording)
-    both = join(
+    both = join_recordings(
         [controlled_recording, controlled_recording], {"parts": [{"start": 0, "stop": n}, {"start": n, "stop": 2 * n}]}
     )
     one, two = make_measure([both], make_model()).measure, make_measure([controlled_recording], make_model()).measure

@@ -12,7 +12,7 @@ from analysis.diagnosis.result.candidate_wording import (
     describe_class,
     format_candidate,
 )
-from analysis.diagnosis.result.ceiling_wording import describe_ceiling
+from analysis.diagnosis.result.error_wording import describe_ceiling
 from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.diagnosis.result.wording import describe_equivalents, describe_verdict, format_effect_title
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL

@@ -5,7 +5,7 @@ import pytest
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
 from analysis.diagnosis.effect_words import EFFECT_WORDS, format_parameters, format_place, get_noun
 from analysis.diagnosis.result.candidate_wording import DeviceWording
-from analysis.diagnosis.result.ceiling_wording import describe_black_box
+from analysis.diagnosis.result.error_wording import describe_black_box
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.retuned_parameters import MovedParameter, describe_raised_error
 from analysis.diagnosis.result.wording import (

@@ -6,7 +6,7 @@ import pytest
 from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.search.no_prediction import has_no_predictive_power, leaves_no_predictive_power
+from analysis.diagnosis.search.no_prediction import has_no_predictive_power, has_unpredicted_channel
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -61,7 +61,7 @@ def test_a_claim_that_silences_a_channel_predicts_nothing_even_if_another_channe
         make_claim_hypothesis(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}]),
     )
     wrenched = replace(lag, residuals=tuple(residual * [1.1, 1e6] for residual in lag.residuals))
-    assert leaves_no_predictive_power(context.full_measure, wrenched, lag)
+    assert has_unpredicted_channel(context.full_measure, wrenched, lag)
 
 
 def test_a_low_pass_of_the_device_itself_silences_no_channel(make_context):
@@ -71,6 +71,6 @@ def test_a_low_pass_of_the_device_itself_silences_no_channel(make_context):
 
 def _predicts_nothing(measure, tuning, bandwidth):
     lag = make_claim_hypothesis(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
-    return leaves_no_predictive_power(
+    return has_unpredicted_channel(
         measure, *(evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), each) for each in (NO_EFFECTS, lag))
     )

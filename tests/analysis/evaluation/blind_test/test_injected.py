@@ -2,7 +2,12 @@
 
 import pytest
 
-from analysis.evaluation.blind_test.injected_faults import DETECTABLE, make_tallies, read_outcome, score_injections
+from analysis.evaluation.blind_test.injected_faults import (
+    LEAST_DETECTABLE_CHANGE,
+    make_tallies,
+    read_outcome,
+    score_injections,
+)
 from analysis.reports.injected_section import classify_injection, format_rate, make_injected_section
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
@@ -66,8 +71,8 @@ def test_only_detectable_faults_are_asked_for():
     outcomes = [
         make_outcome(),
         make_outcome(named=()),
-        make_outcome(change=0.5 / DETECTABLE),
-        make_outcome(named=(), change=0.99 * DETECTABLE),
+        make_outcome(change=0.5 / LEAST_DETECTABLE_CHANGE),
+        make_outcome(named=(), change=0.99 * LEAST_DETECTABLE_CHANGE),
         make_outcome(change=None),
         make_outcome((), ()),
     ]

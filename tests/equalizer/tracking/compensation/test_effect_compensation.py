@@ -14,8 +14,9 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Mo
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.effect_roles import IN_MODEL_REASON, SENSOR_REASON
+from equalizer.tracking.compensation.effect_roles import IN_MODEL_REASON
 from equalizer.tracking.compensation.known_forces import LAWS, compute_deadband_share, compute_equivalent_impedance
+from equalizer.tracking.compensation.law_compensation import SENSOR_ERROR
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
@@ -148,7 +149,7 @@ def test_what_is_linear_is_in_the_model_and_what_is_the_sensors_is_let_be(fricti
     known = physics(effect("viscous_damping", damping=5.0), effect("sensor_gain", gain=1.2))
     done = compensate(forces, wanted, frictionless, known, None)
     np.testing.assert_array_equal(done.forces, forces)
-    assert [reason for _, reason in done.not_used] == [IN_MODEL_REASON, SENSOR_REASON]
+    assert [reason for _, reason in done.not_used] == [IN_MODEL_REASON, SENSOR_ERROR]
 
 
 def test_an_effect_on_one_axis_changes_that_force_alone(frictionless, wanted):

@@ -91,7 +91,7 @@ def test_what_has_no_answer_under_the_cap_is_refused(problem_of):
     others[7] = 2 * cap_n
     with pytest.raises(TrackingError, match="the other forces alone reach .* N at row 7, above the cap of"):
         track_under_cap(problem, wanted, cap_n, others)
-    with pytest.raises(TrackingError, match=r"already has shape \(29, 3\); these forces have \(30, 3\)"):
+    with pytest.raises(TrackingError, match=r"the other forces have shape \(29, 3\); it must be \(30, 3\)"):
         track_under_cap(problem, wanted, cap_n, others[1:])
     with pytest.raises(TrackingError, match="after 3 rounds the forces under the cap .* are only known to be within"):
         track_under_cap(problem, wanted, cap_n, settings=CapSettings(gap=1e-9, rounds=3))

@@ -11,7 +11,7 @@ SEEDS = range(1, 6)
 
 
 def test_between_three_models_the_worst_place_is_flat_and_uncoupled(workspaces, three):
-    worst = workspaces.worst(build_modal_interpolation(three).at)
+    worst = workspaces.worst(build_modal_interpolation(three).interpolate_at)
     assert worst.flatness_db <= 0.2
     assert worst.coupling_db <= -36
 
@@ -44,7 +44,7 @@ def test_figures_of_the_workspace_over_five_seeds(workspaces, order):
         three = type(five)(five.models[::2])
         middle = workspaces.models((0.5,), seed, bend=1.0, order=order).models
         bent = type(five)((five.models[0], *middle, five.models[4]))
-        found["three"].append(workspaces.worst(build_modal_interpolation(three).at))
+        found["three"].append(workspaces.worst(build_modal_interpolation(three).interpolate_at))
         found["three, bent"].append(workspaces.worst(build_modal_interpolation(bent).at, bend=1.0))
         found["five"].append(workspaces.worst(build_modal_interpolation(five).at))
     for name, rows in found.items():

@@ -14,7 +14,7 @@ from study.devices.accelerometer.newest_sample import MAX_AGE_S
 from study.devices.accelerometer.parser import PACKET_SIZE
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
-from study.devices.accelerometer.six_positions import calibrate_on_table
+from study.devices.accelerometer.six_positions import calibrate_in_six_positions
 from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError
 from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, SCALE, Board, table_of, within
@@ -115,7 +115,7 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
         board.acceleration = GRAVITY_MPS2 * UP_DIRECTIONS[len(laid)]
         laid.append(position)
 
-    table = tomllib.loads(calibrate_on_table(board.path, 115_200, lay_down, rest_s=0.3))["accelerometer"]
+    table = tomllib.loads(calibrate_in_six_positions(board.path, 115_200, lay_down, rest_s=0.3))["accelerometer"]
     assert laid == list(POSITIONS)
     assert table["port"] == board.path
     np.testing.assert_allclose(table["bias"], 32_768, atol=2)
@@ -126,4 +126,4 @@ def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
 
 def test_a_sensor_that_was_never_turned_is_not_calibrated(board):
     with pytest.raises(DeviceError, match="was not calibrated"):
-        calibrate_on_table(board.path, 115_200, lambda position, heard: None, rest_s=0.1)
+        calibrate_in_six_positions(board.path, 115_200, lambda position, heard: None, rest_s=0.1)

@@ -12,7 +12,7 @@ import pytest
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP_DIRECTIONS, Calibration
 from study.devices.accelerometer.sensor import Accelerometer
-from study.devices.accelerometer.six_positions import calibrate_on_table
+from study.devices.accelerometer.six_positions import calibrate_in_six_positions
 from study.devices.accelerometer.sources import LOST_SCAN_V, open_source
 from study.errors import DeviceError
 
@@ -123,7 +123,7 @@ def test_six_positions_in_volts(ni):
     def lay_down(position, heard):
         ni.acceleration = GRAVITY_MPS2 * next(turns)
 
-    table = tomllib.loads(calibrate_on_table("ni:Dev1", 1, lay_down, rest_s=0.2))["accelerometer"]
+    table = tomllib.loads(calibrate_in_six_positions("ni:Dev1", 1, lay_down, rest_s=0.2))["accelerometer"]
     np.testing.assert_allclose(table["sensitivity"], VOLTS.sensitivity, atol=1e-6)
     np.testing.assert_allclose(table["bias"], VOLTS.bias, atol=1e-6)
     assert table["raw_range"] == pytest.approx([1.6 - 3 * 9.80665 * 0.0306, 1.7 + 3 * 9.80665 * 0.0306], abs=1e-6)

@@ -12,7 +12,7 @@ from study.devices.device import Fault
 from study.devices.force_dimension.tick_io import repeat_zero_once
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
-from study.session.stimulus.timing_verdict import MAX_LATE_SHARE
+from study.session.stimulus.timing_verdict import MAX_LATE_FRACTION
 
 
 def held_under(stepped_stub, rigs, stimulus, switches: dict[str, float], seconds: float = 2.0) -> Fault:
@@ -119,7 +119,7 @@ def test_calls_that_take_too_long_are_missed_ticks_and_never_a_stretched_force(s
         health = device.release().health
         for name in switches:
             stub.set(name, 0)
-    assert health.fault is not Fault.NONE or health.missed_ticks > 5 * MAX_LATE_SHARE * health.ticks
+    assert health.fault is not Fault.NONE or health.missed_ticks > 5 * MAX_LATE_FRACTION * health.ticks
     assert stub.safe
     assert stub.get("peak_n") <= rigs.LIMITS.total_cap_n
 

@@ -4,7 +4,7 @@ import pytest
 
 from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.six_positions import format_calibration_toml
-from study.devices.force_dimension.lab import read_lab, write_sensor_table
+from study.devices.force_dimension.lab import read_lab_settings, write_sensor_table
 from study.errors import DeviceError
 from tests.study.devices.accelerometer.pty_board import IDEAL
 
@@ -38,7 +38,7 @@ def file(tmp_path, monkeypatch):
 
 def test_a_first_calibration_makes_the_file(file):
     assert write_sensor_table(TABLE) == file
-    lab = read_lab()
+    lab = read_lab_settings()
     assert lab.accelerometer is not None and lab.accelerometer.port == "/dev/ttyACM3"
     assert [path.name for path in file.parent.iterdir()] == ["device.toml"]
 
@@ -47,7 +47,7 @@ def test_a_new_calibration_takes_the_place_of_the_old_one_alone(file):
     file.parent.mkdir()
     file.write_text(OLD)
     write_sensor_table(TABLE)
-    text, lab = file.read_text(), read_lab()
+    text, lab = file.read_text(), read_lab_settings()
     assert text.startswith("# the lab's own words\neffector_mass_kg = 0.153     # with the sensor\n")
     assert "of last year" not in text and text.count("[accelerometer]") == 1
     assert lab.effector_mass_kg == 0.153 and lab.pulse is not None and lab.pulse.port == "/dev/ttyUSB0"

@@ -94,14 +94,15 @@ MUTATIONS = {
         feedback, "stiffness * (reading[0]", "2.0 * stiffness * (reading[0]", "",
     ),
     "the spring pushes": (
-        feedback, "force[0] -= share * (total_factor * x)", "force[0] += share * (total_factor * x)", "spring: pushes",
+        feedback, "force[0] -= reduced_gain * (total_factor * x)", "force[0] += reduced_gain * (total_factor * x)",
+        "spring: pushes",
     ),
     "three times the feedback's cap": (
         feedback, "cap, stiffness, damping = settings[FEEDBACK_CAP]",
         "cap, stiffness, damping = 3.0 * settings[FEEDBACK_CAP]", "",
     ),
     "speed by one tick instead of those that went by": (
-        feedback, "(elapsed * settings[TICK_S])", "settings[TICK_S]", "",
+        feedback, "(elapsed_ticks * settings[TICK_S])", "settings[TICK_S]", "",
     ),
     "no check of stale readings": (
         plausibility, "return STALE if _is_stale(state, settings, reading) or axis_stale else NO_FAULT",

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from equalizer.signals.joining import join
+from equalizer.signals.joining import join_recordings
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.cli.main import main
@@ -38,7 +38,7 @@ def originals(rigs, commands):
 @pytest.fixture(scope="module")
 def file(originals, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "lab.h5"
-    write_recording(path, join(originals, {}))
+    write_recording(path, join_recordings(originals, {}))
     return path
 
 
@@ -56,7 +56,7 @@ def test_a_part_of_what_was_recorded_is_found_in_its_middle(rigs, commands, orig
     # 25 Hz: nothing else is near.
     heard = np.abs(np.fft.rfft(found.response.samples[:, 2] * np.hanning(1000)))
     assert np.argmax(heard) == 25
-    first = (found.response.samples[0] == join(originals, {}).response.samples).all(axis=1)
+    first = (found.response.samples[0] == join_recordings(originals, {}).response.samples).all(axis=1)
     assert 999 <= np.flatnonzero(first)[0] < 2000
 
 

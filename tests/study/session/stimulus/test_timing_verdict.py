@@ -10,21 +10,21 @@ from study.session.stimulus.timing_verdict import (
     judge_lateness,
     judge_load,
     judge_missed_ticks,
-    measure_lateness,
+    summarize_lateness,
 )
 
 
 def finding(late_ms, simulated: bool, rate_hz: float = 1000.0):
-    return judge_lateness(measure_lateness(np.asarray(late_ms) / 1000.0, rate_hz), simulated)
+    return judge_lateness(summarize_lateness(np.asarray(late_ms) / 1000.0, rate_hz), simulated)
 
 
 def test_the_figures_are_those_of_the_measurement():
-    lateness = measure_lateness(np.arange(101) / 1000.0 / 100.0, 1000.0)
+    lateness = summarize_lateness(np.arange(101) / 1000.0 / 100.0, 1000.0)
     assert (lateness.median_ms, lateness.p99_ms, lateness.longest_ms) == pytest.approx((0.5, 0.99, 1.0))
     assert lateness.missed_fraction == 0.0
     assert not lateness.too_late
     with pytest.raises(ValueError, match="no wake-up"):
-        measure_lateness(np.array([]), 1000.0)
+        summarize_lateness(np.array([]), 1000.0)
 
 
 def test_99_of_100_wake_ups_must_come_within_a_tick():

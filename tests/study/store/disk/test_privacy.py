@@ -12,7 +12,7 @@ from study.cli.main import app
 from study.session.watching.live_state import LiveState
 from study.session.watching.requests import NoteAsked
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.privacy import close_to_others, format_data_folder_warning, is_open_to_others, make_folder
+from study.store.disk.privacy import format_data_folder_warning, is_open_to_others, make_folder, restrict_to_owner
 from study.store.sessions.archive import create_session_folder
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
@@ -144,8 +144,8 @@ def test_closing_follows_no_link(opened, tmp_path):
     other = Path(shutil.copytree(opened, tmp_path / "other"))
     shutil.rmtree(opened / "P01_001")
     (opened / "P01_001").symlink_to(other)
-    close_to_others(opened / "P01_001", recursive=True)
-    close_to_others(opened, recursive=True)
+    restrict_to_owner(opened / "P01_001", recursive=True)
+    restrict_to_owner(opened, recursive=True)
     assert stat.S_IMODE(other.stat().st_mode) == 0o755
     assert exposed(opened) == ["data/P01_001"]
 

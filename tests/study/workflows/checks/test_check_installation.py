@@ -52,7 +52,7 @@ def test_a_python_that_is_too_old_is_found(distribution):
 
 
 def test_a_checkout_without_installation_says_what_to_do(monkeypatch):
-    monkeypatch.setattr(module, "HAPTEQ", "hapteq-of-no-author")
+    monkeypatch.setattr(module, "DISTRIBUTION_NAME", "hapteq-of-no-author")
     (finding,) = check_packages()
     assert finding.value == "not installed, so what it needs is not known"
     assert finding.advice == "Run `make study` in its folder once: that installs hapteq and what it needs."

@@ -22,7 +22,7 @@ from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
 from study.workflows.checks.device_changes import make_change_findings
-from study.workflows.checks.examine_setup import Examination, accept
+from study.workflows.checks.examine_setup import Examination, accept_examined_device
 from tests.study.workflows.checks.conftest import INFO, QUIET
 
 
@@ -40,7 +40,7 @@ def test_the_proof_of_the_acceptance_is_announced_and_a_no_keeps_the_device_stil
     monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: ("baselines/a.h5", "0"))
     monkeypatch.setattr(examine_setup, "accept_device", lambda *_: called.append("moved"))
     with pytest.raises(KeyboardInterrupt):
-        accept("omega3", looked, "Ada", MotionCallbacks(no, lambda done: None))
+        accept_examined_device("omega3", looked, "Ada", MotionCallbacks(no, lambda done: None))
     assert not called
     assert "No person may hold the handle" in notices[0] and "0.5 N" in notices[0]
 
@@ -52,7 +52,7 @@ def test_a_sensor_that_is_not_fine_does_not_hinder_the_acceptance(monkeypatch, s
     looked = Examination((), DeviceReport("omega3", simulated=False, findings=found), SimpleNamespace(findings=()))
     monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: ("baselines/a.h5", "0"))
     monkeypatch.setattr(examine_setup, "accept_device", lambda _, settings, *rest: asked.append(settings) or "signed")
-    said = accept("omega3", looked, "Ada", QUIET)
+    said = accept_examined_device("omega3", looked, "Ada", QUIET)
     assert [settings.with_sensor for settings in asked] == [sensor]
     assert ("no daily check" in said) is not sensor
 

@@ -18,7 +18,7 @@ from study.errors import StudyError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnosis_input import read_given_model, read_input
-from study.workflows.diagnosis.fit_first_model import FirstModelPlan, FittedFirstModel, fit_first_model
+from study.workflows.diagnosis.fit_first_model import FirstModelPlan, FittedFirstModel, fit_and_write_first_model
 
 RATE_HZ, SECONDS = 1000.0, 30.0
 
@@ -68,7 +68,9 @@ def untimed(recording: Recording) -> Recording:
 
 def fitted(folder: Path, recording: Recording, structure: str = "auto") -> FittedFirstModel:
     write_recording(folder / "rec.h5", recording, precision="float64")
-    return fit_first_model(FirstModelPlan((folder / "rec.h5",), folder / "model.toml", structure), lambda share: None)
+    return fit_and_write_first_model(
+        FirstModelPlan((folder / "rec.h5",), folder / "model.toml", structure), lambda share: None
+    )
 
 
 def inside(done: FittedFirstModel, name: str, truth: float) -> bool:
@@ -227,7 +229,7 @@ def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_
         recording, command=replace(recording.command, **plain), response=replace(recording.response, **plain)
     )
     write_recording(tmp_path / "bare.h5", bare)
-    done = fit_first_model(FirstModelPlan((tmp_path / "bare.h5",), tmp_path / "m.toml"), lambda share: None)
+    done = fit_and_write_first_model(FirstModelPlan((tmp_path / "bare.h5",), tmp_path / "m.toml"), lambda share: None)
     assert done.choice.fit.kind == "mass-spring"
     assert done.choice.fit.parameters[0].value == pytest.approx(0.4, rel=0.02)
     assert any(

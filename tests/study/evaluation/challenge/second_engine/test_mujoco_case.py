@@ -86,4 +86,4 @@ def test_what_the_engine_cannot_express_is_refused():
 def test_every_effect_of_its_list_can_be_built():
     from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS, SENSOR_EFFECTS
 
-    assert set(mujoco_access.EFFECTS) == {*BUILDERS, *SENSOR_EFFECTS}
+    assert set(mujoco_access.MUJOCO_EFFECTS) == {*BUILDERS, *SENSOR_EFFECTS}

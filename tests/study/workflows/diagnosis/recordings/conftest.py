@@ -6,7 +6,7 @@ import pytest
 
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
-from study.workflows.diagnosis.diagnose_recordings import find_answer, write_answer
+from study.workflows.diagnosis.diagnose_recordings import run_diagnosis, write_result_folder
 from tests.study.workflows.diagnosis.recordings.scripted import Scripted, plan, quiet
 
 
@@ -37,9 +37,9 @@ def findings(made, recording):
 def in_two_steps(files, findings, tmp_path_factory):
     """The answer, what lay in its folder then, and what was written after it."""
     folder = tmp_path_factory.mktemp("done")
-    answer = find_answer(plan(files, folder / "out"), quiet, Scripted(findings))
+    answer = run_diagnosis(plan(files, folder / "out"), quiet, Scripted(findings))
     there = list(folder.iterdir())
-    return answer, there, write_answer(answer, quiet)
+    return answer, there, write_result_folder(answer, quiet)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from analysis.diagnosis.localisation.model_error_floor import IncomparableRecord
 from study.errors import StudyError
 from study.store.disk.json_document import read_json
 from study.store.formats.recording_file import write_recording
-from study.workflows.diagnosis.diagnose_recordings import diagnose_recordings, find_answer
+from study.workflows.diagnosis.diagnose_recordings import diagnose_recordings, run_diagnosis
 from tests.study.workflows.diagnosis.recordings.scripted import Scripted, asked_of_engine, plan, quiet, refused_with
 
 pytestmark = pytest.mark.usefixtures("sketched")
@@ -29,7 +29,7 @@ def test_without_a_model_the_clean_recordings_are_what_one_is_fitted_to(files, f
     write_recording(tmp_path / "clean.h5", made.recorded(1, (), seed=9))
     engine = Scripted(findings)
     wanted = plan(files, tmp_path / "out", model=None, clean=(tmp_path / "clean.h5",))
-    found = find_answer(wanted, quiet, engine)
+    found = run_diagnosis(wanted, quiet, engine)
     assert engine.model.name == "fitted to the clean recordings"
     assert found.findings.remarks[0].startswith("No model was given. A linear model was fitted to the clean recordings")
 

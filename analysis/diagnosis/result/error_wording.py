@@ -1,8 +1,8 @@
 """Sentences for the user about held-out errors: compared with the noise, with all laws together, and with a black box.
 
-The ceiling is the fit of all laws together in a force balance (`BalanceErrors.ceiling`): the error that no sum of a few
-laws should be expected to beat. Errors are rms errors over the rms of the signal, unless a text says otherwise. Called
-by `wording` and `diagnosis_report`.
+The ceiling is the fit of all laws together in a force balance: a sum of a few laws can hardly have a smaller error
+(`BalanceErrors.ceiling`). Errors are rms errors over the rms of the signal, in a force balance over the rms of the
+force. Called by `wording` and `diagnosis_report`.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,13 @@ from analysis.diagnosis.unit_wording import format_error, format_error_of_signal
 from analysis.wording import capitalise
 
 ROUNDING_TOLERANCE = 1e-9
-"""Relative difference of two errors of the same data that is due to rounding."""
+"""Relative difference up to which two errors of the same data count as equal: above the rounding of 64-bit floats.
+Chosen."""
 
 
 def describe_black_box(black_box: BlackBox | None, is_effect_named: bool) -> str:
-    """Compare the held-out errors of a black box and of the physics in a sentence; empty without a black box.
-    is_effect_named: whether effects were named; else the physics is the re-tuned model."""
+    """Compare the held-out errors of a black box and of the physical model in words; empty without a black box.
+    is_effect_named: whether effects were named; without any, the physical model is the re-tuned one."""
     if black_box is None:
         return ""
     physics_name = "the physics" if is_effect_named else "the re-tuned model"
@@ -47,13 +48,13 @@ def is_black_box_better(black_box: BlackBox) -> bool:
 
 
 def describe_ceiling(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
-    """Describe the held-out errors of each axis's force balance in a sentence, also where no law could be tested."""
+    """Describe the held-out errors of each axis's force balance, a text per axis, also where no law could be tested."""
     return tuple(_describe_ceiling_of_axis(errors, len(axis_errors) == 1) for errors in axis_errors)
 
 
 def _describe_ceiling_of_axis(errors: BalanceErrors, is_single_axis: bool) -> str:
-    """Describe the held-out errors of one axis. is_single_axis: whether the device has no other, so that it needs no
-    name."""
+    """Describe the held-out errors of one axis. is_single_axis: whether the device has one axis, which is then not
+    named."""
     axis_text = "" if is_single_axis else f" along {errors.axis}"
     if not errors.tested:
         return (
@@ -90,28 +91,29 @@ unknown, so that errors are not stated in units of it."""
 
 
 def format_ratio(ratio: float) -> str:
-    """Format a ratio in words: "1.04 times", from 10 on with three significant digits."""
+    """Format a ratio with two decimals, such as "1.04 times"; from 10 on with three significant digits."""
     return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
 
 
 def describe_error_change(
     errors: Errors, first_stage: tuple[str, str], last_stage: tuple[str, str], noise_method: str = ""
 ) -> str:
-    """Describe, in a clause, the change of the held-out error between two stages. first_stage, last_stage: a field of
-    `Errors`, and its name in words. noise_method: `NoiseFloor.method`; empty where it is not known."""
+    """Describe in a clause the change of the held-out error between two stages, and the noise; a statement that it is
+    not known where an error is None. first_stage, last_stage: a field of `Errors`, and its name in words. noise_method:
+    `NoiseFloor.method`; empty where it is not known."""
     first_error, last_error = getattr(errors, first_stage[0]), getattr(errors, last_stage[0])
     if first_error is None or last_error is None:
         return "how much better it predicts held-out data is not known"
-    verb = "falls" if last_error * EQUAL_ERROR_RATIO < first_error else "goes"
+    change_verb = "falls" if last_error * EQUAL_ERROR_RATIO < first_error else "goes"
     return (
-        f"the error on held-out data {verb} from {format_error_of_signal(first_error)} ({first_stage[1]}) to "
+        f"the error on held-out data {change_verb} from {format_error_of_signal(first_error)} ({first_stage[1]}) to "
         f"{format_error(last_error)} ({last_stage[1]}){_describe_noise(errors, last_error, noise_method)}"
     )
 
 
 def describe_error(beginning: str, error: float | None, errors: Errors, noise_method: str = "") -> str:
-    """Describe, in a clause, one held-out error and the noise, or state that the error is not known. beginning: of the
-    clause."""
+    """Describe in a clause a held-out error and the noise; a statement that it is not known where the error is None.
+    beginning: first words of the clause."""
     if error is None:
         return "its error on held-out data is not known"
     return (
@@ -121,7 +123,8 @@ def describe_error(beginning: str, error: float | None, errors: Errors, noise_me
 
 
 def _describe_noise(errors: Errors, error: float, noise_method: str) -> str:
-    """Compare an error with that of noise alone, as the end of a clause."""
+    """Compare an error with that of noise alone, as the end of a clause: by their ratio, or, for noise of
+    `_NOISE_SOURCES`, by naming the noise; a statement that the noise is not known where it is None or 0."""
     if not errors.noise or noise_method == "unknown":
         return "; what noise alone would leave is not known"
     if noise_method in _NOISE_SOURCES:
@@ -129,18 +132,25 @@ def _describe_noise(errors: Errors, error: float, noise_method: str) -> str:
     return f", {format_ratio(error / errors.noise)} what noise alone would leave ({format_error(errors.noise)})"
 
 
-def describe_confirmation(fit: Errors, test: Errors) -> str:
-    """State that held-out data do not, or only in part, confirm the fit; else empty, as where an error is not known.
-    The errors of both sets are compared in units of their noise, so that different signals do not matter."""
-    if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
+def describe_confirmation(fit_errors: Errors, test_errors: Errors) -> str:
+    """State that held-out data do not confirm the fit, or only in part (`CONFIRMED_FIT_RATIO`); empty where they
+    confirm it or an error is None. Errors of both sets are compared in units of their noise, which must not be 0,
+    because their signals may differ."""
+    if None in (test_errors.after, test_errors.retuned, test_errors.noise, fit_errors.after, fit_errors.noise):
         return ""
-    assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise
-    if test.after > test.retuned:
+    assert (
+        test_errors.after is not None
+        and test_errors.retuned is not None
+        and test_errors.noise
+        and fit_errors.after is not None
+        and fit_errors.noise
+    )
+    if test_errors.after > test_errors.retuned:
         return (
             "The held-out data do not confirm this: there the re-tuned model alone has a smaller error "
-            f"({format_error_of_signal(test.retuned)} compared with {format_error(test.after)})."
+            f"({format_error_of_signal(test_errors.retuned)} compared with {format_error(test_errors.after)})."
         )
-    test_ratio, fit_ratio = test.after / test.noise, fit.after / fit.noise
+    test_ratio, fit_ratio = test_errors.after / test_errors.noise, fit_errors.after / fit_errors.noise
     if test_ratio > CONFIRMED_FIT_RATIO * max(fit_ratio, 1.0):
         return (
             f"The held-out data confirm this only in part: the error is {format_ratio(test_ratio)} the noise there and "
