@@ -3,7 +3,7 @@ noise at rest.
 
 The mean friction force (N) is the work dissipated in a closed stroke, the integral of F dx along its path, divided by
 the length of the path. Springs, weights and inertia do no net work over a closed path, so that no model is needed.
-Called by `compare_devices` for the daily check of a device.
+Called by `compare_measurements` for the daily check of a device.
 """
 
 from dataclasses import dataclass, replace
@@ -50,7 +50,8 @@ class DeviceMeasures:
 
 def measure_device(recording: Recording) -> DeviceMeasures:
     """Measure friction, frequency response and noise of a free device. recording: strokes and a broadband excitation
-    along every axis, with rests. Raises NotMeasurableError where any of the three cannot be computed."""
+    along every axis, with rests. Raises NotMeasurableError without a position or a rest, for too many missing samples,
+    with fewer than two strokes along an axis, and where no frequency response is reliable."""
     recording = _interpolate_gaps(recording)
     response = _estimate_response(recording)
     friction_and_error_n = np.array(

@@ -103,13 +103,13 @@ def find_drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str]
         comparison = _compare_probes(compared_probes, shapes, probe_levels_n, delay_s)
         drifts = tuple(_select_causes(comparison, newest_s, tuple(causes)))
         delay_s += sum(drift.change for drift in drifts if drift.parameter == "delay")
-    delay = replace(_estimate_delay(comparison, newest_s), change=delay_s)
+    delay = replace(_make_delay_drift(comparison, newest_s), change=delay_s)
     other_drifts = tuple(drift for drift in drifts if drift.parameter != "delay")
     return (*other_drifts, delay) if abs(delay_s) > max(LEAST_CHANGE["delay"], Z_LIMIT * delay.error) else other_drifts
 
 
-def _estimate_delay(comparison: _Comparison, time_s: float) -> Drift:
-    """Estimate the standard error of a delay that is the only cause; the `change` of the result is 0."""
+def _make_delay_drift(comparison: _Comparison, time_s: float) -> Drift:
+    """Make the drift of a delay, with the standard error that the delay has as the only cause; its `change` is 0."""
     standard_error_s = float(_fit_causes(comparison, ("delay",))[2][0])
     return Drift("delay", "delay", "", time_s, 0.0, standard_error_s, None)
 

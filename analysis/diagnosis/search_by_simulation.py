@@ -109,7 +109,7 @@ def search_by_simulation(
 
 class _ImpactSearch:
     """Search for rattling play, compared by band power. It runs once, before a third effect or at the end, and again
-    only where the result has gained effects, which are then rivals of play."""
+    only where it did not reject play and the result has gained effects since, which are then rivals of play."""
 
     def __init__(
         self, fitting: FittingMeasure, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
@@ -145,8 +145,8 @@ class _ImpactSearch:
 
     def _search_for_play(self, result: SearchResult) -> SearchResult | None:
         """Return the result with play, or None where play does not explain the recordings; the result with the remark
-        `OUT_OF_TIME` where the time ended before this was known. The return value is cached until `result` has more
-        effects."""
+        `OUT_OF_TIME` where the time ended before this was known. The return value is cached: None for good, a result
+        until `result` has more effects."""
         if self._searched_step_count < 0 or (
             self._play_result is not None and len(result.found.steps) > self._searched_step_count
         ):
@@ -234,8 +234,9 @@ def _skip_law_search_with_hum(
 
 
 def _select_catalogue(settings: DiagnosisSettings, recording: Recording, excluded: frozenset[str]) -> list[Effect]:
-    """Select the effects to try: the catalogue and the kept laws without the excluded effects; excluded effects that
-    others refine are included as rivals that cannot be named."""
+    """Select the effects to try: the catalogue and the kept laws without the excluded effects, and without
+    `GAIN_EFFECTS` for a fitted model; excluded effects that others refine are included as rivals that cannot be
+    named."""
     omitted = {*settings.without, *(GAIN_EFFECTS if settings.fitted and not settings.clean else ())}
     all_effects = (*CATALOGUE, *make_library_effects(settings.kept, recording))
     catalogue = [effect for effect in all_effects if effect.name not in omitted]

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 Mask = npt.NDArray[np.bool_]
-"""(n,): True at the samples, or at the lines of a spectrum, that are used."""
+"""Boolean array, usually (n,): True at the samples, or at the lines of a spectrum, that are used."""
 
 Mapper = Callable[..., Iterable[object]]
 """The built-in `map`, or a parallel map with the same arguments; results are in the order of the items."""

@@ -79,8 +79,8 @@ def typeset_unit(unit: str) -> str:
 
 
 def format_value(value: float, unit: str, ci95: tuple[float, float] | None = None) -> str:
-    """Format a value with its 95 % interval, such as "54 µm [49, 60]"; three significant digits without an interval.
-    value, ci95: in `unit`, SI."""
+    """Format a value with its 95 % interval, such as "54 µm [49, 60]"; at least three significant digits without an
+    interval. value, ci95: in `unit`, SI."""
     scale = choose_scale(unit, value)
     scaled_value = value * scale.factor
     interval = None if ci95 is None else (ci95[0] * scale.factor, ci95[1] * scale.factor)

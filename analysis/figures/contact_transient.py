@@ -25,8 +25,8 @@ def make_contact_picture(
     return Picture(
         name="contact",
         title=f"A transient along the normal ({normal_text})",
-        caption="Columns: ways to play it. Above: acceleration along the normal, wanted (grey) and measured. Middle: "
-        "length of what was measured across the normal, which nothing wants. Below: the forces.",
+        caption="Columns: ways to play it. Above: acceleration along the normal, target (grey) and measured. Middle: "
+        "magnitude of the measured acceleration across the normal, whose target is 0. Below: the forces.",
         figure=_draw_transient(normal, sample_rate_hz, target_mps2, played_transients),
         alternative="Acceleration along and across the normal, and forces, over time, for "
         + " and ".join(name for name, _, _ in played_transients),
@@ -43,7 +43,7 @@ def _draw_transient(
     for column_axes, (name, forces_n, measured_mps2) in zip(grid.T, played_transients, strict=True):
         along_normal = measured_mps2 @ normal
         across_normal = np.linalg.norm(measured_mps2 - np.outer(along_normal, normal), axis=1)
-        column_axes[0].plot(time_ms, target_mps2 @ normal, color=GREY, linewidth=2.2, label="wanted")
+        column_axes[0].plot(time_ms, target_mps2 @ normal, color=GREY, linewidth=2.2, label="target")
         column_axes[0].plot(time_ms, along_normal, color=BLUE, linewidth=1.0, label="measured")
         column_axes[1].plot(time_ms, across_normal, color=VERMILLION, linewidth=1.0)
         for component, axis, colour in zip(forces_n.T, "xyz", (BLUE, VERMILLION, GREEN), strict=True):

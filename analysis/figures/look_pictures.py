@@ -284,5 +284,5 @@ def _find_most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int
 
 
 def _format_unit(unit: str) -> str:
-    """Format the unit with a raised 2; "no unit" for "1"."""
+    """Format a unit, or a value with its unit, with a raised 2; "no unit" for "1"."""
     return "no unit" if unit == "1" else unit.replace("^2", "²")

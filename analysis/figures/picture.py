@@ -92,8 +92,8 @@ def remove_figure(picture: Picture) -> Picture:
 
 
 def convert_to_sample_units(picture: Picture) -> Picture:
-    """Replace seconds and hertz by units of samples in all texts, for a recording with unknown sample rate. Texts of
-    the figure are changed in place. To be called before the picture is rendered."""
+    """Replace seconds and hertz by units of samples in all texts but the title, for a recording with unknown sample
+    rate. Texts of the figure are changed in place. To be called before the picture is rendered."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):
             text.set_text(replace_time_units(text.get_text()))

@@ -33,11 +33,11 @@ def make_played_responses_picture(playbacks: Sequence[PlayedResponse]) -> Pictur
     """Make the picture of delivered over target acceleration without and with equalizer. playbacks: one per row."""
     return Picture(
         name="equalized-response",
-        title="What is played, with and without the equalizer",
-        caption="Columns: the axis along which an acceleration was wanted, a swept sine. Thick: the response along "
-        "it, which should be 0 dB; thin: the response across it. True acceleration of the simulated handle, line by "
-        "line. The first row is a force, scaled by its mean gain; the last row is ours: models of other places, "
-        "their forces blended.",
+        title="Response from target to delivered acceleration, with and without the equalizer",
+        caption="Columns: axis of the target acceleration, a swept sine. Thick: delivered acceleration along this "
+        "axis, ideally 0 dB; thin: along the other axes. Delivered is the true acceleration of the simulated handle, "
+        "at each spectral line. First row: a force proportional to the target, scaled by the mean gain. Last row (not "
+        "in the publication): forces interpolated between models of other places.",
         figure=draw_played_responses(playbacks),
     )
 
@@ -46,11 +46,11 @@ def make_friction_picture(playbacks: Sequence[PlayedResponse]) -> Picture:
     """Make the picture of delivered over target acceleration with and without friction. playbacks: one per row."""
     return Picture(
         name="equalized-friction",
-        title="What friction costs",
-        caption="The same as above. First a swept sine, then all frequencies at once with the same peak force, so "
-        "that each has less: friction, which no linear model contains, makes the lines scatter. Last, the same on a "
-        "copy of the simulated device without friction, with a model identified on that; the remaining coupling is "
-        "the accelerometer's mounting error.",
+        title="Effect of friction on the delivered acceleration",
+        caption="Responses from target to delivered acceleration, as in the figure above. First row: a swept sine. "
+        "Second row: all frequencies at once with the same peak force, so that each has less force: friction, which no "
+        "linear model contains, makes the lines scatter. Last row: the same on a copy of the simulated device without "
+        "friction, with a model identified on it; the remaining coupling is the accelerometer's mounting error.",
         figure=draw_played_responses(playbacks),
     )
 
@@ -67,10 +67,11 @@ def draw_played_responses(playbacks: Sequence[PlayedResponse]) -> Figure:
             _draw_panel(axes, playback, target_axis)
         panels[0].set_ylabel(f"{fill(playback.name, 18)}\n(dB)", fontsize=9)
     for target_axis, name in enumerate(_AXES):
-        grid[0][target_axis].set_title(f"wanted along {name}", fontsize=10)
+        grid[0][target_axis].set_title(f"target along {name}", fontsize=10)
         grid[-1][target_axis].set_xlabel("Frequency (Hz)")
     handles = [
-        Line2D([], [], color=colour, label=f"came along {name}") for colour, name in zip(_COLOURS, _AXES, strict=True)
+        Line2D([], [], color=colour, label=f"delivered along {name}")
+        for colour, name in zip(_COLOURS, _AXES, strict=True)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
     return figure

@@ -11,7 +11,7 @@ from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.attached_oscillator import (
     estimate_missing_force_spectra,
     find_likely_oscillators,
-    with_oscillator,
+    attach_oscillator,
 )
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import compute_driven_axes
@@ -24,7 +24,7 @@ DAMPING_RATIOS = (0.1, 0.3, 0.8, 2.0)
 def _add_body(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
     """Attach the body with its damper and its spring to a driven axis of the model."""
     direction = compute_driven_axes(model)[:, axis]
-    return with_oscillator(model, direction, values["mass"], values["damping"], values["stiffness"])
+    return attach_oscillator(model, direction, values["mass"], values["damping"], values["stiffness"])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:

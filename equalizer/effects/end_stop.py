@@ -127,7 +127,7 @@ EFFECT = Effect(
     source="Brogliato, Nonsmooth Mechanics, chapter 2",
     signature="nothing is missing until the axis comes near its farthest positions; then a force pushes back, and odd "
     "and even harmonics appear",
-    # `side` is no fitted parameter, so that it is not listed: starting values set it where the position's sign does not
+    # `side` is no fitted parameter and not listed: `analysis.diagnosis` sets it where the position's sign does not
     # state the side. Bounds are chosen: of position and stiffness far beyond any device; of `opposite` (0: no second
     # stop, 1: equally stiff) above 1, so that equal stiffness lies inside the range of a fit.
     parameters=(

@@ -15,7 +15,7 @@ from equalizer.effects.starts.attached_oscillator import (
     estimate_missing_force_spectra,
     find_likely_oscillators,
     subtract_oscillator,
-    with_oscillator,
+    attach_oscillator,
 )
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import compute_driven_axes
@@ -41,7 +41,7 @@ def _attach_oscillator(model: MechanicalModel, axis: int, values: Values) -> Mec
         direction += values.get(tilt_name, 0.0) * axes[:, (axis + offset) % m]
     direction /= np.linalg.norm(direction)
     mass, natural_rad_s = values["mass"], 2 * np.pi * values["frequency"]
-    return with_oscillator(
+    return attach_oscillator(
         model, direction, mass, 2 * values["damping_ratio"] * mass * natural_rad_s, mass * natural_rad_s**2
     )
 

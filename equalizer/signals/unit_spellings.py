@@ -1,8 +1,9 @@
 """Normalisation of the spelling of units in recordings of other laboratories: `RPM`, `m/sec2`, `°/s`, `kgf·cm`,
 `oz-in`.
 
-Only listed spellings are rewritten, all others are returned unchanged; the meaning of a unit is not examined. For an
-unknown symbol the nearest known one can be suggested. Called by `signals.units`.
+Symbols are rewritten only where a spelling is listed; signs, powers and products are rewritten in any text (`foo2`
+becomes `foo^2`), and `units.normalise_unit` restores a text that is no unit afterwards. The meaning of a unit is not
+examined. For an unknown symbol the nearest known one can be suggested. Called by `signals.units`.
 """
 
 import re
@@ -14,7 +15,7 @@ _ASCII_BY_SIGN = {
     "º": "°", "˚": "°", "μ": "u", "µ": "u", "°": "deg", "Ω": "ohm", "·": " ", "•": " ", "∙": " ", "⋅": " ", "×": " ",
     "*": " ", "−": "-", "–": "-",
 }  # fmt: skip
-"""Signs outside ASCII, each with its ASCII replacement."""
+"""Signs, each with its replacement. The table is applied twice: `º` and `˚` become `°`, which becomes `deg`."""
 _SPELLINGS = {
     "s": "sec secs sek second seconds",
     "ms": "msec msecs millisec millisecond milliseconds",
@@ -83,8 +84,8 @@ _AMPLITUDE = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.
 
 
 def respell(text: str, known_symbols: Collection[str]) -> str:
-    """Rewrite a unit in the spelling of `signals.units`; parts that are not listed are unchanged. known_symbols:
-    symbols of that spelling, which are not changed."""
+    """Rewrite a unit in the spelling of `signals.units`; unknown symbols are unchanged, but signs, powers and products
+    beside them are rewritten. known_symbols: symbols of that spelling, which are not changed."""
     spelling = text.strip()
     if amplitude_match := _AMPLITUDE.fullmatch(spelling):
         return amplitude_match["unit"]
@@ -118,7 +119,7 @@ def find_nearest_unit(text: str, known_symbols: Collection[str]) -> str:
 
 
 def _convert_to_ascii(text: str) -> str:
-    """The text with the signs of `_ASCII_BY_SIGN` replaced."""
+    """Replace the signs of `_ASCII_BY_SIGN`, each once."""
     return "".join(_ASCII_BY_SIGN.get(character, character) for character in text)
 
 

@@ -2,8 +2,8 @@
 
 A draw depends only on the seed and its key (run, trial, attempt), not on earlier draws: a repeated trial, a resumed
 session or a replay changes no later draw. The random 64-bit words come directly from numpy's SeedSequence, whose output
-is guaranteed never to change, so that a session can be checked years later. Called by the session (`study.session`)
-and by `study_plan`.
+is guaranteed never to change, so that a session can be checked years later. Called by `study.session`,
+`study.workflows` and `study_plan`.
 """
 
 from dataclasses import dataclass
@@ -153,8 +153,8 @@ def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...
 
 
 _CATCH_KEY, _DETECTION_KEY, _ROVE_KEY = 0, 1, 2
-"""Last element of the keys of four elements, by purpose: catch trial, direction in detection, roving. A key of four
-elements never gives the same words as a trial's key of three."""
+"""Purpose in the keys of four elements: the last element for the direction in detection and for roving; the keys of
+catch trials end in `_CATCH_KEY` and 0. A key of four elements never gives the same words as a trial's key of three."""
 
 
 def are_labels_swapped(settings: ScheduleSettings, frequency_count: int, participant_number: int) -> bool:

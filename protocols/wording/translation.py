@@ -94,7 +94,7 @@ def _find_text_problem(key: str, text: Any) -> Problem | None:
     if used_names != expected_names:
         expected_text = " ".join(f"{{{name}}}" for name in sorted(expected_names)) or "no braces"
         actual_text = (
-            "braces that are not in pairs"
+            "braces that are not in pairs or hold no plain name"
             if used_names is None
             else " ".join(f"{{{name}}}" for name in sorted(used_names))
         )

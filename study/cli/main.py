@@ -113,8 +113,8 @@ def print_error(error: StudyError) -> None:
 
 
 def qualify_commands(text: str) -> str:
-    """Replace `hapteq` in the commands of a text by the path of the executable, if the shell would not find it: after
-    `make study`, hapteq is not on the PATH."""
+    """Replace `hapteq`, where a lower-case word and a space follow it, by the path of the executable, if the shell
+    would not find it: after `make study`, hapteq is not on the PATH."""
     executable = Path(sys.argv[0])
     if shutil.which("hapteq") or executable.name != "hapteq":
         return text

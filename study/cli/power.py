@@ -69,7 +69,7 @@ DeliveredOption = Annotated[
 def power(
     subjects: Annotated[str, typer.Option(help="Sample sizes: 5:40:5 (from, to, step), or one number.")] = "5:40:5",
     effect_db: EffectOption = 3.0,
-    threshold_n: Annotated[float, typer.Option(min=0.01, max=100, help="Median threshold at the others, in N.")] = 0.7,
+    threshold_n: Annotated[float, typer.Option(min=0.01, max=100, help="Median at the other frequencies, in N.")] = 0.7,
     studies: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies of each size.")] = 200,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     scheduler: SchedulerOption = None,
@@ -215,7 +215,7 @@ def _apply_person_options(crowd: "Crowd", people: str, curve: str, lapse: float,
 
 def parse_sample_sizes(text: str) -> tuple[int, ...]:
     """Parse sample sizes from:to:step, both limits included: "5:40:5" gives 5, 10 ... 40. Without to: one size; without
-    step: 1. Raises WrongUseError for any other text, sizes outside 2 to 1000, and a step of 0."""
+    step: 1. Raises WrongUseError for any other text, sizes outside 2 to 1000, falling limits, and a step of 0."""
     numbers = (
         [int(number_text) for number_text in text.split(":")] if re.fullmatch(r"\d{1,4}(:\d{1,4}){0,2}", text) else []
     )

@@ -31,10 +31,10 @@ def real(
         typer.Option(
             min=0,
             max=10_000,
-            help="Number of faults, half of them none, that are drawn, injected under a seal and diagnosed blind.",
+            help="Number of blind cases, half of them without a fault: drawn, sealed, injected, diagnosed.",
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Of the draw of these faults.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the draw of these cases.")] = 1,
     scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -76,8 +76,8 @@ class PulseSettings:
     @property
     def description(self) -> str:
         """Description of the line for the log."""
-        carriers = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
-        return f"{carriers.get(self.kind, f'data lines {self.code}')} of {self.port}"
+        names_by_kind = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
+        return f"{names_by_kind.get(self.kind, f'data lines {self.code}')} of {self.port}"
 
 
 class OnsetLine:

@@ -203,14 +203,14 @@ def examine_device(name: str) -> tuple[DeviceFinding, ...]:
     return examine(name)
 
 
-def calibrate_device(name: str, patience_s: float) -> None:
-    """Wait, at most `patience_s` (s), until a person has moved the handle of a real device into its calibration
+def calibrate_device(name: str, timeout_s: float) -> None:
+    """Wait, at most `timeout_s` (s), until a person has moved the handle of a real device into its calibration
     position. Raises `DeviceError`, also for a device that is not real."""
     if name not in REAL_DEVICES:
         raise DeviceError("There is nothing to calibrate", f"{name!r} is no real device.", "Leave --calibrate out.")
     from study.devices.force_dimension.findings import calibrate
 
-    calibrate(name, patience_s)
+    calibrate(name, timeout_s)
 
 
 def calibrate_accelerometer(
@@ -225,7 +225,7 @@ def calibrate_accelerometer(
 
 def save_accelerometer_calibration(table: str) -> Path:
     """Write the TOML table of an accelerometer's calibration into the lab's file. Returns its path. Raises
-    `DeviceError`; the file is then unchanged."""
+    `DeviceError`; the previous content then remains, in that file or in `NAME.before`."""
     from study.devices.force_dimension.lab import write_sensor_table
 
     return write_sensor_table(table)

@@ -228,7 +228,8 @@ class SafeDevice:
         self._require_connected()
         if self._governor.stop_requested:
             raise _make_usage_error(
-                "The emergency stop was pressed.", "Make sure that all is well, then open the device again."
+                "It was stopped, by the emergency stop or an interruption.",
+                "Make sure that all is well, then open the device again.",
             )
         if self._held_stimulus is not None:
             raise _make_playing_error()
@@ -285,10 +286,10 @@ class SafeDevice:
 
 
 def _make_playing_error() -> DeviceError:
-    """Error of a call that needs a device at rest, while a stimulus is held."""
+    """Make the error of a call that needs a device at rest, while a stimulus is held or the device still moves."""
     return _make_usage_error("It is still playing.", "Call release first.")
 
 
 def _make_usage_error(problem: str, remedy: str) -> DeviceError:
-    """Error of a call that the device cannot carry out in its present state."""
+    """Make the error of a call that the device cannot carry out in its present state."""
     return DeviceError("The device cannot do this now", problem, remedy)

@@ -40,7 +40,8 @@ class IntensityCue:
     """Threshold of detection, and level at which the noise is `noise_db` times the square root of two (N)."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
+        """Draw the answer (1 or 2) and response time (s) for one presentation, random but the same for equal
+        arguments."""
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection_curve = WeibullCurve(self.detection_n, DETECTION_SLOPE)

@@ -6,7 +6,7 @@ from types import ModuleType
 
 import numpy as np
 
-from equalizer.identification.mechanical.modal_structure import to_driven_axes
+from equalizer.identification.mechanical.modal_structure import transform_to_driven_axes
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -92,7 +92,7 @@ def nominal(modes) -> MechanicalModel:
         "without friction", "acceleration", np.eye(len(off)), damping, np.diag(speed**2), shapes, shapes.T,
         actuator=ActuatorLimits(delay_s=0.00109, bandwidth_hz=320.0), tolerance=Tolerance(0.006, 0.5, 4.0, 0.005),
     )  # fmt: skip
-    return to_driven_axes(modal)
+    return transform_to_driven_axes(modal)
 
 
 def _wanted(seed: int) -> FloatArray:

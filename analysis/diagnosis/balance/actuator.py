@@ -66,7 +66,7 @@ class ActuatorFit:
     replaces_motion_laws: bool = False
     """Whether its error alone is smaller than that of the laws of the motion named before."""
     suffices: bool = False
-    """Whether its error alone is at most that of the best laws of the motion with the unchanged command."""
+    """Whether its error alone is about as small as with laws of the motion, and not larger than that of these alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +82,8 @@ class DrivenAxis:
 def find_balance(
     motions: Sequence[Motion], driven: DrivenAxis, excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> Balance:
-    """Find the balance of one axis: laws of the motion and, where it is significant, a law of the command, through
-    which the commanded force is then passed before the laws of the motion are searched again."""
+    """Find the balance of one axis: laws of the motion and, where significant, a law of the command. With a named one,
+    the laws of the motion are searched again for the force that it gives; else it is listed with its objection."""
     axis, rotational = driven.number, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
     actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
@@ -125,8 +125,8 @@ def _pass_through_law(motion: Motion, axis: int, driven_channel: int, law: Comma
 def find_command_law(
     balance: Balance, driven: DrivenAxis, excluded: frozenset[str], map_: Mapper = map
 ) -> ActuatorFit | None:
-    """Find the law of the command with the smallest error; None where the balance has no time axis, no command varies,
-    no law of the command is allowed, or none can explain enough."""
+    """Find the law of the command with the smallest error; None where the balance has no time axis, the command is
+    zero, no law of the command is allowed, or none can explain enough."""
     search, target = balance.search, driven.target
     # A limited rate is tried for servo targets only: for forces, hardening springs and friction resemble it.
     excluded_effects = excluded if target is not None else excluded | {"slew_limit"}
@@ -162,7 +162,7 @@ LawKinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
 
 
 def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozenset[str]) -> LawKinds:
-    """List the kinds of laws to try; of coils only with a measured translation; none where the command is zero."""
+    """List the kinds of laws to try: electromagnets only with a measured translation; none where the command is zero."""
     motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
@@ -249,7 +249,7 @@ def _refine_best_per_effect(
 def _refine_values(
     inverse: InverseBalance, motion_laws: tuple[int, ...], start: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
-    """Search the values of a law along coordinates until a pass lowers its error by less than 0.1 %."""
+    """Search a law's values along coordinates until one of `MOST_PASSES` passes lowers its error by less than 0.1 %."""
     error, law = start
     for _ in range(MOST_PASSES):
         neighbours = [(inverse.sum_errors(neighbour, motion_laws), neighbour) for neighbour in vary_parameters(law)]
@@ -290,7 +290,7 @@ def _find_objection(law: CommandLaw, gain: float, gain_low: float, equivalents: 
     if gain < COMMAND_LAW_GAIN or gain_low <= 0:
         return (
             f"in place of the command it explains {100 * max(gain, 0.0):.0f} % of the error that laws of the motion "
-            "leave, and not most of it"
+            "leave: too little, or not in all stretches of the recording"
         )
     # A curve of the command and a force that changes with the distance are different physics.
     unlike = [effect for effect in equivalents if effect not in EFFECTS_BY_NAME or law.position_factor is not None]

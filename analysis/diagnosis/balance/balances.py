@@ -29,9 +29,9 @@ def find_balances(
 ) -> tuple[Balance, ...]:
     """Find the force balance of each command; empty where no motion was measured, or too little of it. recordings: at
     least one, with the same channels. excluded: names of effects that are left out, of the catalogue or of `FREE_LAWS`.
-    Where no law is named in the band that noise allows, the narrower band in which the device moves is tried, because
-    power of the command above that band hides laws; then the samples in motion alone. Laws outside the catalogue are
-    compared with the result."""
+    Where all axes can be tested and no law is named in the band that noise allows, the narrower band in which the
+    device moves is tried, because power of the command above that band hides laws; then the samples in motion alone.
+    Laws outside the catalogue are compared with the result."""
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = compute_motions(records)
@@ -94,8 +94,8 @@ def select_samples_in_motion(records: Sequence[Observed], motions: Sequence[Moti
 
 
 def _find_moving_samples(motion: Motion, motions: Sequence[Motion]) -> Mask:
-    """Find (n,): whether the squared velocity of any channel exceeds `STILL_SHARE` of its mean square over all
-    motions."""
+    """Find (n,): whether the squared velocity of any channel exceeds `STILL_SHARE` of its mean square over the samples
+    to fit of all motions."""
     mean_square_velocity = np.concatenate(
         [fitted_motion.velocity[fitted_motion.fit] ** 2 for fitted_motion in motions]
     ).mean(axis=0)

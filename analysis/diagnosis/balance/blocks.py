@@ -1,10 +1,10 @@
 """Normal equations of linear least squares, X'X w = X'y, block by block of consecutive samples.
 
 X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force. A
-block keeps the Gram matrix X'X and the cross products X'y only. Sums of these over blocks give the fit to any subset of
-blocks and columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
-y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part`, `judged_law` and
-`first_model.joint_fit`.
+block keeps the Gram matrix X'X, the cross products X'y and y'y in place of its samples. Sums of these over blocks give
+the fit to any subset of blocks and columns without the samples, which makes cross-validation fast. The residual sum of
+squares of weights w is y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part`, `judged_law`
+and `first_model.joint_fit`.
 """
 
 from collections.abc import Sequence
@@ -138,7 +138,7 @@ def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, is_unpena
     )
 
 
-def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
+def add_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
     """Add the prior to the normal equations: its precision to the first diagonal elements of X'X, its precision
     times mean to the first elements of X'y. products: (..., c, c) and (..., c)."""
     if prior is None:

@@ -5,7 +5,8 @@ parameters are refined in the most promising sums. If the best of them is signif
 leaves at most 1 - `FREE_LAW_GAIN` of its cross-validated squared error (of the linear balance's where no law of the sum
 can be named), the sum with the fewest parameters at about the same error is completed by further laws
 (`add_further_laws`) and judged on held-out data, with the catalogue's laws as rivals. It replaces the chosen sum where
-one of its free laws is named, or where it halves the error and the chosen sum has no named law. Called by `balances`.
+a free law with a gain of at least `FREE_LAW_GAIN` is named, or where there is such a law, the chosen sum has no named
+law, and the rms error is at most half of the linear balance's. Called by `balances`.
 """
 
 from dataclasses import replace
@@ -65,7 +66,7 @@ def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balanc
         simplest = extended_sum
     judged_balance = judge_structure(search, simplest)
     free_laws = [law for law in judged_balance.laws if law.is_free and law.gain_low > 0 and law.gain >= FREE_LAW_GAIN]
-    # A law that is not named is a candidate only where it halves the error on the held-out samples.
+    # A law that is not named is a candidate only where its sum halves the linear balance's error on the test blocks.
     halves_error = judged_balance.error <= np.sqrt(1 - FREE_LAW_GAIN) * balance.linear and not balance.named
     return judged_balance if free_laws and (halves_error or any(law.named for law in free_laws)) else balance
 

@@ -150,8 +150,9 @@ class InverseBalance:
         return [speed**2 > least_squared_speed for speed in speeds]
 
     def _build_regressors(self, law: CommandForce, motion_laws: Sequence[int]) -> list[FloatArray]:
-        """Build the regressors (n, columns) of each motion: the columns of the law, their time derivatives, the other
-        axes' commands, and the laws of the motion."""
+        """Build the regressors (n, columns) of each motion: the columns of the law, the time derivatives of its first
+        `lag_column_count` columns, the other axes' commands, and the remaining columns of the base and of the laws of
+        the motion."""
         regression, regressors = self.search.regression, []
         # Columns of the base that are filtered copies of the predicted quantity would reproduce it.
         excluded_columns = {

@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.judged_law import (
     JudgedLaw,
     compute_force_ratio,
     find_family,
-    list_simpler,
+    list_special_cases,
     select_test_blocks,
 )
 from analysis.diagnosis.balance.law import Law
@@ -225,7 +225,7 @@ def _find_equivalents(
     equivalents, is_best = [], np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for effect, (_, laws) in best_by_effect.items():
         increases = _compute_errors(regression, laws) - full_errors
-        if tested_law.effect not in list_simpler(effect):
+        if tested_law.effect not in list_special_cases(effect):
             is_best &= increases[draws].sum(axis=1) >= 0
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
         has_more_parameters = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
@@ -257,7 +257,7 @@ def _find_objection(
                 "is another")  # fmt: skip
     family = find_family(law.effect) | (CONDITION_LAWS if law.effect in CONDITION_LAWS else set())
     other_families = [effect for effect in equivalents if effect not in family]
-    rivals = [effect for effect in equivalents if law.effect not in list_simpler(effect)]
+    rivals = [effect for effect in equivalents if law.effect not in list_special_cases(effect)]
     if other_families or (len(rivals) >= LARGEST_CLASS and not {law.effect, *rivals} <= FRICTIONS):
         rival_names = ("another formula" if name in FREE_LAWS else name for name in other_families or equivalents)
         return f"these data cannot distinguish it from {', '.join(dict.fromkeys(rival_names))}"

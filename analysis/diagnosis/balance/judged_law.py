@@ -34,9 +34,9 @@ FAMILIES = (
     FREE_SPEED_LAWS,
     FREE_POSITION_LAWS,
 )  # fmt: skip
-"""Families of effects with similar forces. A law whose equally good rivals are all of its own family is named, with the
-rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a family of its
-own."""
+"""Families of effects with similar forces. A law whose equally good rivals are all of its own family, and not too many,
+is named with the rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a
+family of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +108,7 @@ def compute_force_ratio(regression: Regression, laws: Sequence[int], law_index: 
     return float(np.concatenate(law_force).std() / max(float(np.concatenate(force).std()), 1e-300))
 
 
-def list_simpler(effect: str) -> tuple[str, ...]:
+def list_special_cases(effect: str) -> tuple[str, ...]:
     """List the effects that are special cases of a law, so that the law fits at least as well; empty for a law outside
     the catalogue."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
@@ -142,6 +142,7 @@ def has_held_out_motion(regression: Regression) -> bool:
 
 
 def _compute_mean_square_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
-    """Compute the mean square speed of the driven channel in each block, (blocks,), relative to its scale."""
+    """Compute the mean square speed of the driven channel in each block, (blocks,), relative to its scale. With a given
+    model, whose base has no column of the speed, it is that of the column with the same index."""
     speed_column = len(regression.motions[0].channels) + regression.base_terms.driven_channel
     return np.array([block.gram[speed_column, speed_column] / max(len(block.rows), 1) for block in blocks])

@@ -51,9 +51,9 @@ hand."""
 
 
 def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
-    """Make all laws of the catalogue for all channels except `make_cogging_law`, whose pitch is found from the residual
-    of the others. Laws that need a time axis are left out where the band is infinite; the drifting force also where an
-    acceleration was measured."""
+    """Make all laws of the catalogue, and those of recorded conditions, for all channels; without `make_cogging_law`,
+    whose pitch is found from the residual of the others. Laws that need a time axis are left out where the band is
+    infinite; the drifting force also where an acceleration was measured."""
     for channel in range(len(motions[0].channels)):
         scales = measure_scales(motions, channel, rotational)
         yield from make_friction_laws(channel, scales)

@@ -114,9 +114,9 @@ def _complete_base(
     base_laws = tuple(law for law in base_terms.laws if not (delay_s and law.effect in DELAY_LIKE_LAWS))
     linear_laws = [law for law in regression.laws if law.linear and not (delay_s and law.effect in DELAY_LIKE_LAWS)]
     motions = [_delay_forces(motion, delay_s) for motion in regression.motions]
-    laws = [*(regression.laws[k] for k in nonlinear_laws), *linear_laws]
+    candidate_laws = [*(regression.laws[k] for k in nonlinear_laws), *linear_laws]
     extended_regression = build_regression(
-        motions, regression.axis, laws, is_freely_turning(regression), replace(base_terms, laws=base_laws)
+        motions, regression.axis, candidate_laws, is_freely_turning(regression), replace(base_terms, laws=base_laws)
     )
     chosen_structure = Structure(
         tuple(range(len(nonlinear_laws))),
@@ -142,11 +142,11 @@ def _add_linear_law(regression: Regression, base_structure: Structure) -> tuple[
     for law_index, law in enumerate(regression.laws):
         if not law.linear or law_index in base_structure.laws:
             continue
-        laws = (*base_structure.laws, law_index)
-        trial_structure = Structure(laws, regression.cross_validate(regression.select_columns(laws)))
-        if (best_structure is None or trial_structure.error < best_structure.error) and fit_values(regression, laws)[
-            -1
-        ] is not None:
+        law_indices = (*base_structure.laws, law_index)
+        trial_structure = Structure(law_indices, regression.cross_validate(regression.select_columns(law_indices)))
+        if (best_structure is None or trial_structure.error < best_structure.error) and fit_values(
+            regression, law_indices
+        )[-1] is not None:
             best_structure = trial_structure
     if best_structure is None or not _is_worth_adding(base_structure, best_structure):
         return None

@@ -121,9 +121,10 @@ def _is_varying(samples: FloatArray) -> bool:
 
 
 def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
-    """Compute the motion of each record, with derivatives and forces. records: with the same channels, units and rate.
-    band_hz: upper end of the band (Hz); None = the highest that the noise allows. Raises NoMotionError where there are
-    no records, or a record contains no motion."""
+    """Compute the motion of each record, with derivatives and forces; missing samples are interpolated. Under a
+    zero-order hold, a motion that was not imposed is advanced by half a sample; the acceleration of a free motion is
+    set to zero. records: with the same channels, units and rate. band_hz: upper end of the band (Hz); None = the
+    highest that the noise allows. Raises NoMotionError where there are no records, or a record contains no motion."""
     signals = [find_motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a position, velocity or acceleration")

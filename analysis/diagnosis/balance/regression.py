@@ -4,9 +4,9 @@ The products X'X and X'f of all columns are computed once per block of samples (
 is fitted and tested without another pass over the samples.
 
 The base is mass, damping and stiffness along every measured motion, linear dynamics of a higher order where there are
-any (`BaseTerms`), and a constant. Errors are sums of squares of the force within the band. In cross-validation, the
-error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974). Called by
-`structures`, `judge_laws`, and the fits of a first model (`first_model`).
+any (`BaseTerms`), and a constant. Errors are sums of squares of the residual force within the band. In
+cross-validation, the error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111,
+1974). Called by `structures`, `judge_laws`, and the fits of a first model (`first_model`).
 """
 
 from collections.abc import Sequence
@@ -19,6 +19,7 @@ from analysis.diagnosis.balance.blocks import (
     RIDGE,
     Block,
     Prior,
+    add_prior,
     build_blocks,
     compute_scale,
     compute_squared_errors,
@@ -27,7 +28,6 @@ from analysis.diagnosis.balance.blocks import (
     solve_without_columns,
     stack_products,
     sum_products,
-    with_prior,
 )
 from analysis.diagnosis.balance.law import BaseTerms, Law
 from analysis.diagnosis.balance.motion import Motion
@@ -105,7 +105,7 @@ class Regression:
         """Solve for weights (..., c) from products (..., c, c) and (..., c): least squares in which mass and damping of
         the driven motion are fixed at zero where they would be negative (active-set method). A fixed weight is not
         freed again."""
-        gram, cross = products = with_prior(products, self.prior)
+        gram, cross = products = add_prior(products, self.prior)
         weights = solve_normal_equations(products, RIDGE)
         nonnegative = list(self.nonnegative_columns)
         is_fixed: Mask = np.zeros_like(weights, dtype=np.bool_)
@@ -116,8 +116,8 @@ class Regression:
             is_fixed[..., nonnegative] |= is_negative
             for fixed_columns in np.unique(is_fixed.reshape(-1, is_fixed.shape[-1]), axis=0):
                 if fixed_columns.any():
-                    rows = (is_fixed == fixed_columns).all(axis=-1)
-                    weights[rows] = solve_without_columns(gram[rows], cross[rows], fixed_columns)
+                    matches = (is_fixed == fixed_columns).all(axis=-1)
+                    weights[matches] = solve_without_columns(gram[matches], cross[matches], fixed_columns)
         return np.where(is_fixed, 0.0, weights)
 
     def compute_residuals(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
@@ -138,8 +138,8 @@ def build_regression(
 ) -> Regression:
     """Build the regression of one axis's force on mass, damping, stiffness and laws. turns: whether the shaft turns
     freely (`Scales.turns`) and so has no stiffness. base_terms: further terms of the base; None = none, and the force
-    drives the motion channel of the same index. bases: columns (n, k) per motion that replace mass, damping and
-    stiffness. Laws whose columns vanish or are not finite are left out."""
+    drives the motion channel of the same index, or the last. bases: columns (n, k) per motion that replace mass,
+    damping and stiffness. Laws whose columns vanish or are not finite are left out."""
     channel_count = len(motions[0].channels)
     base_terms = base_terms or BaseTerms(min(axis, channel_count - 1))
     forces = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
@@ -251,14 +251,14 @@ def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
     )
 
 
-def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
+def keep_laws(regression: Regression, law_indices: Sequence[int]) -> Regression:
     """Reduce a regression to the laws of these indices, in this order."""
-    columns = regression.select_columns(laws)
-    widths = [regression.column_ranges[k].stop - regression.column_ranges[k].start for k in laws]
+    columns = regression.select_columns(law_indices)
+    widths = [regression.column_ranges[k].stop - regression.column_ranges[k].start for k in law_indices]
     ends = np.cumsum([regression.base_column_count, *widths]).tolist()
     return replace(
         regression,
-        laws=tuple(regression.laws[k] for k in laws),
+        laws=tuple(regression.laws[k] for k in law_indices),
         column_ranges=tuple(slice(start, end) for start, end in pairwise(ends)),
         scale=regression.scale[columns],
         columns=tuple(part[:, columns] for part in regression.columns),
@@ -289,8 +289,8 @@ def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float,
     is_base = np.array([k < regression.base_column_count for k in columns])
     products = stack_products(regression.fit, columns)
     total_products = products[0].sum(axis=0), products[1].sum(axis=0)
-    training = with_prior((total_products[0] - products[0], total_products[1] - products[1]), regression.prior)
-    total_products = with_prior(total_products, regression.prior)
+    training = add_prior((total_products[0] - products[0], total_products[1] - products[1]), regression.prior)
+    total_products = add_prior(total_products, regression.prior)
     errors = [
         float(compute_squared_errors(regression.fit, products, solve_ridge(training, ridge, is_base)).sum())
         for ridge in RIDGE_PARAMETERS

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.given_model_base import GivenModelBase, build_regression_with_model, can_laws_explain
 from analysis.diagnosis.balance.judged_law import SIMULATED_AS
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, measure_scales
 from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
-from analysis.diagnosis.balance.model_base import ModelBase, build_regression_with_model, can_laws_explain
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import (
     Regression,
@@ -75,27 +75,27 @@ def search_structures(
     rotational: bool,
     excluded: frozenset[str],
     time_left: TimeBudget,
-    base: BaseTerms | ModelBase | None = None,
+    base: BaseTerms | GivenModelBase | None = None,
 ) -> StructureSearch:
-    """Search the sum of at most `MOST_SUMMED_LAWS` laws with the least cross-validated error. excluded: effects left
-    out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
+    """Search for the sum of at most `MOST_SUMMED_LAWS` laws with the least cross-validated error. excluded: effects
+    left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [measure_scales(motions, c, rotational) for c in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     base_laws = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
-    laws = [
+    candidate_laws = [
         law
         for law in make_laws(motions, rotational)
         if excluded.isdisjoint((law.effect, SIMULATED_AS.get(law.effect))) and (law.key, law.numbers) not in base_laws
     ]
-    if isinstance(base, ModelBase):
-        regression = build_regression_with_model(motions, axis, laws, base)
+    if isinstance(base, GivenModelBase):
+        regression = build_regression_with_model(motions, axis, candidate_laws, base)
         if not can_laws_explain(regression, base.least_share):
             base_only = _fit_linear_structure(regression)
             return StructureSearch(regression, base_only, base_only, (base_only,), True)
     else:
-        regression = build_regression(motions, axis, laws, turns, base)
+        regression = build_regression(motions, axis, candidate_laws, turns, base)
     if "cogging" not in excluded:
         regression = _add_cogging_laws(regression, scales)
     linear = _fit_linear_structure(regression)
@@ -215,29 +215,29 @@ def refine_parameters(regression: Regression, structures: Sequence[Structure]) -
     structure that has it."""
     refined: set[int] = set()
     for structure in structures:
-        for position, law_index in enumerate(structure.laws):
+        for index_in_sum, law_index in enumerate(structure.laws):
             if law_index not in refined and regression.laws[law_index].bounds:
                 refined.add(law_index)
                 reduced = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
-                updated = replace_law(regression, law_index, _refine_law(reduced, position))
+                updated = replace_law(regression, law_index, _refine_law(reduced, index_in_sum))
                 regression = updated or regression
     return regression
 
 
-def _refine_law(regression: Regression, position: int) -> Law:
+def _refine_law(regression: Regression, index_in_sum: int) -> Law:
     """Refine one law of a structure by steps to its best neighbour. regression: with the structure's laws alone."""
     laws = tuple(range(len(regression.laws)))
     least_error = float(regression.cross_validate(regression.select_columns(laws)).sum())
     for _ in range(MOST_PASSES):
         trials = []
-        for neighbour in _list_neighbours(regression.laws[position]):
-            trial = replace_law(regression, position, neighbour)
+        for neighbour in _list_neighbours(regression.laws[index_in_sum]):
+            trial = replace_law(regression, index_in_sum, neighbour)
             if trial is not None and _is_physical(trial, laws):
                 trials.append((float(trial.cross_validate(trial.select_columns(laws)).sum()), trial))
         if not trials or min(trials, key=lambda pair: pair[0])[0] >= least_error * (1 - 1e-4):  # converged
             break
         least_error, regression = min(trials, key=lambda pair: pair[0])
-    return regression.laws[position]
+    return regression.laws[index_in_sum]
 
 
 def _list_neighbours(law: Law) -> Iterator[Law]:
@@ -257,7 +257,7 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 
 
 def choose_simplest_structure(search: StructureSearch) -> Structure:
-    """Choose the fewest parameters at about the least error, and add laws that explain most of the remaining error."""
+    """Choose the sum with the fewest parameters at about the least error; add laws that explain most of the rest."""
     limit = search.best.error + PLAINER_SHORTFALL * (search.linear.error - search.best.error)
     sums = [s for s in search.ranked if s.error <= limit]
     simplest = min(sums, key=lambda s: (count_parameters(search.regression, s.laws), s.error), default=search.linear)
@@ -268,7 +268,8 @@ def choose_simplest_structure(search: StructureSearch) -> Structure:
 
 
 def add_further_laws(search: StructureSearch, base: Structure, ceiling: float) -> Structure | None:
-    """Add laws to `base` that explain most of what all laws (error: ceiling) could explain; None without such laws."""
+    """Add laws to `base` that explain most of what all laws (error: ceiling) could explain, and at least
+    `FURTHER_LAW_SHARE` of its error; None without such laws."""
     limit = base.error - max(FURTHER_LAW_EXCESS * (base.error - ceiling), FURTHER_LAW_SHARE * base.error)
     extensions = [
         s

@@ -1,8 +1,8 @@
 """Force balance with a given mechanical model as its base: finds the force laws that the model lacks.
 
 Inverse dynamics give the force that the model requires for the measured motion, with its actuator, modes and effects.
-The base of the regression (`balance.model_base`) consists of that force and its derivatives with respect to the model's
-free parameters, which have the prior of their calibration. Laws are then tested as for a fitted model
+The base of the regression (`balance.given_model_base`) consists of that force and its derivatives with respect to the
+model's free parameters, which have the prior of their calibration. Laws are then tested as for a fitted model
 (`balance.judge_laws`), by their gain on held-out data over the re-tuned model. Called by `decide_with_model`.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.given_model_base import GivenModelBase
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.model_base import ModelBase
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
@@ -61,7 +61,7 @@ def find_balances_with_model(
                 search_structures(
                     [_select_axis(entry.motion, axis) for entry in prepared], axis, model.rotational, excluded,
                     time_left,
-                    ModelBase(tuple(entry.columns[axis] for entry in prepared), float(mass[axis]), LAW_FORCE_SHARE),
+                    GivenModelBase(tuple(entry.columns[axis] for entry in prepared), float(mass[axis]), LAW_FORCE_SHARE),
                 )
             )
             for axis in range(model.inputs)
@@ -84,7 +84,7 @@ class _PreparedRecord:
     motion: Motion
     """Motion of the driven axes; its force is that of the actuators and known effects there, in N (N m)."""
     columns: tuple[FloatArray, ...]
-    """Per axis, the columns of `ModelBase`, (n, 1 + parameters)."""
+    """Per axis, the columns of `GivenModelBase`, (n, 1 + parameters)."""
 
 
 def _prepare_record(record: Observed, motion: Motion, model: MechanicalModel) -> _PreparedRecord:

@@ -11,7 +11,8 @@ simulation compares responses.
 
        E(with laws) <= E(without) + ln(CONFIRMED_RATIO)          (a tenth less error)
 
-   and if the model with the laws explains more than half of the held-out power (`held_out_gain.explains_half`).
+   and if the model with the laws explains more than half of the held-out power (`held_out_gain.explains_half`). Else
+   the last law is left out, and the others are fitted again.
 3. A law whose amplitude's 95 % interval contains zero is withdrawn, or replaced by the special case that lacks the
    undetermined parameter, and the remaining laws are fitted again (`_find_undetermined_law`, `_prefer_special_case`).
 4. The verdict is `explained` only if the noise is known from repeats, the residual is as good as noise, and held-out
@@ -74,10 +75,10 @@ class _ConfirmationStart:
     """The model with constants only, as it was given."""
     retuned: FittedCandidate
     """`as_given` with the model's parameters fitted again."""
-    confirmed: FittedCandidate
+    tested: FittedCandidate
     """`retuned`, scored on the held-out samples."""
     baseline: FittedCandidate
-    """The better of `as_given` and `confirmed` on the held-out samples."""
+    """The better of `as_given` and `tested` on the held-out samples."""
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise_known: bool) -> SearchResult | None:
@@ -102,10 +103,10 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise
         full_context.with_test_score(full_context.score_fit(given_fit)),
         full_context.score_fit(refine(full_context, given_fit)),
     )
-    confirmed = full_context.with_test_score(retuned)
-    baseline = Explanation(as_given, confirmed, confirmed, (), ()).plain
+    tested = full_context.with_test_score(retuned)
+    baseline = Explanation(as_given, tested, tested, (), ()).plain
     start = _ConfirmationStart(
-        context, full_context, tuple(balances), noise_known, len(forces.claims), as_given, retuned, confirmed, baseline
+        context, full_context, tuple(balances), noise_known, len(forces.claims), as_given, retuned, tested, baseline
     )
     confirmed_laws = _confirm_by_simulation(start, named_laws)
     return None if confirmed_laws is None else _prefer_special_case(start, *confirmed_laws)
@@ -114,13 +115,13 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise
 def _confirm_by_simulation(
     start: _ConfirmationStart, named_laws: Sequence[tuple[int, JudgedLaw]]
 ) -> tuple[SearchResult, _NamedLaws] | None:
-    """Fit the laws, dropping undetermined ones, until all are confirmed; returns the result and these laws, None where
-    there are none."""
+    """Fit the laws until all are confirmed, dropping undetermined ones, and the last one where the held-out error does
+    not fall enough; returns the result and these laws, None where there are none."""
     context, named_laws = start.full_context, refit_laws(start.balances, named_laws)
     while named_laws:
         steps, with_laws = _fit_from_starts(context, start.balances, (start.retuned, start.baseline), named_laws)
         explanation = Explanation(
-            start.as_given, start.confirmed, with_laws, tuple((step,) for step in steps), tuple(steps)
+            start.as_given, start.tested, with_laws, tuple((step,) for step in steps), tuple(steps)
         )
         undetermined: int | None = len(named_laws) - 1
         errors: FloatArray | None = None

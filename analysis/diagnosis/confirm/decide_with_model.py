@@ -40,7 +40,7 @@ class ResultWithModel:
 
     result: SearchResult
     balances: tuple[Balance, ...] = ()
-    """Empty where no motion was measured."""
+    """Empty where `find_balances_with_model` finds none."""
 
 
 def decide_with_model(
@@ -139,8 +139,9 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
 
 
 def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[UnconfirmedEffect, ...]:
-    """List the best candidates of the round in which the search ended that have a positive held-out gain, at most one
-    per effect, the largest gain first. reason: why the best of them is not named."""
+    """List candidates with a positive held-out gain, the largest gain first: of the first `CANDIDATES_WITH_GAIN`
+    effects of the round that added the last effect, or of the first round where none was added; one candidate per
+    effect. reason: why the first candidate of the round is not named."""
     rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
     if not rounds:
         return ()

@@ -24,8 +24,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT_ADDED = (
-    "The fitted model contains no constants, so a constant was added to the command that makes the mean error on the "
-    "fitted data zero. It includes weights, offsets of sensor and amplifier, and the operating point of the device."
+    "The fitted model contains no constants, so a constant was added to the command, for which the mean error on the "
+    "fitted data is about zero. It includes weights, offsets of sensor and amplifier, and the operating point of the device."
 )
 """Remark of a diagnosis whose measure has such a constant."""
 
@@ -50,8 +50,9 @@ def choose_fitting_measure(
     about_mean: bool = False,
 ) -> FittingMeasure:
     """Choose the measure that `errors.choose_measure` selects. clean: recordings without the fault. compared: motion,
-    force or automatic. about_mean: whether the model was fitted to deviations from the mean; a constant command is then
-    added where that lowers the error."""
+    force or automatic. about_mean: whether the model was fitted to deviations from the mean; without clean recordings,
+    a constant is then added to the commands of a free simulation or predicted force, where the error over noise falls
+    to `CONSTANT_ERROR_RATIO` or less."""
     fitting = FittingMeasure(model, make_measure(recordings, model, clean, compared))
     if not about_mean or clean:
         return fitting

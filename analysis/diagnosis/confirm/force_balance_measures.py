@@ -71,12 +71,12 @@ def list_fitting_measures(
 def choose_forces_of_balance(
     recordings: Sequence[Recording], fitting_measure: FittingMeasure, balances: Sequence[Balance]
 ) -> FittingMeasure:
-    """Choose the measure with the linear parameters of the balances if it predicts the forces better; else `fitting`
-    unchanged, also where these parameters make no model.
+    """Choose the measure with the linear parameters of the balances if it predicts the forces better; else
+    `fitting_measure` unchanged, also where these parameters make no model.
 
-    It can replace `fitting` only where forces are compared and no law is named. Better: a smaller error on the samples
-    to fit and to choose by (`_predicts_better`). A model fitted to spectra in closed loop may need modes that are
-    unnecessary where the motion of a second body is measured.
+    It can replace `fitting_measure` only where forces are compared and no law is named. Better: a smaller error on the
+    samples to fit and to choose by (`_predicts_better`). A model fitted to spectra in closed loop may need modes that
+    are unnecessary where the motion of a second body is measured.
     """
     fitted_measure = fitting_measure.chosen.measure
     has_named_law, first_recording = any(balance.named for balance in balances), recordings[0]

@@ -71,11 +71,11 @@ def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, Judg
             other_law.law_index for other_axis, other_law in named_laws if other_axis == axis and other_law.has_column
         ]
         values = fit_values(regression, law_indices)[law_indices.index(law.law_index)]
-        refitted.append((axis, law if values is None else _with_values(law, values)))
+        refitted.append((axis, law if values is None else _replace_values(law, values)))
     return refitted
 
 
-def _with_values(judged_law: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
+def _replace_values(judged_law: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
     """Replace the parameters of a law, also in its formula where it has one."""
     formula = judged_law.formula if judged_law.law.formula is None else judged_law.law.formula(values)
     return replace(judged_law, values=values, formula=formula)

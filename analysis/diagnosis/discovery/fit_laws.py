@@ -27,7 +27,7 @@ from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.parsimony import are_inseparable
 from analysis.diagnosis.search.search_context import (
-    FIRST_FIT_ROUNDS,
+    FIRST_FIT_STEPS,
     FittedCandidate,
     SearchContext,
     compute_sensitivity,
@@ -87,7 +87,7 @@ def fit_sums(
 
 
 def _make_first_fitter(context: SearchContext, base: Fitted) -> Callable[[Fitted], Fitted]:
-    """Make the function that fits a starting fit for `FIRST_FIT_ROUNDS` steps. Where the drive repeats and the law does
+    """Make the function that fits a starting fit for `FIRST_FIT_STEPS` steps. Where the drive repeats and the law does
     not depend on time, it fits to one period of each segment with longer simulation steps (`short_recordings`), which
     suffices for a ranking, and returns the fit or the start, whichever has the lower cost on all samples."""
     tuning, shortened = context.tuning, shorten_recordings(context, base)
@@ -102,10 +102,10 @@ def _make_first_fitter(context: SearchContext, base: Fitted) -> Callable[[Fitted
         depends_on_time = any(effect.effect.of_time for effect in starting_fit.hypothesis.list_placed_effects())
         if short_context is None or depends_on_time:
             sensitivity = compute_sensitivity_to_model(context)
-            return fit(context.measure, tuning, starting_fit, sensitivity, FIRST_FIT_ROUNDS, context.map_)
+            return fit(context.measure, tuning, starting_fit, sensitivity, FIRST_FIT_STEPS, context.map_)
         sensitivity = compute_sensitivity_to_model(short_context)
         short_start = evaluate_fit(short_context.measure, tuning, starting_fit.deviations, starting_fit.hypothesis)
-        short_fit = fit(short_context.measure, tuning, short_start, sensitivity, FIRST_FIT_ROUNDS, context.map_)
+        short_fit = fit(short_context.measure, tuning, short_start, sensitivity, FIRST_FIT_STEPS, context.map_)
         fit_on_all_samples = evaluate_fit(context.measure, tuning, short_fit.deviations, short_fit.hypothesis)
         return min(fit_on_all_samples, starting_fit, key=lambda candidate: candidate.cost)
 

@@ -13,7 +13,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine_hypo
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.search_context import FIRST_FIT_ROUNDS, SearchContext
+from analysis.diagnosis.search.search_context import FIRST_FIT_STEPS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_ROUNDING_TOLERANCE
 from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
 from equalizer.laws.law import Law, find_parameter_roles
@@ -41,7 +41,7 @@ def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     model_sensitivity = replace(
         sensitivity, columns=sensitivity.columns[:tuned_count], gram=sensitivity.gram[:tuned_count, :tuned_count]
     )
-    refitted = fit(context.measure, context.tuning, start_fit, model_sensitivity, FIRST_FIT_ROUNDS)
+    refitted = fit(context.measure, context.tuning, start_fit, model_sensitivity, FIRST_FIT_STEPS)
     return refitted if refitted.cost <= fitted.cost * (1 + LAW_ROUNDING_TOLERANCE) else fitted
 
 

@@ -59,8 +59,8 @@ def make_fast_inverse_response(
 ) -> Callable[[FloatArray], ComplexArray]:
     """Return `compute_inverse_response` of this model as a function of frequency (Hz): the partial fraction expansion
     above `MAX_SOLVED_LINES` lines where its error is within `FIT_TOLERANCE`, else the exact solution. line_count: of
-    the spectrum;
-    highest_hz: the highest of them. Raises as `compute_inverse_response`, at once or when the function is called."""
+    the spectrum; highest_hz: the highest of its lines. Raises as `compute_inverse_response`, at once or when the
+    function is called."""
     if line_count > MAX_SOLVED_LINES and (expansion := _fit_partial_fractions(model, highest_hz)) is not None:
         return expansion
     return lambda frequency_hz: compute_inverse_response(model, frequency_hz)
@@ -96,7 +96,7 @@ def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callabl
 
 def _fit_coefficients(basis: ComplexArray, exact_response: ComplexArray) -> ComplexArray | None:
     """Fit the coefficients, (functions, entries), by least squares to every other line; None where the error at the
-    lines between exceeds `FIT_TOLERANCE`. basis: (lines, functions); exact: (lines, entries)."""
+    lines between exceeds `FIT_TOLERANCE`. basis: (lines, functions); exact_response: (lines, entries)."""
     line_magnitude = np.abs(exact_response).max(axis=1)[:, None]
     basis, exact_response = basis / line_magnitude, exact_response / line_magnitude
     # Columns scaled to equal norm, so that units do not matter; singular values at rounding errors (1e-14) are dropped.

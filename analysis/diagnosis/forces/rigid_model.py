@@ -129,8 +129,8 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
 
 def _compute_least_mass(accelerations: FloatArray, forces: FloatArray) -> FloatArray:
     """Compute lower bounds (m,) of the diagonal masses: the inertial force of each body is at least `MASSLESS_SHARE` of
-    the force (standard deviations), because a simulation needs positive masses. acceleration, force: (samples, m). A
-    body without acceleration gets a huge finite bound (the divisor is at least 1e-300)."""
+    the force (standard deviations), because a simulation needs positive masses. accelerations, forces: (samples, m).
+    A body without acceleration gets a huge finite bound (the divisor is at least 1e-300)."""
     return np.asarray(MASSLESS_SHARE * forces.std(axis=0) / np.maximum(accelerations.std(axis=0), 1e-300))
 
 

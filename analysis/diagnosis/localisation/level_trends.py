@@ -30,7 +30,7 @@ class LevelTrend:
     """True: the whole driven band; False: one octave of it."""
     kind: Kind
     p_value: float
-    """p-value of no distortion: the smallest over the levels times their number (Bonferroni)."""
+    """p-value of no distortion: the smallest over the segments times their number (Bonferroni)."""
     db_per_doubling: float | None
     """Slope of the relative distortion with the level, dB per doubling; None where it is not known, see
     `_estimate_slope`."""

@@ -104,7 +104,7 @@ def compute_mismatch_cells(
     """Compute and test all cells of a recording. used: (n,), the samples that count; None = all. Empty where the noise
     is not known. `beyond_noise` of each cell is set from its adjusted p-value.
 
-    Raises ValueError where a prediction has another shape than the recording.
+    Raises ValueError where a prediction has another shape than the recording, or `used` another length.
     """
     observations = _make_observations(recording, prediction, floor)
     if not floor.is_known:

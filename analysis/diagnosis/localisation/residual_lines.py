@@ -2,9 +2,8 @@
 
 In periodic segments, the spectrum is that of the mean period, whose lines are independent. In all others, it is the
 mean over Hann windows that overlap by half (Welch, IEEE Trans. Audio Electroacoust. 15:70, 1967), whose correlation
-reduces the degrees of freedom. Powers
-are mean squares in the signal's unit squared, one-sided: twice the squared magnitudes of the lines of positive
-frequency.
+reduces the degrees of freedom. Powers are mean squares in the signal's unit squared, one-sided: twice the squared
+magnitudes of the lines of positive frequency.
 """
 
 from collections.abc import Sequence
@@ -154,8 +153,7 @@ def _sum_window_octaves(
 ) -> list[ResidualLines]:
     """Compute the residual power of Hann windows, by octave of the driven band, from the second line on; empty where
     the window is shorter than 16 samples (chosen; it has too few lines), no window is usable, or a command is missing.
-    residual: (n, channels).
-    segment_and_mask: the segment, and the mask (n,) of usable samples."""
+    residual: (n, channels). segment_and_mask: the segment, and the mask (n,) of usable samples."""
     segment, is_usable = segment_and_mask
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     all_starts = range(segment.start, segment.stop - length + 1, max(length // 2, 1))
@@ -204,8 +202,8 @@ def _compute_window_power(samples: FloatArray, starts: Sequence[int], length: in
 
 
 def _compute_noise_power(observation: Observation, lines_hz: FloatArray, period_count: int) -> FloatArray:
-    """Compute the noise power of a line times the length of a period, (lines, channels), for a mean of `periods`
-    periods. The part of the rounding error that repeats in every period does not average out."""
+    """Compute the noise power of a line times the length of a period, (lines, channels), for a mean over
+    `period_count` periods. The part of the rounding error that repeats in every period does not average out."""
     density = np.stack(
         [np.interp(lines_hz, observation.noise_hz, channel) for channel in observation.noise.density.T], axis=1
     )

@@ -2,8 +2,9 @@
 
 A state is a variable of the motion or of the signals: position, velocity, command, response, time. The mismatch may be
 larger in a region of the state, or follow its sign (`state_regions`); the p-value of each test is multiplied by the
-number of all tests (Bonferroni). A dependence is stated where the p-value is at most `FALSE_DISCOVERY_RATE` and the
-region has a larger share of the mismatch than of the samples. Called by `localisation`.
+number of all tests (Bonferroni). A dependence is stated where the p-value is at most `FALSE_DISCOVERY_RATE` and, for
+a region, its share of the mismatch is clearly larger than that of the samples (`_is_informative`). Called by
+`localisation`.
 """
 
 from collections.abc import Sequence
@@ -99,9 +100,9 @@ def find_error_states(
         ]
         strata = _assign_strata(recording, evidence.used > 0, reading)
         inputs = "+".join(
-            channel
-            for channel in recording.command.channels
-            if any(channel in channel_cell.input.split("+") for channel_cell in channel_cells)
+            command_channel
+            for command_channel in recording.command.channels
+            if any(command_channel in channel_cell.input.split("+") for channel_cell in channel_cells)
         )
         regions = find_state_regions(
             Disturbance(reading - evidence.predicted[:, channel_index], strata, reading), states, _PERMUTATION_SEED

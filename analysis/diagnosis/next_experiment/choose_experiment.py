@@ -76,7 +76,8 @@ class ExperimentSet:
     discriminated: tuple[int, ...]
     """Indices of the rivals that they discriminate from the named effect."""
     gain: float
-    """Smallest expected log-likelihood ratio over these rivals; 0 for an empty set."""
+    """Smallest expected log-likelihood ratio over these rivals, of several recordings its lower bound; 0 for an empty
+    set."""
 
 
 def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
@@ -157,7 +158,7 @@ def make_document_entry(experiment_set: ExperimentSet, effect_names: Sequence[st
         "; the recording's meta must state the weight (added_mass_kg, or added_inertia_kg_m2)" if has_added_mass else ""
     )
     first_command, *later_commands = (experiment.words for experiment in experiment_set.experiments)
-    place = "in these recordings together" if later_commands else "there"
+    place = "in these recordings together" if later_commands else "in this recording"
     return NextExperiment(
         command="; then ".join([f"record {first_command}", *later_commands]),
         splits=(

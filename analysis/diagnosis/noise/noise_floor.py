@@ -72,8 +72,8 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
     quiet_estimates = [estimate_quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(quiet_estimate is not None for quiet_estimate in quiet_estimates):
         remark = (
-            "Nothing repeats in this recording and it never rests: its noise was measured above the driven band and "
-            "is assumed to have the same density below."
+            "This recording contains neither repeated periods nor a usable stretch of rest: its noise was measured "
+            "above the driven band and is assumed to have the same density below."
         )
         return _build_noise_floor(
             "quiet band",
@@ -82,7 +82,10 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
             signals,
             remark,
         )
-    remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
+    remark = (
+        "This recording contains neither repeated periods nor a usable stretch of rest or band that is not driven: its "
+        "noise is not known."
+    )
     unknown_estimates = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
     return _build_noise_floor("unknown", lines_hz, unknown_estimates, signals, remark)
 

@@ -49,8 +49,9 @@ class Periods:
 
 
 def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
-    """Find the usable periods of every periodic segment. The first period is left out, and further ones until the
-    transient has decayed; so are periods with missing samples. Segments without a usable period are left out."""
+    """Find the usable periods of every periodic segment. The first period is left out, unless it is the only
+    complete one, and further ones until the transient has decayed; so are periods with missing samples. Segments
+    without a usable period are left out."""
     usable_periods = []
     for index, segment in enumerate(recording.segments):
         if segment.period < _SHORTEST_PERIOD:

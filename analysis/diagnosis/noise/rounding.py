@@ -22,7 +22,7 @@ _MAX_EXAMINED_SAMPLES, _BISECTIONS = 20_000, 40
 """Number of samples, from the first on, in which a step is searched for, to limit the computing time; number of
 bisections, each of which halves the interval."""
 _TOLERANCE = 1e-3
-"""Largest deviation from multiples of a step, relative to the step: float32 storage leaves no exact multiples."""
+"""Deviation from multiples of a step that storage as float32 may add to a tenth of a step, relative to the step."""
 
 
 @dataclass(frozen=True, slots=True)

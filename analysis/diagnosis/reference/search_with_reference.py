@@ -1,9 +1,9 @@
 """Search for effects whose contribution exceeds the model error on clean recordings of the same device.
 
 The residual of the re-tuned model on clean recordings (`learn_model_error`) counts as noise in two ways: as coloured
-noise, by a whitening filter; and, where the residual is much larger than that noise, by its rms only. Effects that also
-improve the prediction of the clean recordings are not named: the model lacks them, but they are not the fault. Called
-by `search_by_simulation`.
+noise, by a whitening filter; and, where the residual exceeds that noise by more than a factor, by its rms only.
+Effects that also improve the prediction of the clean recordings are not named: the model lacks them, but they are not
+the fault. Called by `search_by_simulation`.
 """
 
 from collections.abc import Sequence
@@ -39,8 +39,9 @@ def search_with_reference(
     without clean recordings, with the faults that are certain. Residuals of the result are those of its own measure,
     with that model error as noise. progress, time_left: as for `search_effects`.
 
-    Where the residual is much larger than that noise, whitening helps little: effects are then also sought with the
-    plain residual, and that result replaces the first where it names effects and has the smaller error.
+    Where the residual exceeds that noise by more than `ModelErrorFloor.margin_factor`, whitening helps little: effects
+    are then also sought with the plain residual, and that result replaces the first where it names effects and has the
+    smaller error; not with certain faults, or without time left.
     """
     whitened_result = _withdraw_shared_effects(
         _search_whitened_residual(context, learned_error, catalogue, progress, time_left), learned_error

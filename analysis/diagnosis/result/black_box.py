@@ -20,8 +20,8 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 SELECTION_SAMPLES = 20_000
-"""Most samples for the selection of terms, evenly spaced among the fit samples; the final fit uses all.
-Limits the computing time; chosen by hand."""
+"""Least number of samples for the selection of terms, where there are as many; up to twice as many are used, evenly
+spaced among the fit samples, to limit the computing time. The final fit uses all. Chosen by hand."""
 _LEAST_RMS = 1e-6
 """Rms of a term on the samples for the selection (of a regressor over all samples: 1) up to which the term is not used.
 Chosen by hand."""

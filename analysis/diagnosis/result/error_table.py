@@ -58,7 +58,8 @@ def _compute_log_errors(explanation: Explanation, statistic: Statistic, roles: t
 
 def _compute_errors(measure: ErrorMeasure, explanation: Explanation, roles: tuple[str, ...]) -> Errors:
     """Compute the errors on the samples of these roles, relative to the signal; None where there are no samples, an
-    error is not finite, or held-out samples contain no motion."""
+    error is not finite, or held-out samples contain no motion. The error by noise alone is also None where an error is
+    clearly smaller (`EQUAL_ERROR_RATIO`)."""
     if roles == ("test",) and is_held_out_still(measure.records, measure.noise):
         return Errors(None, None, None, None)
     masks = [np.logical_or.reduce([getattr(record, role) for role in roles]) for record in measure.records]

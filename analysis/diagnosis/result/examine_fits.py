@@ -45,8 +45,8 @@ class Examination:
     signatures: tuple[Signature, ...]
     """Curve of each named effect, such as its force over position, velocity or command."""
     black_box: BlackBox | None
-    """Fitted to the residuals of the re-tuned model; None where band powers were compared, nothing was held out, or its
-    fit crashed."""
+    """Fitted to the residuals of the re-tuned model; None where band powers were compared, no error on held-out
+    data is known, or its fit crashed."""
 
 
 def examine_fits(search_result: SearchResult, noise_floor: NoiseFloor, maps: MismatchMaps) -> Examination:

@@ -54,7 +54,7 @@ class Signature:
 
     effect: str
     axis: str | None
-    """Letter of the axis; None where all axes share the effect."""
+    """Letter of the axis; name of the channel where the curve shows the error of a channel; None = all axes."""
     abscissa_label: str
     """Label of the abscissa with unit: "velocity of x (m/s)"."""
     ordinate_label: str
@@ -151,7 +151,7 @@ class Findings(SummaryDisplay):
     remarks: tuple[str, ...]
     """Remarks as sentences: assumptions, weaknesses, implausible results."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
-    """Every cell of the mismatch map, in units of the noise, by stage ("before", "retuned", "after")."""
+    """Every cell of the mismatch map, by stage ("before", "retuned", "after")."""
     localisation: Localisation = field(default_factory=Localisation)
     """Localisation of the mismatch: the states it occurs in, where it enters, and the kind of distortion."""
     fitted: bool = False

@@ -122,7 +122,7 @@ def extract_device(findings: Findings) -> DeviceWording:
 
 def describe_rivals(effect: NamedEffect) -> tuple[str, ...]:
     """Describe each rival of the effect in a sentence: its probability and why it was not chosen. Left out are rivals
-    that the data cannot distinguish from the effect, and refinements of it (`describe_equivalents`)."""
+    that the data cannot distinguish from the effect, and those with `REFINEMENT_REASON` (`describe_equivalents`)."""
     return tuple(
         f"{capitalise(get_noun(rival.effect))} (probability {format_probability(rival.probability)}): "
         f"{end_sentence(rival.why_not)}"
@@ -160,8 +160,8 @@ def _describe_inseparable(effect: NamedEffect) -> str:
 
 
 def describe_remainder(diagnosis: Diagnosis, device: DeviceWording | None = None) -> str:
-    """Describe the remaining mismatch: its first `_MAX_LISTED_PLACES` significant rows in the document's order, which
-    begins with the largest share of the signal, and the number of the others."""
+    """Describe the remaining mismatch: its first `_MAX_LISTED_PLACES` significant rows in the document's order
+    (`list_mismatch_rows`), and the number of the others."""
     significant_rows = select_significant(diagnosis.remainder)
     if not significant_rows:
         return "No significant mismatch remains."

@@ -52,7 +52,7 @@ of a parameter, in standard deviations, above which the sensitivity is renewed. 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
     """Refine the best fits, and sort all candidates by their error. base: fit without the new effect. fits: first fits,
     the best first (`fit_first`); may be empty. If `base` contains a force that depends on the motion, the fits have
-    been continued on all samples already, and only the best is refined, by `_polish`."""
+    been continued on all samples already, and are refined by `_polish` only."""
     promising = _select_promising(base, fits)
     is_continued = has_motion_forces(base.hypothesis)
     first_refined: list[tuple[Fitted, Sensitivity]] = []
@@ -187,15 +187,17 @@ def refine_with_sensitivity(
     full_fit = _fit_full_record(
         context, start, jacobian if short_form is None else short_form.repeat_sensitivity(jacobian)
     )
-    # Parameters that one period does not determine may diverge on all samples: then start again from the given fit.
+    # Parameters that one period does not determine may diverge on all samples: then start again from the given fit, or,
+    # with forces that depend on the motion, keep it.
     if full_fit.cost <= fitted.cost:
         return choose_plainest(context, full_fit), jacobian
     return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), jacobian
 
 
 def _fit_full_record(context: SearchContext, start: Fitted, jacobian: Sensitivity) -> Fitted:
-    """Fit to all samples, started from the fit to one period of each segment: repeat fits of `FULL_FIT_STEPS` steps, at
-    most `MAX_RENEWALS`, until the cost converges; above the noise, periods may differ."""
+    """Fit to all samples, started from the fit to one period of each segment, or that with longer simulation steps:
+    repeat fits of `FULL_FIT_STEPS` steps, at most `MAX_RENEWALS`, until the cost converges; above the noise, periods
+    may differ."""
     best_fit = start
     for _ in range(MAX_RENEWALS):
         next_fit = fit(context.measure, context.tuning, best_fit, jacobian, FULL_FIT_STEPS, context.map_)
@@ -285,8 +287,8 @@ def _refine_until_converged(
 
 
 def _contains(general_fit: Fitted, special_fit: Fitted) -> bool:
-    """Whether the last effect of `general` contains that of `special` as a special case, at sites that include those of
-    `special`: for a fair comparison both must then be refined."""
+    """Whether the last effect of `general_fit` contains that of `special_fit` as a special case, at sites that include
+    those of `special_fit`: for a fair comparison both must then be refined."""
     general_claim, special_claim = general_fit.hypothesis.claims[-1], special_fit.hypothesis.claims[-1]
     return special_claim.effect.name in general_claim.effect.simpler and set(special_claim.sites) <= set(
         general_claim.sites

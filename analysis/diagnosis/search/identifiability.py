@@ -142,7 +142,8 @@ def _compute_sensitivity(context: SearchContext, fitted: Fitted) -> Sensitivity:
 
 def keep_identifiable(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
     """Remove effects whose parameters are not identifiable, the last first; a single one is replaced by an equal rival
-    that is identifiable, if there is one. Where all are identifiable, only the fit is continued to its minimum."""
+    that is identifiable, if there is one. All are removed where those after it cannot be refitted, because no time is
+    left. Where all are identifiable, only the fit is continued to its minimum."""
     if not explanation.steps:
         return explanation
     explanation = _apply_profile_errors(context, explanation, time_left)

@@ -71,8 +71,8 @@ def explain_impacts(
     time_left: TimeBudget = grant_time,
 ) -> Explanation | None:
     """Explain the response by play, alone or with a second effect. None where the response is regular, where play does
-    not explain it, where the time ends before that is known, where play is not in the catalogue, or where the error
-    measure is no free simulation.
+    not explain it, where the model without play differs by chance alone, where the time ends before that is known,
+    where play is not in the catalogue, or where the error measure is no free simulation.
 
     explanation: result of the search by waveforms. floors: noise of each recording. time_left: called before each
     refinement, and between its linearisations.

@@ -197,7 +197,9 @@ def exchange_first_for_relatives(
 
     The candidates start from the explanation without the first effect, the other values unchanged; only a candidate
     with a smaller cost than the explanation is fitted further. The first effect is among the candidates, so that a
-    refinement must reduce the error by as much as in any step. Unchanged as for `exchange_first_effects`.
+    refinement must reduce the error by as much as in any step. Unchanged where effects may not be changed
+    (`_can_exchange`), the first effect has no relatives in the catalogue, none of them fits better, or the comparison
+    crashes.
     """
     related_effects = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
     if len(related_effects) < 2 or not _can_exchange(context, explanation, time_left):

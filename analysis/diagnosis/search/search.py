@@ -147,8 +147,8 @@ def repeat_with_wider_bound(
 
 
 def _choose_early_or_full(early: SearchResult, full: SearchResult) -> SearchResult:
-    """Choose the full search's result, with the early search's candidates where it lists none; or the early result by a
-    law, where the full search names nothing, or where time ran out and its effects leave a far larger error."""
+    """Choose the full result, with the early search's candidates where it lists none or time ran out; or the early
+    result by a law, where the full search names nothing, or time ran out and its effects leave a far larger error."""
     is_timed_out = full.found.ended_early
     if not early.judgement.named:
         candidates = early.unconfirmed if is_timed_out or not full.unconfirmed else ()

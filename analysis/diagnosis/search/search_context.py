@@ -32,7 +32,7 @@ from analysis.diagnosis.types import Mapper, Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
-FIRST_FIT_ROUNDS = 3
+FIRST_FIT_STEPS = 3
 """Gauss-Newton steps of a first fit, which only ranks the hypotheses. Chosen by hand."""
 STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
 """Names of the steps of the search in the messages of `Guard` about an effect that crashes."""
@@ -184,7 +184,7 @@ def has_held_out_mismatch(errors: FloatArray, candidate: FittedCandidate) -> boo
 def fit_first(
     context: SearchContext, base: Fitted, jacobian: Sensitivity, screened: Sequence[ScreenedHypothesis]
 ) -> list[Fitted]:
-    """Fit the hypotheses with the largest predicted gains, `FIRST_FIT_ROUNDS` steps each; the smallest cost first.
+    """Fit the hypotheses with the largest predicted gains, `FIRST_FIT_STEPS` steps each; the smallest cost first.
     Hypotheses whose fit crashes are omitted. base: the fit without the further effect; jacobian: its sensitivity."""
     measure, tuning = context.measure, context.tuning
 
@@ -194,7 +194,7 @@ def fit_first(
             tuning,
             evaluate_fit(measure, tuning, base.deviations, candidate.hypothesis),
             jacobian,
-            FIRST_FIT_ROUNDS,
+            FIRST_FIT_STEPS,
         )
 
     guarded_map = context.guard.wrap(context.map_, FITTING)

@@ -40,7 +40,7 @@ from equalizer.signals.signal import FloatArray
 
 Indices = npt.NDArray[np.int64]
 COARSE_STEP_FACTOR = 2
-"""Factor on the simulation step for ranking. Chosen: the integration error is far below that of linearised gains."""
+"""Factor on the simulation step of screening and first fits. Chosen: its error is far below that of a linearisation."""
 
 
 def coarsen_steps(measure: ErrorMeasure) -> ErrorMeasure:

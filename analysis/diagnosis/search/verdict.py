@@ -93,7 +93,7 @@ class SearchResult:
     errors: FloatArray | None = None
     """Standard errors of the final fit (`compute_final_errors`), where the search needed them."""
     unconfirmed: tuple[UnconfirmedEffect, ...] = ()
-    """Effects that were found and are not named, the largest gain first."""
+    """Effects that were found and are not named."""
 
 
 def judge(explanation: Explanation) -> Judgement:

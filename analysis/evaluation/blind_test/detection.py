@@ -24,7 +24,8 @@ class EffectDraws:
     draws: tuple[tuple[float, str], ...]
     """Strength (0 to 1) and outcome: right, in the set, missed or invisible; weakest first."""
     ideal_threshold: float | None
-    """Strength from which an ideal observer detects it; None where too few cases were drawn."""
+    """Strength from which an ideal observer detects it; None where the draws do not determine it
+    (`compute_ideal_threshold`)."""
 
 
 @dataclass(frozen=True, slots=True)

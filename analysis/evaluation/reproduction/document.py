@@ -69,17 +69,17 @@ class PlayedRow:
     device: str
     place_mm: tuple[float, float, float]
     hand: Annotated[bool, Field(description="Whether a simulated hand held the handle.")]
-    signal: Annotated[Literal["sweep", "multisine"], Field(description="Wanted signal, along one axis at a time.")]
-    flatness_db: Annotated[float, Field(description="Largest deviation of a wanted axis from the wanted level.")]
+    signal: Annotated[Literal["sweep", "multisine"], Field(description="Target signal, along one axis at a time.")]
+    flatness_db: Annotated[float, Field(description="Largest deviation of a target axis from the target level.")]
     coupling_db: Annotated[
         float,
-        Field(description="Largest ratio of off-axis response to response along the wanted axis, at the worst line."),
+        Field(description="Largest ratio of off-axis response to response along the target axis, at the worst line."),
     ]
     median_coupling_db: Annotated[float, Field(description="The same at the median line.")]
-    axis_error_deg: Annotated[float, Field(description="Largest angle between wanted and played axis.")]
+    axis_error_deg: Annotated[float, Field(description="Largest angle between target and delivered axis.")]
     error: Annotated[
         float,
-        Field(description="Root mean square of the difference from the wanted signal, relative to the wanted signal."),
+        Field(description="Root mean square of the difference from the target signal, relative to the target signal."),
     ]
     peak_force_n: float
     clipped_ticks: Annotated[int, Field(description="Number of ticks at which a cap limited the force.")]

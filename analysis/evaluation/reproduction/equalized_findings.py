@@ -211,7 +211,7 @@ def _find_friction_cost(rows: EqualizedRows) -> Finding:
         here=f"flatness {format_number(with_friction.flatness_db)} dB and coupling "
         f"{format_number(with_friction.coupling_db, 1)} dB with friction; "
         f"{format_number(frictionless.flatness_db)} dB and "
-        f"{format_number(frictionless.coupling_db, 1)} dB on the twin without",
+        f"{format_number(frictionless.coupling_db, 1)} dB without friction",
         value=with_friction.error,
         unit="1",
         as_published=None,
@@ -224,9 +224,9 @@ def _find_held_out_error(held_out_errors: tuple[float, float] | None) -> Finding
         return None
     error, frictionless_error = held_out_errors
     return Finding(
-        what="Model of the centre on a multisine kept from it",
+        what="Model of the centre on a held-out multisine",
         published="",
-        here=f"error {100 * error:.1f} %; on the twin without friction, by the same steps, "
+        here=f"error {100 * error:.1f} %; on the device without friction, by the same steps, "
         f"{100 * frictionless_error:.1f} %",
         value=error,
         unit="1",

@@ -1,8 +1,8 @@
 """Figure of the prediction of held-out data by three models: as given, re-tuned, and with the effects found.
 
-Left: an excerpt of a channel, measured and predicted, with the residuals; it is the excerpt in which the effects change
-the prediction most, in units of the noise. Right: rms error of each channel over all held-out samples, divided by the
-rms of its noise. Called by `diagnosis_pictures`.
+Left: an excerpt of a channel, measured and predicted, with the residuals; it is the excerpt in which two predictions
+differ most, in units of the noise (`find_excerpt`). Right: rms error of each channel over all held-out samples, divided
+by the rms of its noise. Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,8 +62,8 @@ def make_held_out_picture(
     excerpt_text = ""
     if excerpt is not None:
         excerpt_text = (
-            f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where the effects found "
-            "change the prediction most; below, the residual of each prediction, with plus and minus twice the noise "
+            f"Left: {excerpt.series.channels[excerpt.channel]} in {excerpt.series.name}, where the predictions "
+            "differ most; below, the residual of each prediction, with plus and minus twice the noise "
             "(grey). "
         )
     return Picture(

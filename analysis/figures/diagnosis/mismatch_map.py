@@ -81,8 +81,8 @@ def make_mismatch_map_picture(maps: Maps, input_index: int, unit: str) -> Pictur
         title=f"Where model and device disagree, driven by {input_}",
         caption="Residual relative to that of noise alone: 1 is noise. Framed: significantly larger than the noise "
         "and the model's error elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
-        f"octaves, by their lower edge{_describe_levels(maps, input_, unit)}; grey: not driven there; without a number"
-        f": below {_MIN_NUMBERED_RATIO:g}." + _describe_groups(maps, input_),
+        f"octaves, by their lower edge{_describe_levels(maps, input_, unit)}; grey: not driven there; where cells have "
+        f"numbers, those without: below {_MIN_NUMBERED_RATIO:g}." + _describe_groups(maps, input_),
         figure=draw_mismatch_map(maps, input_, unit),
         folded=input_index > 0,
         bitmap=input_index == 0,

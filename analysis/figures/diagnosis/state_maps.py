@@ -103,8 +103,8 @@ def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
 
 
 def _draw_loops(maps: StateMaps) -> Figure:
-    """Draw the two loops in panels with a common ordinate: measured force, force of the given model, and force of the
-    model with the named effects, if any."""
+    """Draw the two loops in panels with a common ordinate: measured force, force of the model without new physics, and
+    force of the completed model, if any."""
     figure = create_figure(8.8, 3.9)
     forces = [force for loop in maps.loops for force in (loop.measured, loop.model_force, loop.completed_force)]
     scale = choose_scale(maps.unit, float(np.abs(np.concatenate(forces)).max(initial=0.0)))

@@ -29,7 +29,7 @@ SIGNIFICANCE_LEVEL = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CueFinding:
-    """Findings on one cue at one frequency, over all participants."""
+    """Findings on one cue at one frequency, over all participants. The names of the fields are keys of anova.json."""
 
     frequency_hz: float
     cue: Cue
@@ -42,7 +42,8 @@ class CueFinding:
     spread_db: float
     """Median of the participants' standard deviations within a direction."""
     abilities: tuple[float, ...]
-    """Median over participants of the d' of the cue alone, for each internal noise of `INTERNAL_NOISE_DB`."""
+    """Sensitivities d' that the cue alone would give: median over participants, for each internal noise of
+    `INTERNAL_NOISE_DB`."""
     observed_d_prime: float | None
     """Mean over participants of the d' of their answers at this frequency, with any cues; None where no
     participant was shown both directions."""

@@ -45,7 +45,7 @@ class HierarchicalFit:
     curvature: FloatArray
     """(k + 6, k + 6): Hessian of minus the penalized log marginal likelihood."""
     converged: bool
-    """Whether the last Newton search converged within its maximum number of steps (`refine.MOST_NEWTON_STEPS`)."""
+    """Whether the last Newton search converged within `quadrature_search.MOST_NEWTON_STEPS` steps."""
 
     @property
     def layout(self) -> ParameterLayout:

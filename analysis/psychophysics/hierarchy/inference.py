@@ -74,9 +74,9 @@ class DirectionLimit:
     """None where the median is above the cap from the lowest frequency on, never reaches it, or crosses it upwards more
     than once."""
     lower_hz: float | None
-    """Lower bound; None: below the lowest frequency played."""
+    """Lower bound; None: at or below the lowest frequency played, or no interval of the median contains the cap."""
     upper_hz: float | None
-    """Upper bound; None: above the highest frequency played."""
+    """Upper bound; None: at or above the highest frequency played, or no interval of the median contains the cap."""
     words: str
     """Sentences on the limit and its scope, for reports."""
 
@@ -225,7 +225,7 @@ def _explain_no_limit(
 ) -> str:
     """Explain in sentences why there is no single limit."""
     if crossing_count > 1:
-        reason = f"The median threshold crosses the cap {crossing_count} times."
+        reason = f"The median threshold rises through the cap {crossing_count} times."
     elif median_db[0] >= cap_db:
         reason = f"The median threshold is above the cap already at {frequencies_hz[0]:g} Hz."
     else:

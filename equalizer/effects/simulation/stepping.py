@@ -47,7 +47,7 @@ class Forces:
     """Parameters of all forces, one after another."""
     memory: FloatArray
     """Initial state variables of all forces, one after another."""
-    acceleration: bool
+    reads_acceleration: bool
     """Whether a law reads accelerations."""
     reads_all_axes: bool
     """Whether a law reads the motion of all axes and the commands."""
@@ -108,7 +108,7 @@ def build_forced_stepping(
     by_force = linear.state_by_port_force[:, port_indices]
     per_newton = output @ by_force
     per_newton[2 * len(port_indices) :] = linear.motion_by_port_force[2 * axis_count + port_indices][:, port_indices]
-    law_output = output if forces.acceleration else output[: 2 * len(port_indices)]
+    law_output = output if forces.reads_acceleration else output[: 2 * len(port_indices)]
     port_output, force_input = law_output @ form.state_from_modal, (form.modal_from_state @ by_force).T
     step_matrices = (form.step_matrix, _to_c_order(port_output), _to_c_order(force_input), _to_c_order(per_newton.T))
     input_matrix = np.hstack(

@@ -32,7 +32,7 @@ RANK_TOLERANCE = 1e-9
 """Relative singular value, or norm, below which vectors count as linearly dependent (rounding)."""
 
 
-def with_oscillator(
+def attach_oscillator(
     model: MechanicalModel, direction: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
     """Add an oscillator to the model as its last coordinate; the model is unchanged for a mass of 0 or below.

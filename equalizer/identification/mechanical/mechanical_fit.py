@@ -150,9 +150,9 @@ def fit_mechanical_model(
     band_hz = _find_covered_band(segments)
     groups = build_line_groups(segments, settings.floor)
     structure = _make_rigid_structure(recordings[0], settings, band_hz)
-    thinned = [group.limit_lines(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
-    starts = _fit_rigid_starts(segments, thinned, structure, band_hz, settings)
-    choice = choose_structure(thinned, starts, band_hz, settings, on_progress)
+    thinned_groups = [group.limit_lines(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
+    starts = _fit_rigid_starts(segments, thinned_groups, structure, band_hz, settings)
+    choice = choose_structure(thinned_groups, starts, band_hz, settings, on_progress)
     full_groups = [group.select_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
     final = _refit(_include_all_lines(full_groups), choice.best, band_hz)
     refuse_unstable(final)

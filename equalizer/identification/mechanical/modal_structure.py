@@ -101,7 +101,7 @@ def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> F
     return np.asarray(factors.ravel())
 
 
-def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
+def transform_to_driven_axes(model: MechanicalModel) -> MechanicalModel:
     """Transform the model to coordinates of component-mode synthesis: first the driven axes, then the remaining modes
     with those axes held (Craig and Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's
     axis independently."""

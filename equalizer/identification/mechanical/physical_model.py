@@ -13,7 +13,7 @@ import numpy as np
 from equalizer.identification.mechanical.mechanical_misfit import compute_numerical_jacobian
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_structure import Structure
-from equalizer.identification.mechanical.modal_structure import ModalStructure, to_driven_axes
+from equalizer.identification.mechanical.modal_structure import ModalStructure, transform_to_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
@@ -28,11 +28,11 @@ AnyFit = RefinedFit[Structure] | RefinedFit[ModalStructure]
 
 def make_physical_model(fit: AnyFit, name: str) -> MechanicalModel:
     """Make the mechanical model of a fit with its tolerance, in absolute coordinates, in which oscillators have no
-    inertial coupling with the driven axes; a fit with modes is converted by `to_driven_axes`. Raises
+    inertial coupling with the driven axes; a fit with modes is converted by `transform_to_driven_axes`. Raises
     numpy.linalg.LinAlgError where such modes do not move every driven axis independently."""
     model = fit.structure.build_model(fit.unknowns, name)
     if isinstance(fit.structure, ModalStructure):
-        model = to_driven_axes(model)
+        model = transform_to_driven_axes(model)
     else:
         model = _to_absolute_coordinates(model, fit.structure.inputs, fit.structure.joint)
     return replace(model, tolerance=estimate_tolerance(fit))

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import resample_poly
 
-from equalizer.identification.state_space.modal_form import ModalForm, from_poles
+from equalizer.identification.state_space.modal_form import ModalForm, build_form_from_poles
 from equalizer.identification.state_space.stable_poles import stabilise_poles
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -121,6 +121,6 @@ def estimate_poles_and_shapes(
     rootable_poles = np.where(
         (decimated_poles.imag == 0) & (decimated_poles.real < 0), -decimated_poles, decimated_poles
     )
-    return from_poles(
+    return build_form_from_poles(
         stabilise_poles(rootable_poles ** (1 / decimation_factor), radius), observability[:outputs] @ eigenvectors
     )

@@ -88,11 +88,11 @@ def describe_test_error_causes(
     expected_error = float(np.hypot(validation.noise or 0.0, misfit.error))
     if validation.noise is None or validation.error <= HELD_OUT_RATIO * expected_error or cost > UNEXPLAINED_COST:
         return tuple(remarks)
-    fit_n, test_n = (_find_largest_amplitude(recordings, of_test=is_test) for is_test in (False, True))
-    if min(fit_n, test_n) > 0 and max(fit_n, test_n) > LEVEL_RATIO * min(fit_n, test_n):
+    fit_amplitude, test_amplitude = (_find_largest_amplitude(recordings, of_test=is_test) for is_test in (False, True))
+    if min(fit_amplitude, test_amplitude) > 0 and max(fit_amplitude, test_amplitude) > LEVEL_RATIO * min(fit_amplitude, test_amplitude):
         remarks.append(
             "The error on the test is larger than that of the fit, and the test was played at another level (up to "
-            f"{test_n:.3g} N, the fit {fit_n:.3g} N): the response may depend on the amplitude, as with friction."
+            f"{test_amplitude:.3g} N, the fit {fit_amplitude:.3g} N): the response may depend on the amplitude, as with friction."
         )
     else:
         remarks.append(

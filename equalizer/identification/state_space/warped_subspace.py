@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.state_space.modal_form import ModalForm, from_poles
+from equalizer.identification.state_space.modal_form import ModalForm, build_form_from_poles
 from equalizer.identification.state_space.stable_poles import stabilise_poles
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -87,6 +87,6 @@ def extract_poles_and_shapes(subspace: Subspace, order: int, radius: float) -> M
     shift_matrix = np.linalg.lstsq(normalised_observability[:-p], normalised_observability[p:], rcond=None)[0]
     eigenvalues, eigenvectors = np.linalg.eig(shift_matrix)
     # The map also changes B and D, which are fitted afterwards; C is kept.
-    return from_poles(
+    return build_form_from_poles(
         stabilise_poles((eigenvalues + c) / (1 + c * eigenvalues), radius), observability[:p] @ eigenvectors
     )

@@ -5,7 +5,8 @@ An identified model is valid in a limited band only. Low band: inverse dynamics 
 direction of the smallest peak force (`high_band`). The forces are added. Without edges in the split, all is middle
 band. Called by `narrow_and_wide_models`.
 
-Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²).
+Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²). A
+virtual spring needs m = p, which is not checked: its force along the motion, (N, p), is subtracted from the commands.
 """
 
 from dataclasses import dataclass, field, replace
@@ -109,7 +110,7 @@ class BandedEqualizer:
         ):
             if edge_hz is not None and band_model is None:
                 raise ValueError(
-                    f"the split has a {band_name} band beyond {edge_hz:g} Hz, but there is no model to play it"
+                    f"the split has a {band_name} band with the edge {edge_hz:g} Hz, but there is no model to play it"
                 )
             if edge_hz is None and band_model is not None:
                 raise ValueError(f"there is a model for a {band_name} band, but the split has none")
@@ -226,7 +227,7 @@ class BandedEqualizer:
         ), stylus_share
 
     def _compute_spring_force(self, motion: SlowMotion | None, middle_response: FloatArray) -> FloatArray:
-        """Compute the force -(k x + b v), (N, m), N, of the virtual spring along the motion of the low and the middle
+        """Compute the force -(k x + b v), (N, p), N, of the virtual spring along the motion of the low and the middle
         band; that of the high band is negligible. middle_response: (N, p), m/s², predicted acceleration of the middle
         band."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m

@@ -19,13 +19,13 @@ class Equalizer(Protocol):
         ...
 
     @property
-    def takes(self) -> str:
+    def reference_quantity(self) -> str:
         """Quantity of the reference signal that the two methods expect: "force" or "acceleration"."""
         ...
 
     def compute_loop_commands(self, reference: Signal) -> Signal:
-        """One loop (N, channels) of the command for one loop (N, channels) of the reference signal. Both loops are a
-        whole number of periods long and are repeated."""
+        """One loop (samples, channels) of the command for one loop (samples, channels) of the reference signal. Both
+        loops are a whole number of periods long and are repeated."""
         ...
 
     def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> Signal | None:
@@ -34,11 +34,11 @@ class Equalizer(Protocol):
         ...
 
 
-class Identity:
+class IdentityEqualizer:
     """No equalizer: the reference force is the commanded force. Implements `Equalizer`."""
 
     name = "none (commanded force)"
-    takes = "force"
+    reference_quantity = "force"
 
     def compute_loop_commands(self, reference: Signal) -> Signal:
         """The reference force itself. Raises ValueError for another quantity than force."""

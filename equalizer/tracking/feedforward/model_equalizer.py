@@ -2,7 +2,8 @@
 
 The loop of a repeated stimulus is inverted line by line in the frequency domain (`periodic_inverse`); its onset from
 rest is the solution of a finite-horizon linear-quadratic tracking problem (`lqr`) that ends in the state of the loop.
-`study.workflows.session.equalize_stimuli` uses it instead of `feedforward.equalizer.Identity` where a model is given.
+`study.workflows.session.equalize_stimuli` uses it instead of `feedforward.equalizer.IdentityEqualizer` where a model is
+given.
 """
 
 from dataclasses import dataclass
@@ -48,7 +49,7 @@ class ModelEqualizer:
         return f"identified model, order {self.model.order}, {low_hz:g} to {high_hz:g} Hz"
 
     @property
-    def takes(self) -> str:
+    def reference_quantity(self) -> str:
         """Quantity of the reference signal."""
         return "acceleration"
 

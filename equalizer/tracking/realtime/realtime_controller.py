@@ -39,8 +39,8 @@ surface; the duration is five time constants."""
 
 @dataclass(frozen=True, slots=True)
 class RealtimeSettings:
-    """Settings of both controllers. Raises TrackingError for a negative preview, and for a force limit that is not
-    above zero."""
+    """Settings of both controllers. Raises TrackingError for a preview that is negative, a force limit that is not
+    above zero, and either that is not finite."""
 
     weight: float = 1e-3
     """Weight of |force|² against |acceleration error|² in the quadratic cost, (m/s² per N)². Default as in

@@ -127,8 +127,8 @@ def find_band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tup
 
 def _find_start_values(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
     """Find natural frequency (Hz) and damping ratio of the model's poles in and near the band, (modes, 2), by rising
-    frequency. Neighbours that are nearer than half the larger of their bandwidths (damping ratio times frequency) are
-    merged, weighted by their modal gain."""
+    frequency. Neighbours whose distance is below the larger of their half bandwidths (damping ratio times natural
+    frequency) are merged, weighted by their modal gain."""
     poles, mode_shapes = np.linalg.eig(model.A)
     modal_inputs = np.linalg.solve(mode_shapes, model.B.astype(complex))
     modal_gain = np.linalg.norm(model.C @ mode_shapes, axis=0) * np.linalg.norm(modal_inputs, axis=1)

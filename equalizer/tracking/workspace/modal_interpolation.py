@@ -62,7 +62,7 @@ class ModalInterpolation:
         model, fit_error = _assemble_model(self, modes, remainder, np.linalg.norm(total_response, axis=(1, 2)))
         remarks = [weights.remark] if weights.remark else []
         if fit_error > REMARK_THRESHOLD:
-            remarks.append(f"the model between the given ones is {100 * fit_error:.1f} % off where it is worst")
+            remarks.append(f"the interpolated model has a fit error of up to {100 * fit_error:.1f} % of the response")
         placed_model = replace(model, place_m=place_m)
         return ModelsAtPlace(place_m, (placed_model,), (1.0,), tuple(remarks))
 

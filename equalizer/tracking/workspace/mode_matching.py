@@ -70,8 +70,7 @@ def match_modes(
         pair_text = f"{first_modes[i].natural_hz:.1f} Hz and {second_modes[j].natural_hz:.1f} Hz"
         if mac < LEAST_MAC:
             raise ModesDoNotMatchError(
-                f"the resonances at {pair_text} differ in shape (likeness {mac:.2f}); "
-                "identify places nearer to each other"
+                f"the resonances at {pair_text} differ in shape (MAC {mac:.2f}); identify places nearer to each other"
             )
         costs_without_pair = costs.copy()
         # Far more than leaving both modes without a partner: the assignment avoids this pair.

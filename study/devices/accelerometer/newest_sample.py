@@ -57,7 +57,8 @@ class NewestSample:
 
     def read_zeroed(self, now_s: float) -> tuple[FloatArray, bool]:
         """Read the newest acceleration less the reading at rest, (3,), m/s², NaN without a sample younger than
-        `MAX_AGE_S`; and whether a channel is at its limit. now_s: present time by `time.monotonic`."""
+        `MAX_AGE_S`; and whether it was marked as clipped, False without such a sample. now_s: present time by
+        `time.monotonic`."""
         row = self._copy_newest_row()
         if row is None or now_s - row[ARRIVAL_S] > MAX_AGE_S:
             return np.full(3, np.nan), False

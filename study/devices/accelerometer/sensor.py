@@ -60,10 +60,10 @@ class Accelerometer:
         sample arrives."""
         start_s = time.monotonic()
         time.sleep(seconds)
-        rest_counts = self._history.select_interval(start_s, time.monotonic()).raw
-        if not len(rest_counts):
+        raw_at_rest = self._history.select_interval(start_s, time.monotonic()).raw
+        if not len(raw_at_rest):
             raise make_silence_error(seconds, self.counts.spoiled_bytes)
-        self._rest_mps2 = self._calibration.to_acceleration(rest_counts.mean(axis=0))
+        self._rest_mps2 = self._calibration.to_acceleration(raw_at_rest.mean(axis=0))
         self._newest.set_rest(self._rest_mps2)
 
     @property
@@ -73,7 +73,8 @@ class Accelerometer:
 
     def read_latest(self) -> tuple[FloatArray, bool]:
         """Read the newest acceleration, (3,), m/s², less the reading at rest, NaN without a sample younger than
-        `newest_sample.MAX_AGE_S`; and whether a channel is at its limit. May be called from any thread."""
+        `newest_sample.MAX_AGE_S`; and whether a channel was at its limit in a sample that arrived with it. May be
+        called from any thread."""
         return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:

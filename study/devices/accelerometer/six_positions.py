@@ -38,7 +38,8 @@ def calibrate_in_six_positions(path: str, baud: int, await_position: AwaitPositi
     """Record all positions and return the [accelerometer] table, as TOML. path: port of the sensor, as in `sources`;
     baud: rate of a serial line (bit/s); rest_s: time per position (s), None = `REST_S`.
 
-    Raises `DeviceError` where no samples arrive, or the positions do not fit a linear sensor.
+    Raises `DeviceError` where the port cannot be opened, no samples arrive, or the positions do not fit a linear
+    sensor.
     """
     source = open_source(path, baud)
     try:

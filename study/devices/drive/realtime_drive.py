@@ -112,9 +112,9 @@ keep."""
 
 
 class RealtimeDrive:
-    """Drive of a device in real time. rate_hz: rate of the ticks. longest_gap_s: longest interruption of the loop (s)
-    after which it resumes. in_realtime_class: run the loop in the real-time scheduling class where the system allows
-    it, for a real device."""
+    """Drive of a device in real time. rate_hz: rate of the ticks. longest_gap_s: longest interruption (s) after which
+    the loop resumes; for a real rig at most `LATE_S`. in_realtime_class: run the loop in the real-time scheduling class
+    where the system allows it, for a real device."""
 
     def __init__(
         self,
@@ -259,7 +259,7 @@ class RealtimeDrive:
             self._attend_until_closed()
 
     def _attend_until_closed(self) -> None:
-        """Loop of the thread: run ticks while a stimulus is in progress, otherwise wait for work."""
+        """Loop of the thread: run ticks during a stimulus, else wait for work; at the end, switch the force off."""
         while not self._closing:
             try:
                 self._wake_event.wait()

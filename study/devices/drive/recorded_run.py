@@ -24,7 +24,7 @@ def make_stimulus_recording(
     governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None = None
 ) -> PlaybackResult:
     """Make the recording of a held stimulus: the end of its steady part, in whole loops; of a loop longer than the
-    ring, the content of the ring. The recording is None where fewer rows were recorded. own_clock_sensor: an
+    row buffer, the whole buffer. The recording is None where fewer rows were recorded. own_clock_sensor: an
     accelerometer with its own clock, if any."""
     rows, loop = governor.copy_rows(), governor.steady
     loop_row_count = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
@@ -53,8 +53,8 @@ def make_commands_recording(
 def _insert_acceleration(
     rows: FloatArray, governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None
 ) -> tuple[FloatArray, Health]:
-    """Insert the acceleration at the tick of each row, missed ticks included, and its counters. rows: the newest rows
-    of the governor."""
+    """Insert the acceleration at the tick of each row, missed ticks included, and its counters; without
+    `own_clock_sensor` the rows stay unchanged. rows: the newest rows of the governor."""
     due_times_s = governor.compute_row_times()
     due_times_s = due_times_s[len(due_times_s) - len(rows) :]
     sensor_data = (

@@ -90,15 +90,15 @@ def _examine_device(library: Library, model: DeviceModel, lab: LabSettings) -> l
     return findings
 
 
-def calibrate(name: str, patience_s: float) -> None:
-    """Calibrate the device: wait, for at most patience_s (s), until a person has moved the handle to its rest position.
+def calibrate(name: str, timeout_s: float) -> None:
+    """Calibrate the device: wait, for at most timeout_s (s), until a person has moved the handle to its rest position.
     name: a key of `MODELS`. Raises `DeviceError` where the device cannot be opened or is not calibrated in time."""
     handle = open_model(load_library(), MODELS[name])
     try:
-        handle.calibrate(patience_s)
+        handle.calibrate(timeout_s)
     except LibraryError as error:
         raise DeviceError(
-            "The device was not calibrated", f"Within {patience_s:g} s the library said: {error}.", CALIBRATION_ADVICE
+            "The device was not calibrated", f"Within {timeout_s:g} s the library said: {error}.", CALIBRATION_ADVICE
         ) from error
     finally:
         handle.disconnect()

@@ -65,12 +65,12 @@ class ForceReporting(Protocol):
     """A driver that reads the force that the device reports."""
 
     def given_n(self) -> float:
-        """Norm of the force that the device reports at this moment (N)."""
+        """Norm of the horizontal force (N) that the device reports at this moment."""
         ...
 
     def given_past_this_n(self, asked_n: float) -> float:
-        """Norm of the force (N) that the device reports when `asked_n` is commanded without the driver's own cap, so
-        that only the cap of the vendor's library acts."""
+        """Norm of the horizontal force (N) that the device reports when `asked_n` is commanded without the driver's own
+        cap, so that only the cap of the vendor's library acts."""
         ...
 
 
@@ -179,7 +179,7 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
 
 
 def _make_constant_force(rate_hz: float) -> HeldStimulus:
-    """A constant force of `TEST_FORCE_N` along x, towards the operator, repeated from a row of 0.05 s. rate_hz: sample
+    """A constant force of `TEST_FORCE_N` along x, towards the operator, a loop of 0.05 s. rate_hz: sample
     rate of the device (Hz)."""
     samples = np.tile([[TEST_FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")

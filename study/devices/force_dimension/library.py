@@ -68,14 +68,14 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 """Types of result and arguments of each required function. The device's ID (`char`) is the last argument; C has no
 default for it."""
 
-_THREE_ANGLES, _THREE_COUNTS = (_DOUBLE,) * 3, (c_int,) * 3
+_THREE_NUMBERS, _THREE_COUNTS = (_DOUBLE,) * 3, (c_int,) * 3
 
 LINKAGE_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdGetJointAngles": (c_int, (_DOUBLE_POINTER, _ID)),
-    "dhdDeltaPositionToEncoder": (c_int, (*_THREE_ANGLES, *(POINTER(c_int),) * 3, _ID)),
+    "dhdDeltaPositionToEncoder": (c_int, (*_THREE_NUMBERS, *(POINTER(c_int),) * 3, _ID)),
     "dhdDeltaEncoderToPosition": (c_int, (*_THREE_COUNTS, *_VECTOR_POINTERS)),
     "dhdDeltaEncodersToJointAngles": (c_int, (*_THREE_COUNTS, *_VECTOR_POINTERS)),
-    "dhdDeltaJointAnglesToJacobian": (c_int, (*_THREE_ANGLES, _DOUBLE_POINTER, _ID)),
+    "dhdDeltaJointAnglesToJacobian": (c_int, (*_THREE_NUMBERS, _DOUBLE_POINTER, _ID)),
     "dhdJointAnglesToInertiaMatrix": (c_int, (_DOUBLE_POINTER, _DOUBLE_POINTER, _ID)),
     "dhdJointAnglesToGravityJointTorques": (c_int, (_DOUBLE_POINTER, _DOUBLE_POINTER, c_ubyte, _ID)),
 }

@@ -25,12 +25,12 @@ from study.devices.governor.confine import is_bounded
 from study.devices.native import SYSTEM_SIZE, Addresses, allocate_16_words, call_int, read_word
 
 MISMATCH_COUNT, MISMATCH_SHARE = 5, 0.1
-"""Mismatches of reported and sent force that stop the device: MISMATCH_COUNT status checks beyond MISMATCH_SHARE of all
-checks (`count_beyond_share`), or MISMATCH_COUNT in a row after a zero force."""
+"""Mismatches of reported and sent force that stop the device: MISMATCH_COUNT status checks in a row, or the same excess
+over MISMATCH_SHARE of all checks (`count_beyond_share`); after zero forces MISMATCH_COUNT in a row."""
 
 MISMATCH_N, MISMATCH_RATIO = 0.2, 0.2
-"""Allowed difference of reported and sent force: in N, plus a share of the force sent. The acceptance test allows the
-same."""
+"""Allowed difference of reported and sent force: in N, plus a share of the force sent. The acceptance test accepts a
+report that is too small by the same share."""
 
 GAIN_WINDOW, MIN_WEIGHT = 200.0, 20.0
 """Exponential memory, in status checks, of the estimated gain of the reported force (2 s at 1 kHz), and the smallest
@@ -49,7 +49,7 @@ POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, GET_FORCE, CALLS_SIZE = range(
 VENDOR_CALLS = (
     "dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask", "dhdSetBrakes", "dhdEnableForce", "dhdGetForce"
 )  # fmt: skip
-"""Functions of the vendor's library that a tick calls, in the order of their places."""
+"""Functions of the vendor's library that a tick calls, in the order of their indices."""
 
 (
     DEVICE_NUMBER, CAP_N, DROPS_AFTER_S, READ_COUNT, REPEAT_COUNT, SCALED_COUNT, BUTTON_MASK, SENT_S, SENT_ZERO,
@@ -85,7 +85,7 @@ CELLS_SIZE = MISMATCHES_AT_REST + 1
 """Number of cells of the driver."""
 
 LIBRARY_ERROR = 1
-"""Error code of a failed call of the first function of LIBRARY; the codes of the others follow."""
+"""Error code of a failed call of the first function of VENDOR_CALLS; the codes of the others follow."""
 (
     STALE_READINGS,
     FORCES_OFF,
@@ -131,14 +131,14 @@ def count_beyond_share(count: float, occurred: bool, share: float) -> float:
 
 @njit_inline
 def _read_int(status: int, index: int) -> int:
-    """The 32-bit integer at index `place` of the status array at the address `status`; a 64-bit word contains two."""
+    """The 32-bit integer at this index of the status array at the address `status`; a 64-bit word contains two."""
     return int((read_word(status, index // 2) >> (32 * (index % 2))) & 0xFFFFFFFF)
 
 
 @njit_inline
 def check_force_on(calls: Addresses, cells: FloatArray) -> int:
     """Check whether the device's forces are switched on. Returns 0 if so, -1 if its watchdog has switched them off
-    after a zero force, else an error code; OFF_CAUSE then holds the cause."""
+    after a zero force, else an error code. OFF_CAUSE holds the cause where FORCES_OFF is the first failure."""
     status = allocate_16_words()
     if not is_success(call_int(calls[STATUS], (status, np.int32(cells[DEVICE_NUMBER])))):
         return record_library_failure(cells, STATUS)

@@ -68,7 +68,7 @@ STATUS_CYCLE_TICKS, STATUS_CHECK_TICKS = 42.0, (0.0, 8.0, 18.0, 29.0)
 faster than a person presses). Unevenly spaced, so that a periodic stimulus is not always sampled at the same phases."""
 
 MAX_STALE_READINGS, STALE_SHARE = 50, 0.5
-"""Limits on readings that only repeat an earlier one: this many in a row, or as many in excess of this share of all
+"""Limits on readings that only repeat an earlier one: this many in a row, or the same excess over this share of all
 readings (`count_beyond_share`), switch the force off. At 1 kHz half of the time after which a loop counts as lost."""
 
 MAX_SCALED_FORCES, SCALED_SHARE = 5, 0.02
@@ -225,8 +225,8 @@ def _write_zero(calls: Addresses, cells: FloatArray) -> int:
 
 @njit_inline
 def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
-    """Write a force (3,), N: a zero force always; another only within the cap, without a failure, and under the lock.
-    Nothing is written before the time WITHHELD_UNTIL_S."""
+    """Write a force (3,), N: a zero force always; another only within the cap, without a failure, and under the lock;
+    a force above the cap or NaN is refused, and a zero sent. Nothing is written before the time WITHHELD_UNTIL_S."""
     if read_clock_s(calls) < cells[WITHHELD_UNTIL_S]:
         return 0
     norm_n = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])

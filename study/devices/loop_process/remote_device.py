@@ -113,8 +113,8 @@ class RemoteDevice:
             self._call_remote(self._process.signs, "keep_alive")
 
     def fault(self) -> Fault:
-        """Fault of the device. Where the process is lost: STOPPED after an emergency stop, FORCE_LEFT if that was
-        reported before, else LOST. After `close`: the fault reported last."""
+        """Fault of the device. Where the process is lost: FORCE_LEFT if that was reported before, else STOPPED after an
+        emergency stop, else LOST. After `close`: the fault reported last."""
         try:
             fault: Fault = self._call_remote(self._process.signs, "fault")
         except DeviceError:

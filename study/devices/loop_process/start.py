@@ -64,8 +64,8 @@ class LoopProcess:
         self._process.kill()
 
     def end(self, timeout_s: float) -> str:
-        """Wait for timeout_s (s) until the process ends, else kill it. Returns how it ended, as a predicate for a
-        message."""
+        """Wait for timeout_s (s) until the process ends, else kill it. Returns how it ended, as the end of a
+        sentence for a message."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout_s)
         if self._process.returncode is None:

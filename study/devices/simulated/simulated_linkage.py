@@ -38,17 +38,17 @@ class SimulatedLinkage:
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
     def compute_reading_at(self, position_m: FloatArray) -> LinkageReading | None:
-        """Compute joint angles (rad), Jacobian (m/rad), inertia matrix (kg) and gravity force (N) at a position of the
-        handle (3,), m; None at or beyond the end stop."""
+        """Compute joint angles (rad), Jacobian (m/rad), inertia matrix (kg) and the force that balances gravity
+        (N) at a position of the handle (3,), m; None at or beyond the end stop."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
         angles, inverse_jacobian = _compute_pose(self._packed_parameters, position_m)
         moving_mass_kg = self._masses.handle_kg + self._masses.forearm_kg
         arm_inertia = self._packed_parameters[layout.ARM_INERTIA] + self._packed_parameters[layout.DRIVE_INERTIA]
         inertia = moving_mass_kg * np.eye(3) + arm_inertia * inverse_jacobian.T @ inverse_jacobian
-        gravity_force_n = np.array([0.0, 0.0, GRAVITY_MPS2 * moving_mass_kg])
+        balancing_force_n = np.array([0.0, 0.0, GRAVITY_MPS2 * moving_mass_kg])
         jacobian: FloatArray = np.asarray(np.linalg.inv(inverse_jacobian), dtype=np.float64)
-        return LinkageReading(np.array(position_m), angles, jacobian, inertia, gravity_force_n)
+        return LinkageReading(np.array(position_m), angles, jacobian, inertia, balancing_force_n)
 
     def compute_angles_at(self, position_m: FloatArray) -> FloatArray | None:
         """Compute the joint angles (3,), rad, at a position of the handle (3,), m; None at or beyond the end stop."""

@@ -2,8 +2,9 @@
 `study.evaluation.bank.ask_engine`.
 
 It gets only the folder of open cases. It reads a case name per line on standard input, writes answer.json into the
-case's folder, and prints the name when that is done. So that the test is blind, an audit hook stops the process from
-importing the code that made the cases, and from opening its files or any other file of the bank, such as the labels.
+case's folder, and prints the name when that is done. So that the test is blind, the process cannot import the code that
+made the cases, and an audit hook stops it from opening the files of that code or any other file of the bank, such as
+the labels (`isolate_process`).
 Other modules use only its hashes: `follow_up`, `write_proof` and `inject_real`.
 """
 
@@ -51,9 +52,9 @@ def main(arguments: list[str]) -> None:
 
 
 def isolate_process(open_folder: Path) -> None:
-    """Install an audit hook: from now on this process cannot import the challenge or open its files, open or list
-    anything in the parent folder of `open_folder` but `open_folder` itself, or start a program. The import then
-    raises ImportError, the rest PermissionError."""
+    """Block the import of the challenge, and install an audit hook: from now on this process cannot open the files of
+    the challenge, open or list anything in the parent folder of `open_folder` but `open_folder` itself, or start a
+    program. The import then raises ImportError, the rest PermissionError."""
     sys.modules[CHALLENGE_PACKAGE] = cast(ModuleType, None)
     bank_folder, real_open_folder = os.path.realpath(open_folder.parent), os.path.realpath(open_folder)
     challenge_folder = os.path.realpath(Path(study.__path__[0]).joinpath(*CHALLENGE_PACKAGE.split(".")[1:]))

@@ -149,7 +149,7 @@ def _write_case(
 
 def _read_follow_up(follow_up_bank: ProofFolder, undecided_case: Outcome, label: dict[str, Any]) -> FollowUp:
     """Read the effects that are returned after the proposed and after the random experiments; none for a failed
-    diagnosis. Raises StudyError for a broken seal."""
+    diagnosis, and where the label has no such case. Raises StudyError for a broken seal."""
 
     def read_words_and_effects(key: str) -> tuple[str, tuple[str, ...]]:
         """Read the description of the experiments of a follow-up case, and the effects returned after them."""

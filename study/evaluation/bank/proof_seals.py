@@ -82,12 +82,12 @@ def is_answer_to_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> b
 
 
 def make_broken_seal_error(names: list[str], path: Path) -> StudyError:
-    """Make the error for cases whose files differ from the sealed files. names: of the cases or labels; path: folder of
-    the bank."""
+    """Make the error for cases whose files differ from the sealed files, or for a malformed list of seals. names: of
+    the cases, labels or list; path: folder of the bank."""
     return StudyError(
         "A seal is broken",
-        f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
-        "was sealed before the diagnosis.",
+        f"Of {len(names)} sealed items ({', '.join(names[:5])}) in {path} the label, a file of the case or the list of "
+        "seals is not what was sealed before the diagnosis.",
         "Run the bank again in another folder; this one proves nothing.",
         saved="Nothing was changed.",
     )

@@ -62,7 +62,7 @@ def list_drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draw, write and seal the cases that have no label yet, calling `on_sealed(count)` with the number of sealed
     cases. Returns the SHA-256 of labels.sha256, to be published before anything is diagnosed. Raises StudyError where a
-    file cannot be written."""
+    file cannot be written or a sealed label has changed."""
     case_writers = {
         case_draw.number: partial(write_sealed_case, folder, case_draw) for case_draw in list_drawable_cases(plan)
     }

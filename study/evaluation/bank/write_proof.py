@@ -78,7 +78,7 @@ class CaseRow:
     after: float | None
     """The same with the named effects."""
     seconds: float | None
-    """Duration of the diagnosis, s."""
+    """Processor time of the diagnosis (s)."""
     miss: bool
     """Whether the case counts as a miss in the score."""
 

@@ -29,10 +29,10 @@ class Oscillators:
     direction: FloatArray
     """(k, 3), unit vectors"""
 
-    def with_oscillator(
+    def append_oscillator(
         self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
     ) -> "Oscillators":
-        """Append an oscillator to a copy. frequency_hz: with the handle fixed; direction: unit vector (3,)."""
+        """Return a copy with a further oscillator. frequency_hz: with the handle fixed; direction: unit vector (3,)."""
         return Oscillators(
             np.append(self.frequency_hz, frequency_hz),
             np.append(self.mass_kg, mass_kg),

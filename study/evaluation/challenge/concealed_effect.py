@@ -66,7 +66,7 @@ class ConcealedEffect:
     """Name in the vocabulary of effects; a decoy (an effect outside the vocabulary) has another name."""
     place: Place
     """Place at which it acts."""
-    of_axis: bool
+    is_single_axis: bool
     """Whether the effect acts on one axis; otherwise on all."""
     draw: Callable[[EffectContext], dict[str, float]]
     """Draws the parameters, by name: those of the vocabulary, and further parameters that `build` needs."""
@@ -74,24 +74,24 @@ class ConcealedEffect:
     """build(device, axis, values): a new device with the effect."""
 
 
-def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
-    """Set columns of the row `axis` in a copy of a table (3, columns). cells: value by column."""
+def replace_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> FloatArray:
+    """Replace columns of the row `axis` in a copy of a table (3, columns). cells: value by column."""
     new_table = table.copy()
     for column, value in cells.items():
         new_table[axis, column] = value
     return new_table
 
 
-def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:
-    """Set columns of the position- and velocity-dependent forces of one axis; returns a new device. cells: value by
+def replace_handle_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:
+    """Replace columns of the position- and velocity-dependent forces of one axis; returns a new device. cells: value by
     column of `handle_force_kernel`."""
-    return replace(device, forces=with_cells(device.forces, axis, cells))
+    return replace(device, forces=replace_cells(device.forces, axis, cells))
 
 
-def with_amplifier(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
-    """Set columns of the amplifier of one axis, or of all axes with axis None; returns a new device. cells: value by
-    column of `actuator_kernel`."""
+def replace_amplifier_cells(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
+    """Replace columns of the amplifier of one axis, or of all axes with axis None; returns a new device. cells: value
+    by column of `actuator_kernel`."""
     table = device.amplifiers
     for amplifier_axis in range(3) if axis is None else (axis,):
-        table = with_cells(table, amplifier_axis, cells)
+        table = replace_cells(table, amplifier_axis, cells)
     return replace(device, amplifiers=table)

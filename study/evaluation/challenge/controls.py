@@ -49,23 +49,23 @@ class Control:
 
 
 def _draw_control_case(seed: int, settings: CaseSettings) -> Case:
-    """A case with the effect `CONTROL_EFFECT` at strength `CONTROL_STRENGTH`."""
+    """Draw a case with the effect `CONTROL_EFFECT` at strength `CONTROL_STRENGTH`."""
     return draw_case(seed, (CONTROL_EFFECT,), "calibrated", CONTROL_STRENGTH, "a", settings)
 
 
 def _draw_intact_case(seed: int, settings: CaseSettings) -> Case:
-    """A case in which the model lacks nothing."""
+    """Draw a case in which the model lacks nothing."""
     return draw_case(seed, (), "calibrated", None, "a", settings)
 
 
 def _draw_intact_input(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """A case in which the model lacks nothing, unchanged."""
+    """Make an input from a case in which the model lacks nothing, unchanged."""
     case = _draw_intact_case(seed, settings)
     return (ControlInput(case.recording, case.model),)
 
 
 def _shuffle_samples(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """Response and position in a random order of the samples, the same for both; the command is unchanged."""
+    """Put the samples of response and position in a random order, the same for both; the command is unchanged."""
     case = _draw_control_case(seed, settings)
     sample_order = np.random.default_rng(seed).permutation(len(case.recording))
     return (
@@ -74,12 +74,12 @@ def _shuffle_samples(seed: int, settings: CaseSettings) -> tuple[ControlInput, .
 
 
 def _exchange_models(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """Recording of a device with the model of another device, whose stated tolerances are as tight."""
+    """Combine the recording of a device with the model of another device, whose stated tolerances are as tight."""
     return (ControlInput(_draw_control_case(seed, settings).recording, _draw_intact_case(seed + 1, settings).model),)
 
 
 def _draw_sensor_noise(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """A recording of sensor noise alone, with zero command and no position."""
+    """Draw a recording of sensor noise alone, with zero command and no position."""
     case, random = _draw_intact_case(seed, settings), np.random.default_rng(seed)
     shape = case.recording.response.samples.shape
     noise = np.array(NOISE_MPS2)[list(settings.axes)] * random.normal(size=shape)
@@ -94,8 +94,8 @@ def _draw_sensor_noise(seed: int, settings: CaseSettings) -> tuple[ControlInput,
 
 
 def _permute_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """Two axes, with the channels of command, response and position in reverse order, each with its name; no inputs
-    where the case has no position."""
+    """Make a case with two axes, and the same with the channels of command, response, position and model in reverse
+    order, each with its name; no inputs where the case has no position."""
     two_axis_settings = replace(settings, axes=(0, 1))
     case = _draw_control_case(seed, two_axis_settings)
     recording, model = case.recording, case.model
@@ -112,7 +112,8 @@ def _permute_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, 
 
 
 def _exchange_axes(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """The readings of two axes exchange their names, in command, response, position and model."""
+    """Make a case with two axes, and the same with the data of the axes exchanged under the same channel names, in
+    command, response, position and model."""
     two_axis_settings = replace(settings, axes=(0, 1))
     case = _draw_control_case(seed, two_axis_settings)
     exchanged = _map_samples(case.recording, lambda samples: samples[:, ::-1])
@@ -121,22 +122,22 @@ def _exchange_axes(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...
 
 
 def _mirror_signs(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """A recording with a constant force, and the same with command, response and position negated."""
+    """Make a recording with a constant force, and the same with command, response and position negated."""
     case = draw_case(seed, (MIRRORED_EFFECT,), "calibrated", CONTROL_STRENGTH, "a", settings)
     mirrored = _map_samples(case.recording, lambda samples: -samples)
     return ControlInput(case.recording, case.model), ControlInput(mirrored, case.model)
 
 
 def _add_irrelevant_hypotheses(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """The same input, first with all hypotheses about the sensor excluded, then with all hypotheses; the concealed
-    effect is not among those of the sensor."""
+    """Give the same case twice, first with all hypotheses about the sensor excluded, then with all hypotheses; the
+    concealed effect is not among those of the sensor."""
     case = _draw_control_case(seed, settings)
     sensor_effects = tuple(entry.name for entry in EFFECT_ENTRIES if entry.place == "sensor")
     return ControlInput(case.recording, case.model, sensor_effects), ControlInput(case.recording, case.model)
 
 
 def _rename_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """The same data under other names of device and channels."""
+    """Give the same data twice, the second time under other names of device and channels."""
     case = _draw_control_case(seed, settings)
     recording, channel_names = case.recording, tuple(f"q{number}" for number in range(len(settings.axes)))
     renamed = replace(
@@ -150,7 +151,7 @@ def _rename_channels(seed: int, settings: CaseSettings) -> tuple[ControlInput, .
 
 
 def _allow_wrong_effect_only(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """The diagnosis may consider the effect `WRONG_EFFECT` only, which is not the concealed effect."""
+    """Make an input for which the diagnosis may consider only `WRONG_EFFECT`, which is not the concealed effect."""
     case = _draw_control_case(seed, settings)
     return (
         ControlInput(
@@ -164,7 +165,8 @@ def _allow_wrong_effect_only(seed: int, settings: CaseSettings) -> tuple[Control
 def _map_samples(
     recording: Recording, transform: Callable[[FloatArray], FloatArray], command: bool = True
 ) -> Recording:
-    """The recording with `transform` applied to response and position, and to the command if `command` is True."""
+    """Return the recording with `transform` applied to response and position, and to the command if `command` is
+    True."""
     position = recording.position
     return replace(
         recording,
@@ -177,12 +179,12 @@ def _map_samples(
 
 
 def _replace_samples(signal: Signal, samples: FloatArray) -> Signal:
-    """The signal with other samples, (n, channels)."""
+    """Return the signal with other samples, (n, channels)."""
     return Signal(samples, signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels)
 
 
 def _reverse_channels(signal: Signal) -> Signal:
-    """The signal with the samples and the names of its channels in reverse order."""
+    """Return the signal with the samples and the names of its channels in reverse order."""
     return Signal(signal.samples[:, ::-1], signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels[::-1])
 
 

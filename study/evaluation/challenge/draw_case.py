@@ -20,7 +20,7 @@ from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectC
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
-from study.evaluation.challenge.nominal_models import as_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import convert_to_model, draw_calibration, retune
 from study.evaluation.challenge.nuisance_effects import add_nuisance_effects
 from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read_sensor
 
@@ -109,7 +109,7 @@ def draw_case(
     else:
         nominal, tolerance = retune(bench, response, plan, settings.axes)
     device_name = name or f"bench {seed}"
-    model = as_model(device_name, nominal, tolerance, settings.axes)
+    model = convert_to_model(device_name, nominal, tolerance, settings.axes)
     recording = make_recording(device_name, plan, response, position, settings)
 
     def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:  # `RecordAgain`
@@ -208,7 +208,7 @@ def make_truth(effect: ConcealedEffect, axis: int, values: dict[str, float]) -> 
     return Truth(
         effect.name,
         effect.place,
-        AXES[axis] if effect.of_axis else None,
+        AXES[axis] if effect.is_single_axis else None,
         {name: float(value) for name, value in values.items() if name in vocabulary_names},
         {name: float(value) for name, value in values.items() if name not in vocabulary_names},
     )

@@ -127,5 +127,7 @@ def sum_law_forces(
     velocities and drive forces, of which the first three elements (the handle's) are used. memory: memory states
     (laws,)."""
     total_n[:] = 0.0
-    for law in range(rows.shape[0]):
-        total_n[int(rows[law, AXIS])] += compute_law_force(rows[law], state[0], state[1], state[2], memory[law], t)
+    for index in range(rows.shape[0]):
+        total_n[int(rows[index, AXIS])] += compute_law_force(
+            rows[index], state[0], state[1], state[2], memory[index], t
+        )

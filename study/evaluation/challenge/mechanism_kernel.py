@@ -1,5 +1,6 @@
 """Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled). Called
-by `study.evaluation.challenge.device`; `laws.build_law`, `laws.draw_law` and `effects.hand` use the types.
+by `study.evaluation.challenge.device`; `laws.build_law` and `laws.draw_law` use `Motion`, `effects.hand` the columns
+of the modulation.
 
     M(q) d2q/dt2 = -C dq/dt - K q + (drive + friction + handle forces + coupling + creep + modulation + laws, 0)
 

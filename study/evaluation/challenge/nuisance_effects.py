@@ -40,7 +40,7 @@ def add_nuisance_effects(device: Device, factor: float, seed: int) -> Device:
     return device
 
 
-def _with_columns(table: FloatArray, column_values: dict[int, FloatArray | float]) -> FloatArray:
+def _replace_columns(table: FloatArray, column_values: dict[int, FloatArray | float]) -> FloatArray:
     """Copy a parameter table (3 axes, columns) with some columns replaced. column_values: new values by column, (3,) or
     a number for all axes."""
     new_table = table.copy()
@@ -55,7 +55,7 @@ def _add_dry_friction(device: Device, factor: float, random: np.random.Generator
     friction_n = factor * random.uniform(0.25e-4, 1e-4, 3)
     return replace(
         device,
-        friction=_with_columns(
+        friction=_replace_columns(
             device.friction, {BRISTLE_STIFFNESS: 3e5, LEVEL_POSITIVE: friction_n, LEVEL_NEGATIVE: friction_n}
         ),
     )
@@ -69,20 +69,20 @@ def _add_cogging(device: Device, factor: float, random: np.random.Generator) -> 
         COGGING_PITCH: random.uniform(7e-4, 3e-3, 3),
         COGGING_PHASE: random.uniform(0.0, 2 * np.pi, 3),
     }
-    return replace(device, forces=_with_columns(device.forces, dict(column_values)))
+    return replace(device, forces=_replace_columns(device.forces, dict(column_values)))
 
 
 def _add_cubic_stiffness(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set a cubic stiffness of up to 40 N/m³ of either sign per axis (hardening or softening)."""
     return replace(
-        device, forces=_with_columns(device.forces, {CUBIC_STIFFNESS: factor * random.uniform(-40.0, 40.0, 3)})
+        device, forces=_replace_columns(device.forces, {CUBIC_STIFFNESS: factor * random.uniform(-40.0, 40.0, 3)})
     )
 
 
 def _add_quadratic_damping(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set a quadratic damping of 0 to 0.004 N s²/m² per axis."""
     return replace(
-        device, forces=_with_columns(device.forces, {QUADRATIC_DAMPING: factor * random.uniform(0.0, 0.004, 3)})
+        device, forces=_replace_columns(device.forces, {QUADRATIC_DAMPING: factor * random.uniform(0.0, 0.004, 3)})
     )
 
 

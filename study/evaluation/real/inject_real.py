@@ -93,8 +93,8 @@ def seal_injections(
     if not injectable_recordings:
         raise StudyError(
             "There is nothing to inject faults into",
-            "None of the recordings was diagnosed by its motion, by a model that explains some of it.",
-            "Give recordings of open loops, or leave --inject out.",
+            "Every recording was refused; none was diagnosed.",
+            "Give recordings that can be diagnosed, or leave --inject out.",
             saved="The diagnoses are written.",
         )
     with finish_begun_cases(folder):

@@ -125,7 +125,8 @@ def _blank_lead(signal: Signal, lead_samples: int) -> Signal:
 def compute_held_out_change(intact: Recording, faultless: Recording, faulty: Recording) -> float | None:
     """Compute the visibility of a fault: ratio of the prediction error on the half with the fault to that on the same
     half without it, for a model fitted to the intact half; in the axis or channel where it differs most from 1, by its
-    logarithm. None where no model can be fitted. The limits 1e-300 and 1e-12 only avoid a division by zero and log(0).
+    logarithm. None where no model can be fitted, or a half has no part to compare. The limits 1e-300 and 1e-12 only
+    avoid a division by zero and log(0).
 
     The model is the baseline of a comparison: forces along the motion where they balance, otherwise an autoregression
     of each reading. It contains no faults.

@@ -75,17 +75,17 @@ class RealPlan:
     seconds: float | None = None
     """Processor time (s) for all recordings of a sub-folder together; None: evaluations are counted instead."""
     inject: int = 0
-    """Number of faults to inject into the diagnosed recordings; 0 = none."""
+    """Number of cases of the test with injected faults, about half of which have no fault (`inject_real`); 0 = none."""
     seed: int = 1
-    """Seed of the random draws of faults."""
+    """Seed of the random draws of these cases."""
 
 
 def diagnose_folder(
     plan: RealPlan, on_progress: Progress, clock: Clock | None = None, executor: Executor | None = None
 ) -> WrittenReal:
     """Diagnose all recordings of a folder, and write page and table. executor: its workers, which may share no disk,
-    diagnose; None: this process diagnoses, and injected faults on two processes. Resumable after UserInterruptError.
-    Raises StudyError; WrongUseError for an executor together with `plan.seconds`."""
+    diagnose; None: this process does, and two others diagnose the cases with injected faults. Resumable after
+    UserInterruptError. Raises StudyError; WrongUseError for an executor together with `plan.seconds`."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
             "--seconds counts this computer's processor time",
@@ -146,7 +146,7 @@ def _create_output_folder(out: Path) -> None:
 def _inject_faults(
     plan: RealPlan, real_folder: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
 ) -> tuple[InjectedOutcome, ...]:
-    """Inject `plan.inject` faults into diagnosed recordings and diagnose these; empty where it is 0."""
+    """Make `plan.inject` cases of diagnosed recordings and injected faults, and diagnose them; empty where it is 0."""
     if plan.inject == 0:
         return ()
     start_share = DIAGNOSIS_SHARE
@@ -240,7 +240,7 @@ def diagnose_sent_recording(folder: str, name: str, files: FileContents) -> File
                 "A recording did not come to its worker",
                 f"{folder}, {name}: it is not among the files that were sent. {reasons}".strip(),
                 "Look whether it is still in the folder, and run the same command again.",
-                saved="All answers so far.",
+                saved="All answers so far are kept.",
             )
         _diagnose_and_write(plan, real_recording, 0.0, lambda step, share: None, RealClock())
         return read_files(locate_answer_folder(plan.out, real_recording))

@@ -72,7 +72,7 @@ class InjectedRow:
 
 @dataclass(frozen=True, slots=True)
 class RealResults:
-    """Answers for a folder of real recordings, files that could not be used, and outcomes of injected faults."""
+    """Answers for a folder of real recordings, sub-folders that could not be used, and outcomes of injected faults."""
 
     answers: tuple[RealAnswer, ...]
     troubles: tuple[UnusableInput, ...]

@@ -47,7 +47,7 @@ class ReproducedModel:
     tested: HeldOutValidation | None
     """Test on the held-out part of the recording; None where there is none."""
 
-    def as_used_model(self, name: str) -> UsedModel:
+    def convert_to_used_model(self, name: str) -> UsedModel:
         """Convert to the summary for the report. name: of its recording; underscores become blanks."""
         quality = self.model.quality
         assert quality is not None, "every model that is kept or made here has one"
@@ -203,7 +203,7 @@ def _collect_results(
         frequency_response = estimate_transfer((use_excitation_as_command(centre_recording),))
     except (TransferEstimateError, ValueError) as problem:
         raise StudyError(
-            "The recordings do not carry the figures",
+            "The recordings do not suffice for the figures",
             f"{problem}.",
             "Take other recording protocols, or another folder with --out.",
             saved=f"Sessions, recordings and models are in {plan.output_folder}.",
@@ -215,7 +215,7 @@ def _collect_results(
         device_name=centre_recording.device,
         equalized_playback=play_equalized(plan, models, steps.make_callback("playing")),
         baselines=play_baselines(plan, models, frequency_response, steps.make_callback("baselines")),
-        models=tuple(reproduced.as_used_model(name) for name, reproduced in identified_models.items()),
+        models=tuple(reproduced.convert_to_used_model(name) for name, reproduced in identified_models.items()),
         held_out_test=identified_models[CENTRE_NAME].tested,
         frictionless_test=identified_models[FRICTIONLESS_NAME].tested,
         remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),

@@ -28,7 +28,7 @@ class ReproductionResults:
     equalized_playback: EqualizedPlayback
     """Playback with the equalizer (figure 5)."""
     baselines: tuple[PlayedResponse, ...]
-    """Playback by other methods, for comparison."""
+    """Playback by the baseline methods, and by the equalizers designed for the edge and the hand."""
     models: tuple[UsedModel, ...]
     """Models that the equalizer used."""
     held_out_test: HeldOutValidation | None

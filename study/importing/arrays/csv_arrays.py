@@ -58,11 +58,11 @@ class Table:
 def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
     """Read the columns of a table file. Raises CannotReadError; ValueError with line and column of a problem."""
     source = read_text(path, settings.encoding)
-    table = read_lines(_split_lines(source.text, settings), settings)
+    table = parse_lines(_split_lines(source.text, settings), settings)
     return replace(table, notes=(*table.notes, *filter(None, (source.note,))))
 
 
-def read_lines(lines: list[Line], settings: CsvMap) -> Table:
+def parse_lines(lines: list[Line], settings: CsvMap) -> Table:
     """Read columns from the non-empty lines of a table. Raises ValueError with line and column of a problem."""
     layout = find_layout(lines, settings)
     if not layout.body:
@@ -73,7 +73,7 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
         raise ValueError(f"its header names '{repeated[0]}' twice; give the columns names of their own in [csv] names")
     body = list(layout.body)
     _require_equal_rows(body, layout)
-    comments = _find_comments(lines, layout)
+    comments = _describe_comments(lines, layout)
     body_text = "\n".join(line for _, line in body)
     text_names = {name for index, name in enumerate(layout.names) if index in layout.texts}
     first_fields = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
@@ -212,8 +212,8 @@ def _join_header(lines: list[Line]) -> list[Line]:
     return [*header, *lines[first_index:]] if is_closed and len(header) < first_index else lines
 
 
-def _find_comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
-    """Make the remark on comments below the first row. Raises ValueError for a comment with the fields of a row."""
+def _describe_comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
+    """Describe comments below the first row in a remark. Raises ValueError for a comment with the fields of a row."""
     start, width = layout.body[0][0], len(layout.names)
     header_end = max((number for number, line in lines if number < start and not is_comment(line)), default=start)
     comments = [line for line in lines if line[0] > header_end and is_comment(line[1])]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from study.importing.arrays.csv_arrays import FaultyColumn, Table, read_lines
+from study.importing.arrays.csv_arrays import FaultyColumn, Table, parse_lines
 from study.importing.arrays.table_cells import Line, has_number, is_comment
 from study.importing.map_format.import_map import CsvMap
 from study.regular_file import read_regular
@@ -192,7 +192,7 @@ def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: 
     decimal = settings.decimal or ("." if has_fraction else "")
     sheet_hint = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
     try:
-        table = read_lines(
+        table = parse_lines(
             [_make_line(number, cells, width, (percent_columns, decimal or ".")) for number, cells in rows],
             replace(settings, delimiter=_DELIMITER, decimal=decimal),
         )

@@ -60,7 +60,7 @@ class Namespace:
         ImportProblemError otherwise."""
         value = self.compute_value(expression, NoTime())
         if np.size(value) != 1 or not np.isfinite(value).all():
-            raise ImportProblemError(f"'{expression}' has the shape {np.shape(value)}; it must be one number")
+            raise ImportProblemError(f"'{expression}' has the shape {np.shape(value)}; it must be one finite number")
         return float(np.ravel(value)[0])
 
     def look_up_value(self, name: str, clock: Clock) -> Value:

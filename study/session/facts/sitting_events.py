@@ -40,7 +40,7 @@ class DoseElsewhere:
     vibrated_s: Seconds
     unmeasured_s: Seconds
     still_s: Seconds
-    """Time since the handle last moved in any of these sessions (s)."""
+    """Time since the handle last moved in any of these sessions (s); 0 without any."""
     unread: tuple[str, ...] = ()
     """Names of sessions that could not be read and are not included."""
 
@@ -71,8 +71,8 @@ class PlaceTaken:
 
     utc: UtcTime
     participant_number: Count
-    """Number of participants of this protocol who took their places before; it replaces the number in the opening line
-    of the log."""
+    """Participant number, from 0: that of the participant's earlier sessions of this protocol, else the number after
+    the largest taken one. It replaces the number in the opening line of the log."""
     monotonic_s: Seconds | None = None
     event: Literal["place_taken"] = "place_taken"
 
@@ -110,7 +110,7 @@ class DemoPlayed:
 @dataclass(frozen=True, config=FACT_CONFIG)
 class OnsetPulsed:
     """A trigger pulse on an output line of the laboratory, at the onset of the trial's force. It is logged after the
-    trial because writing to the disk must not delay the trial."""
+    answer, because writing to the disk would delay the question."""
 
     utc: UtcTime
     run: Index
@@ -156,7 +156,8 @@ class ProbeMeasured:
     sha256: Sha256 | None = None
     """SHA-256 of the recording; None without a recording."""
     rms_mps2: Magnitude | None = None
-    """Root mean square of the norm of the measured acceleration (m/s²); None without a recording."""
+    """Root mean square of the norm of the measured acceleration (m/s²); None without a recording, or where
+    samples of it are missing."""
     apparent_mass_kg: Magnitude | None = None
     """Apparent mass (kg): median of the real part of force over acceleration at the upper lines of the multisine. A
     hand on the handle increases it. None where it could not be estimated."""

@@ -1,7 +1,7 @@
 """Reasons for which a trial is void or remarked on: the texts that are logged and shown, and sentences made of them.
 
-Most of these trials are void because the computer was too busy, which delays the 1 kHz control loop or the screen; they
-are repeated. `is_computer_busy` recognises this cause by the text of the logged reason; therefore the texts must not
+A computer that is too busy delays the 1 kHz control loop or the screen; trials that are void for this reason are
+repeated. `is_computer_busy` recognises this cause by the text of the logged reason; therefore the texts must not
 change. Used where trials are judged (`judge_trial`, `present_trial`, `timing_verdict`), where void trials are counted
 (`fold_trial`, `session_facts`), where a sitting ends (`run_session`, `end_sitting`), by the safety layer of a device,
 by the screens and by the alarms of `hapteq watch`.
@@ -66,8 +66,8 @@ def explain_many_voids(reasons: tuple[str, ...]) -> str:
 
 
 def describe_busy_voids(void_count: int) -> str:
-    """Return a summary for the experimenter at the end of a sitting. voids: number of trials that were void because of
-    a busy computer."""
+    """Return a summary for the experimenter at the end of a sitting. void_count: number of trials that were void
+    because of a busy computer."""
     phrase = "1 trial was" if void_count == 1 else f"{void_count} trials were"
     return (
         f"The computer was too busy: {phrase} void because of it in this sitting and repeated. Close other programs; "

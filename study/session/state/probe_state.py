@@ -38,7 +38,8 @@ class ProbeState:
     open: ProbePlayed | None = None
     """The probe whose measurement is not in the log: it is playing, or the program ended while it played."""
     since_probe_s: float | None = None
-    """Time (s) since the last probe with a hand in this sitting; None before the first, and after a long pause."""
+    """Time (s) since the last probe with a hand in this sitting, or since the end of a shorter pause after it; None
+    before the first, and after a long pause."""
     is_reference_done: bool = False
     """Whether the reference that is due once in this sitting, and again after a long pause, was declined or begun; it
     begins with the test whether the handle is free."""

@@ -26,7 +26,7 @@ hand."""
 
 def estimate_progress(state: SessionState) -> Progress:
     """Estimate the fraction of the session's trials that are done, 0 to 1, and the minutes left, from the most recent
-    answers; later rests are included in the minutes."""
+    answers: with later rests between runs, without those within a run; None while there are too few answers."""
     expected_trials = [_estimate_run_trials(state, run) for run in state.runs]
     done_trials = sum(expected_trials[: state.run])
     if not state.finished:

@@ -57,7 +57,8 @@ class SittingState:
     answers_before: int = 0
     """Number of answers given in earlier sittings."""
     still_s: float | None = None
-    """Seconds since the handle last moved, in any sitting; None before."""
+    """Seconds since the handle last moved, in any sitting of this session or in the sessions of `other_sessions_dose`;
+    None before."""
     dose: Dose = NO_DOSE
     """Dose of this session since the last rest of `DAILY_REST_H` or more."""
     other_sessions_dose: Dose = NO_DOSE

@@ -66,7 +66,7 @@ def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, 
     for a negative duration and, with a known amplitude, for a frequency that is not above 0.
     """
     if duration_s < 0:
-        raise ValueError(f"seconds is {duration_s:g}; a vibration lasts 0 s or longer")
+        raise ValueError(f"duration_s is {duration_s:g}; a vibration lasts 0 s or longer")
     extended_dose = replace(dose, vibrated_s=dose.vibrated_s + duration_s)
     if amplitude_mps2 is None:
         return replace(extended_dose, unmeasured_s=dose.unmeasured_s + duration_s)

@@ -78,11 +78,11 @@ def make_held_stimulus(
     the direction."""
     loop_sample_count = count_loop_samples(frequency_hz, sample_rate_hz)
     phase_rad = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(loop_sample_count)
-    is_force = equalizer.takes == "force"
+    is_force = equalizer.reference_quantity == "force"
     target_signal = Signal(
         samples=amplitude * np.sin(phase_rad)[:, None] * unit_vector,
         sample_rate_hz=sample_rate_hz,
-        quantity=equalizer.takes,
+        quantity=equalizer.reference_quantity,
         unit="N" if is_force else "m/s^2",
         channels=("fx", "fy", "fz") if is_force else ("ax", "ay", "az"),
     )

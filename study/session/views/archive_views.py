@@ -37,7 +37,8 @@ class SessionLine:
     observer: str | None
     """Name of the simulated participant; None for a person."""
     answers: int
-    """Number of answers in the log; 0, like the next two numbers, for a withdrawn or unreadable session."""
+    """Number of answers in the log; 0, like the next two numbers, for a withdrawn session and for one of which no
+    number can be read."""
     runs_done: int
     """Number of completed runs."""
     runs: int
@@ -55,6 +56,7 @@ class ProtocolLine:
     name: str
     """Name or path, as `--protocol` takes it."""
     title: str
+    """Title, or why the protocol cannot be used."""
     locked: bool
     """Whether the protocol is locked against changes."""
     equalized: bool = False
@@ -75,10 +77,11 @@ class HomeView:
     models: tuple[str, ...] = ()
     """Paths of files of identified models."""
     qualities: tuple[tuple[str, str], ...] = ()
-    """(path of a model file, its held-out error in words)."""
+    """(path of a model file, its quality in words: held-out error, or misfit of an untested model, or why the file
+    cannot be used)."""
 
     def describe_quality(self, model: str) -> str:
-        """Describe the held-out error of the model in this file; empty where it is not known."""
+        """Describe the quality of the model in this file, as in `qualities`; empty for a file that is not listed."""
         return dict(self.qualities).get(model, "")
 
 
@@ -105,7 +108,8 @@ class SessionView:
 
     line: SessionLine
     facts: tuple[tuple[str, str], ...]
-    """(label, value): participant, protocol, device, seed, dates."""
+    """(label, value): participant, protocol, device, seed, dates; only participant and folder of a withdrawn or
+    unreadable session."""
     thresholds: tuple[tuple[str, ...], ...]
     """Rows of text, the first one the header; empty without a complete run."""
     warnings: tuple[str, ...]
@@ -128,20 +132,22 @@ class DiagnosisView:
     verdict: str
     """Result in one sentence."""
     sentences: tuple[str, ...]
-    """One per named effect, with parameters and intervals."""
+    """For each named effect: its parameters with intervals, and the effects that the data cannot distinguish from
+    it."""
     rivals: tuple[str, ...]
-    """Effects that explain the recordings as well, one sentence each."""
+    """Effects that were considered and rejected, with probability and reason, one sentence each."""
     mismatch: tuple[tuple[str, ...], ...]
-    """Differences of model and recording, as rows of text, the first one the header."""
+    """Differences of model and recording, as rows of text, the first one the header; empty without any."""
     fit: tuple[tuple[str, ...], ...]
-    """Errors of the given model, of the re-tuned model, and of the model with the effects, as rows like `mismatch`."""
+    """Errors of the given model, of the re-tuned model, and of the model with the effects, and the noise between
+    repeats, as rows like `mismatch`."""
     remainder: tuple[tuple[str, ...], ...]
     """Errors above the noise that the effects do not explain, as rows like `mismatch`."""
     next_experiment: str
-    """Recommended next recording, in words."""
+    """Recommended next recording, in words; empty without a recommendation."""
     report: str = ""
     """Path of the report.html in the same folder; empty where there is none."""
     notes: tuple[str, ...] = ()
     """Remarks, such as how errors were measured and what was re-tuned."""
     candidates: tuple[str, ...] = ()
-    """Effects that were not confirmed, the best first, except those that the verdict states."""
+    """The best few effects that were not confirmed, the best first, except one that the verdict states."""

@@ -45,9 +45,9 @@ class Welcome:
     """Title of the study."""
     picture: DirectionPicture
     runs: int
-    """Number of runs in the session."""
+    """Number of runs in the session, without those of training."""
     training_runs: int
-    """Number of these runs that are training."""
+    """Number of training runs."""
     device: str
     """Name of the device."""
     device_moves: bool
@@ -97,7 +97,8 @@ class PlayingNotice:
     """Notice while a stimulus, or an interval without stimulus, of fixed duration is played; no answer is taken."""
 
     title: str
-    """Title of the interval or direction, such as "Direction 1" or "Interval 2"."""
+    """Title of the interval, direction or probe, such as "Direction 1" or "Interval 2"; empty in the gap between two
+    intervals."""
     number: int
     """Direction or interval that is highlighted, 1 or 2; 0: none."""
     seconds: float

@@ -1,7 +1,8 @@
 """State of a session that an experimenter follows from another terminal.
 
-The state is computed from the log event by event, as in the running session (`study.session.state.fold`); events that
-do not affect it (notes, forms, remarks on trials, probes, end of the sitting) are kept in addition. `watch_session`
+The state is computed from the log event by event, as in the running session (`study.session.state.fold`). What the
+state does not keep of them is kept in addition: notes, forms with their times, remarks on trials, recordings of probes,
+and why the sitting ended. `watch_session`
 (for `hapteq watch`) and `session_references` apply the events; `make_watch_view`, `followed_trials` and `watch_alarms`
 read the result.
 """

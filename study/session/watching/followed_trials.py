@@ -47,8 +47,8 @@ def _is_open(state: SessionState, trial: Trial) -> bool:
 
 
 def find_next_level_n(state: SessionState, shown_run: int | None) -> float | None:
-    """Find the level of the next trial (N); None if the shown run is not the current one, or the session is
-    finished."""
+    """Find the level of the staircase at the next trial (N), before roving and without catch trials; in a practice run
+    the level that is drawn for it. None if the shown run is not the current one, or the session is finished."""
     if state.finished or shown_run != state.run:
         return None
     run = state.runs[state.run]

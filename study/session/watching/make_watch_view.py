@@ -166,8 +166,8 @@ def _describe_activity(
 def _compute_exposure(
     session: FollowedSession, live_state: LiveState | None, status: SittingStatus, now_utc: str
 ) -> Exposure:
-    """Compute the duration of the sitting and the daily vibration dose, with their limits: at `now_utc` while the
-    session runs, otherwise at the last entry of the log."""
+    """Compute the duration of the sitting and the daily vibration dose, with their limits: at present
+    (`_advance_to_now`) while the session runs, otherwise at the last entry of the log."""
     state, limits = session.state, session.state.protocol.limits
     sitting = _advance_to_now(state.sitting, live_state, now_utc) if status in RUNNING_STATUSES else state.sitting
     return Exposure(

@@ -81,9 +81,9 @@ class Situation:
 
 
 def find_alarms(situation: Situation, previous_alarms: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
-    """Evaluate all checks. Returns the current alarms, most urgent first; an alarm that was among `previous_alarms`
-    keeps its start time. The end of a sitting is reported for `END_REPORTED_S`, and permanently to a viewer who saw
-    it."""
+    """Evaluate all checks. Returns the current alarms, most urgent first; a lasting alarm that was among
+    `previous_alarms` keeps its start time. The end of a sitting is reported for `END_REPORTED_S`, and permanently to a
+    viewer who saw it."""
     previous_by_kind = {alarm.kind: alarm for alarm in previous_alarms}
     checks = _RUNNING_CHECKS if situation.standing in RUNNING_STATUSES else _ENDED_CHECKS
     current_alarms = [alarm for check in checks if (alarm := check(situation)) is not None]

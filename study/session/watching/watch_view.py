@@ -1,10 +1,9 @@
 """Data classes of the view that an experimenter has of a running session; field names are the keys of its JSON form.
 
-The view contains no seed, and the direction of a trial only after the answer, because an experimenter who knows the
-direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a screen
-adds 1. `make_watch_view` makes the view; screens, text lines and `hapteq watch --json` show it. Levels are stimulus
-amplitudes, stated as force (N). The values are plain, so that the module imports quickly.
-"""
+The view contains no seed, and the direction of a trial only once its answer counts, because an experimenter who knows
+the direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a
+screen adds 1. `make_watch_view` makes the view; screens, text lines and `hapteq watch --json` show it. Levels are
+stimulus amplitudes, stated as force (N). The values are plain, so that the module imports quickly."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -220,9 +219,10 @@ class WatchView:
     shown_run: int | None
     """Index of the run that `points` belong to, see `followed_trials.find_shown_run`."""
     points: tuple[StaircasePoint, ...]
-    """Counted trials of `shown_run`, in order."""
+    """Counted trials of `shown_run` without catch trials, in order."""
     next_level_n: float | None
-    """Next level (N) of the staircase in `shown_run`, after the last point; None where the run is over."""
+    """Next level (N) in `shown_run`, after the last point, as `followed_trials.find_next_level_n` gives it; None where
+    the run is over."""
     cap_n: float
     """Highest level of the staircase (N)."""
     open_trial: OpenTrial | None

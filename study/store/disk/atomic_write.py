@@ -15,7 +15,8 @@ from study.store.disk.privacy import choose_file_mode
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
     """Write `content` to a temporary file in the same folder, sync it, and move it to `path`; its mode is
     `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyExistsError if the file exists and is
-    not to be replaced, CannotWriteError for any error of the operating system; the temporary file is then removed."""
+    not to be replaced, CannotWriteError for any error of the operating system, also where the file is in place and only
+    the sync of the folder failed; the temporary file is then removed."""
     temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not overwrite:

@@ -47,8 +47,9 @@ def format_csv_table(rows: Iterable[Row], row_type: type[Row]) -> str:
 
 def parse_csv_table(text: str, row_type: type[Row]) -> tuple[Row, ...]:
     """Parse CSV text with a header into rows. Unknown columns after the known ones are ignored, no column may occur
-    twice, and trailing columns with a default may be missing. Raises CsvError with the problem of the header, or with
-    the first `_LISTED_PROBLEM_LIMIT` problems of the fields and the number of the others."""
+    twice, and trailing columns with a default may be missing. Raises CsvError for text that is not CSV, with the
+    problem of the header, or with the first `_LISTED_PROBLEM_LIMIT` problems of the rows and the number of the
+    others."""
     try:
         csv_rows = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:

@@ -35,8 +35,8 @@ read."""
 class UnusableFileError(StudyError):
     """A file was read, and its content is invalid.
 
-    kind: expected kind of the file, for the title; `problems`: a clause for each problem, without a full stop;
-    `sentences`: the same as sentences; do_now: remedy.
+    kind: expected kind of the file, for the title; `problems`: a clause for each problem, without a full stop, cut in
+    number and length by `_shorten_problems`; `sentences`: the same as sentences; do_now: remedy.
     """
 
     def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = VALIDATE_ADVICE) -> None:
@@ -51,7 +51,7 @@ class UnusableFileError(StudyError):
 
 
 class CannotReadError(StudyError):
-    """A file is missing or cannot be opened."""
+    """A file is missing, cannot be opened or read, or is no text in UTF-8 where text is expected."""
 
     def __init__(self, path: Path, problem: OSError | UnicodeDecodeError) -> None:
         super().__init__(

@@ -28,7 +28,7 @@ KIND = "table of exported trials"
 
 
 def is_tidy_csv(folder: Path) -> bool:
-    """Whether the folder contains the four files of `write_tidy_csv` that do not depend on the protocol."""
+    """Whether the folder contains the four files that `write_tidy_csv` writes in every export."""
     return all((folder / name).is_file() for name in (TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME))
 
 

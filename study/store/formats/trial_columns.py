@@ -11,8 +11,12 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "trial": ("Number of the trial within the run, from 0", ""),
     "attempt": ("Number of the presentation of this trial, from 0; above 0 where the earlier ones were void", ""),
     "phase": ("Part of the session: training, test, detection, or catch trials within the test", ""),
-    "frequency_hz": ("Frequency of the sinusoidal force", "Hz"),
-    "level_n": ("Commanded amplitude of the force, which is the level of the staircase unless levels are roved", "N"),
+    "frequency_hz": ("Frequency of the sinusoidal stimulus", "Hz"),
+    "level_n": (
+        "Level of the stimulus: commanded amplitude of the force or, where stimuli are equalized, the larger of the "
+        "forces that the directions need for wanted_mps2; it is the level of the staircase unless levels are roved",
+        "N",
+    ),
     "direction_shown": (
         "Number on the screen, 1 or 2, of the direction that was played, which is the right answer; in a detection "
         "trial, of the interval. Where a protocol exchanges the numbers for half of the participants, angle_deg "

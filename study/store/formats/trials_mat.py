@@ -32,10 +32,10 @@ def write_trials_mat(
     provenance: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write `trials.mat` into the folder and return a tuple with its path. Numbers and booleans become column vectors
-    of double (NaN for a missing value), text becomes cell arrays. name: of the study; protocol_text: its file;
-    provenance: JSON values. Raises AlreadyExistsError for an existing file, CannotWriteError where it cannot be
-    written."""
+    """Write `trials.mat` into the folder and return a tuple with its path. Numbers, booleans and columns without any
+    value become column vectors of double (NaN for a missing value), text becomes cell arrays. name: of the study;
+    protocol_text: its file; provenance: JSON values. Raises AlreadyExistsError for an existing file, CannotWriteError
+    where it cannot be written."""
     from scipy.io import savemat
 
     buffer = io.BytesIO()

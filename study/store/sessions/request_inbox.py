@@ -53,7 +53,7 @@ class RequestInbox:
     def __init__(self, session_folder: Path) -> None:
         self._folder = session_folder / REQUESTS_NAME
         self._ignored_names: set[str] = set()
-        """Names of files that could be neither used nor removed: they are examined once, not twenty times a second."""
+        """Names of files that could not be removed or renamed: they are read once, not twenty times a second."""
 
     def send(self, request: Request) -> str:
         """Write a request. Returns its name, for `is_unread` and `take_back`. Raises StudyError if it cannot be
@@ -91,8 +91,8 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """Remove all files but notes, such as old requests to stop or pause, at the start of a sitting. Notes are kept
-        for the log. Never raises."""
+        """Remove all files but notes, such as old requests to stop or pause and unusable requests, at the start of a
+        sitting. Notes are kept for the log. Never raises."""
         try:
             self._make_folder()
             names = os.listdir(self._folder)  # noqa: PTH208

@@ -1,4 +1,5 @@
-"""Entries of the command palette: all actions of the current screen, each with its key and its equivalent command line.
+"""Entries of the command palette: the actions of the current screen, each with its key and, where there is one, the
+equivalent command line.
 
 Users find an action by its name, and learn the shell command that does the same. Called by `app` when Textual opens the
 palette.
@@ -34,7 +35,8 @@ EQUIVALENT_COMMAND_LINES = {
     "note(True)": "hapteq note --adverse SESSION TEXT",
     "quit": "Ctrl-C in line mode",
 }
-"""Equivalent shell command of an action, by the name of the action in its key binding."""
+"""Equivalent of an action outside the screen, by the name of the action in its key binding: a shell command, or the key
+of line mode."""
 
 TITLES = {
     "let_go": "Take the force off and leave",

@@ -36,8 +36,8 @@ class EngineConnection:
         self._app = app
         self._engine = EngineClient(self._deliver)
         self.last_end: Finished | Failed | None = None
-        """How the last sitting ended; None after the start of the next. Stored here, because an end that comes while
-        the application closes is no longer handled as an event."""
+        """The last message of the engine on the end of a sitting or on a failure; None after the start of a sitting.
+        Stored here, because an end that comes while the application closes is no longer handled as an event."""
 
     @property
     def pid(self) -> int | None:

@@ -1,9 +1,8 @@
 """Commands of the screen, as the engine performs them one after another.
 
-They are: lists and views of sessions and diagnoses, whole sittings, analyses, withdrawals, and the calibration of the
-accelerometer. Results and progress are sent to the screen as messages of `from_engine`. `study.tui.engine.engine`
-calls `EngineCommands.perform`.
-"""
+They are: lists and views of sessions and diagnoses, whole sittings, analyses, diagnoses, withdrawals, the calibration
+of the accelerometer, and requests to sessions of other programs. Results and progress are sent to the screen as
+messages of `from_engine`. `study.tui.engine.engine` calls `EngineCommands.perform`."""
 
 import contextlib
 import itertools
@@ -149,8 +148,8 @@ class EngineCommands:
     def _conduct_sitting(
         self, words: Words, device_name: str, conduct: Callable[[Participant], ConductedSitting]
     ) -> None:
-        """Conduct a sitting, write its results and send them. words: texts of the protocol's language; device_name: as
-        `open_device` takes it."""
+        """Conduct a sitting, write its results and send them. Raises StudyError, as `end_sitting` does, where the
+        session is not finished. words: texts of the protocol's language; device_name: as `open_device` takes it."""
         self._link.send(ParticipantWords(words))
         self._link.send(PreparationStarted(words["preparing_device"]))
         with self._open_participant(device_name) as participant:

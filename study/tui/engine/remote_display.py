@@ -67,7 +67,8 @@ class RemoteDisplay:
         self._get_load = get_load
         self._request_number = 0
         self._wake_delay_s = 0.0
-        """Longest delay (s) of this process's own wake-ups since the last request was shown."""
+        """Longest delay (s) of this process's own wake-ups since the last request was shown, or since the wait for the
+        handle began."""
 
     def fill_in(self, form: Form) -> FormReply:
         reply: FormReply = self._ask_screen(DisplayCall.FILL_IN, form)
@@ -214,7 +215,7 @@ class RemoteDisplay:
         return reply if reply is not None and reply.number == request_number else None
 
     def _is_screen_silent(self) -> bool:
-        """Whether the screen's last heartbeat is older than `HEARTBEAT_TIMEOUT_S`."""
+        """Whether the screen's last message, usually a heartbeat, is older than `HEARTBEAT_TIMEOUT_S`."""
         return self._link.compute_silence_s() > HEARTBEAT_TIMEOUT_S
 
     def _close_request(self, request_number: int, reason: Unanswered) -> Unanswered:

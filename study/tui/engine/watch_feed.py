@@ -74,9 +74,10 @@ class WatchFeed:
 
 
 def feed(descriptor: int, session_path: str) -> None:
-    """Send a view of the session every `LOG_POLL_INTERVAL_S`, or the problem if the log cannot be read, until the pipe
-    is closed: main function of the child process. descriptor: file descriptor of its end of the pipe. The imports are
-    inside the function, because the screen's process, which imports this module too, must not load them."""
+    """Send a view of the session every `LOG_POLL_INTERVAL_S`, nothing while its log has no complete line, or the
+    problem if the log cannot be read, until the pipe is closed: main function of the child process. descriptor: file
+    descriptor of its end of the pipe. The imports are inside the function, because the screen's process, which imports
+    this module too, must not load them."""
     from pathlib import Path
 
     from study.devices.clock import RealClock

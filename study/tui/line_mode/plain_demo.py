@@ -61,7 +61,8 @@ def choose_demo(menu: DemoMenu, conversation: Conversation, keys: AnswerKeys, si
 
 def show_playing(notice: PlayingNotice, conversation: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
     """Wait `notice.seconds` while a stimulus plays. Of typed lines only p (pause) and q (leave) have an effect. Returns
-    None at the end; otherwise the reason why the wait ended early."""
+    None at the end; otherwise the reason why the wait ended early. Raises KeyboardInterrupt at the end of the input of
+    a terminal."""
     conversation.discard_early_lines()
     if notice.title:  # the gap between two intervals has no title
         direction_text = (

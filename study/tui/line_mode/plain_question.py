@@ -60,10 +60,10 @@ def show_instructions(welcome: Welcome, conversation: Conversation, keys: Answer
 
 
 def ask_question(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
-    """Ask the question of a trial until there is a reply. It is `Unanswered` where the time limit (none if 0 s) is
-    over, where the sign of life reports that the stimulus ended early, and at the end of the input, which ends the
-    sitting. "?" explains the question; other lines, and "r" without repeats left, are refused; then the question is
-    asked again."""
+    """Ask the question of a trial until there is a reply. It is an answer, or `Unanswered`: for a line that leaves,
+    pauses or repeats (`parse_reply`), where the time limit (none if 0 s) is over, where the sign of life reports that
+    the stimulus ended early, and at the end of the input, which ends the sitting. "?" explains the question; other
+    lines, and "r" without repeats left, are refused; then the question is asked again."""
     words, key_placeholders = conversation.words, {"keys": keys.describe_keys(conversation.words)}
     conversation.discard_early_lines()
     conversation.say("", format_heading(question, words))

@@ -37,7 +37,7 @@ class ConfirmView(ModalScreen[bool]):
 - It shows the levels and which answers were right or wrong. A participant who has seen that is no naive observer.
 - Turn the screen away, type the session's name, and press **Enter**. **Esc** goes back.
 - Opened at the participant's own screen, it is noted in the session's log.
-- A second terminal does without: `hapteq watch SESSION`.
+- In a second terminal no name is asked for: `hapteq watch SESSION`.
 """
     DEFAULT_CSS = """
     ConfirmView { align: center middle; }

@@ -41,7 +41,7 @@ In a terminal: `hapteq diagnose REC.h5 --model MODEL.toml --out DIR`.
 FIELDS = (
     ("sources", "Recordings", "REC.h5, several, or a session's folder"),
     ("model", "Model", "MODEL.toml; empty: none is given"),
-    ("clean", "In order", "recordings of it when nothing was missing; may stay empty"),
+    ("clean", "In order", "recordings of the device in order; may stay empty"),
     ("out", "Results", "a new folder; empty: next to the recording"),
 )
 """Name, label and placeholder of each field, from top to bottom."""

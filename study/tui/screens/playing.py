@@ -21,7 +21,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 class PlayingScreen(TranslatedScreen[Unanswered | None]):
     """Screen that highlights the direction or interval that plays, or shows the title of the probe. It is dismissed
-    with `PAUSE` (key p) or `LEAVING` (key q); the application closes it at the end of the stimulus, with None."""
+    with `PAUSE` (key p) or `LEAVING` (key q); the application removes it at the end of the stimulus, without a
+    result."""
 
     PAGE = "help_playing"
     DEFAULT_CSS = """

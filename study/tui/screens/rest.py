@@ -1,4 +1,4 @@
-"""Screen of an enforced rest between runs: remaining time, number of remaining runs, and progress of the session.
+"""Screen of an enforced rest between runs or trials: remaining time, remaining runs, and progress of the session.
 
 The rest cannot be shortened: Enter has no effect before its end. Opened by `study.tui.app.sitting_screens`; the engine
 enforces the duration as well (`remote_display`).

@@ -22,8 +22,9 @@ from study.tui.home_messages import CommandRequested
 HELP = """\
 # The accelerometer in six positions
 
-Gravity is the same everywhere: with each axis of the sensor once up and once down, its bias, its sensitivity with
-cross-axis, and its noise are known. Take the sensor with its cable off the handle, and have a flat table.
+Gravity is a known acceleration: with each axis of the sensor once up and once down, its bias, its sensitivity
+(cross-axis terms included) and its noise can be computed. Take the sensor with its cable off the handle, and have a
+flat table.
 
 1. Name the **port** of the board: /dev/ttyACM0 or so, on Windows COM3. No other program may read it.
 2. **F5** begins. Lay the sensor down as it says, let go of it, press **Enter**, and wait for 2 seconds: it must not

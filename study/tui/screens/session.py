@@ -238,8 +238,8 @@ def _compose_thresholds(view: SessionView) -> ComposeResult:
     yield TextTable(view.thresholds)
     yield Static(
         Content.styled(
-            "Thresholds: mean of the last peaks and valleys, or of Psi's posterior. Delivered: what the handle did "
-            "along the direction there. Rev.: reversals. Cut by the cap: the strongest force allowed was met.",
+            "Thresholds: mean of the last peaks and valleys, or of Psi's posterior. Delivered: acceleration "
+            "along the direction at threshold. Rev.: reversals. Cut by the cap: the strongest force allowed was met.",
             "$foreground 65%",
         ),
         classes="part",

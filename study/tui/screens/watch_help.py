@@ -19,12 +19,12 @@ light, dark and high contrast, **q** leaves the view; the session continues.
 
 * **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ reversals, ? the next level.
 * **Last trials**: the newest on top. *shown* and *said* are the numbers 1 and 2; *s* is the time to answer; *m/s²* is \
-what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial, ! a remark \
+the delivered acceleration along the direction, *off* across it. ↺ marks a reversal, + a repeated trial, ! a remark \
 (shown in a wider window).
 * **Runs**: *rev.* counts reversals, *n* trials.
 * **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
 * **Catch**: trials at full force that every participant should get right; errors in them are lapses of attention.
 
-The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
+The direction of a trial stays hidden until its answer counts, so that you cannot give it away.
 """
 """Help page of the view, in Markdown."""

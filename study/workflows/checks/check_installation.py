@@ -84,7 +84,7 @@ def check_packages() -> tuple[DeviceFinding, ...]:
 
 
 def check_requirement(requirement: Requirement) -> DeviceFinding:
-    """Check whether the installed package, if there is one, satisfies a requirement."""
+    """Check whether the installed package satisfies a requirement; a package that is not installed does not."""
     try:
         return check_version(requirement.name, version(requirement.name), requirement.specifier)
     except PackageNotFoundError:

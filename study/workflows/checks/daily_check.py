@@ -30,7 +30,7 @@ from study.workflows.checks.device_changes import make_change_findings
 from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
 
 if TYPE_CHECKING:
-    from analysis.device_change.compare_devices import Change
+    from analysis.device_change.compare_measurements import Change
     from analysis.device_change.measure_device import NotMeasurableError
 
 CHECK_PROTOCOL_NAME = "daily_check"
@@ -169,11 +169,11 @@ def compare_recordings(baseline: Recording, todays_recording: Recording) -> tupl
     """Compute the changes of friction, gain, response and noise from the recording of the acceptance to today's. Raises
     DeviceError where they cannot be measured in one of the recordings."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
-    from analysis.device_change.compare_devices import compare_devices
+    from analysis.device_change.compare_measurements import compare_measurements
     from analysis.device_change.measure_device import NotMeasurableError
 
     try:
-        return compare_devices(baseline, todays_recording)
+        return compare_measurements(baseline, todays_recording)
     except NotMeasurableError as error:
         raise _make_not_comparable_error(error) from error
 

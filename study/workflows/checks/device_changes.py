@@ -9,7 +9,7 @@ from analysis.wording import format_signed
 from study.session.views.participant_views import DeviceFinding
 
 if TYPE_CHECKING:
-    from analysis.device_change.compare_devices import Change
+    from analysis.device_change.compare_measurements import Change
 
 CAUSE_ADVICE = {
     "friction": "Look for a cable that rubs and for dirt in the joints; let the device warm up.",

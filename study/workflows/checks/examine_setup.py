@@ -55,7 +55,7 @@ class Examination:
 
     @property
     def sensed(self) -> bool:
-        """Whether every finding about the accelerometer is fine, also where there is none."""
+        """Whether every finding about the accelerometer is fine; True also where there is no such finding."""
         return all(finding.fine for finding in self.findings if finding.name in OPTIONAL_FINDINGS)
 
     @property
@@ -83,7 +83,8 @@ def _examine_device(
     device_name: str, timing_s: float, on_progress: Callable[[float], None]
 ) -> tuple[DeviceReport, Timing | None]:
     """Examine the device and its timing. Returns the findings, and the timing; None where none is requested (`timing_s`
-    0), the driver reports a wrong finding (the device is then not opened), or the device fails."""
+    0), the driver reports a wrong finding other than of `OPTIONAL_FINDINGS` (the device is then not opened), or the
+    device fails."""
     clock, settings = RealClock(), _make_settings(device_name, timing_s)
     driver_findings = examine_device(device_name)
     device_report = DeviceReport(device_name, simulated=False, findings=driver_findings)
@@ -147,7 +148,7 @@ def accept_examined_device(
 ) -> str:
     """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
     `operator`; returns a sentence about it. Without an accelerometer no baseline is recorded. Raises DeviceError
-    without a timing or with a wrong finding, WrongUseError for a simulated device."""
+    without a timing or with a wrong finding other than of `OPTIONAL_FINDINGS`, WrongUseError for a simulated device."""
     if not needs_real_time(device_name):
         raise WrongUseError("There is nothing to accept", f"{device_name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing

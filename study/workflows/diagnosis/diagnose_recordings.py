@@ -1,8 +1,8 @@
 """Find the physics that a mechanical model lacks from recordings, and write the result folder; called by
 `hapteq diagnose` and, for the screens, by `diagnose_at_screen`.
 
-Steps: read and check the input, take or fit the model to compare with, add the virtual spring of a session, run the
-diagnosis (`analysis.diagnosis.diagnose`), write document, improved model, figures and page.
+Steps: read the input, take or fit the model to compare with, add the virtual spring of a session, run the diagnosis
+(`analysis.diagnosis.diagnose`), write the results.
 """
 
 import tempfile
@@ -180,7 +180,7 @@ def write_result_folder(diagnosis: UnwrittenDiagnosis, on_progress: Progress) ->
     for session_folder in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
         from study.store.sessions.written_elsewhere import note_written_folder
 
-        note_written_folder(session_folder, plan.out)
+        note_written_folder(session_folder, plan.out)  # listed in the data folder, for a withdrawal
     with create_new_folder(plan.out) as folder:
         findings = write_diagnosis_into(folder, diagnosis.findings, diagnosis.parents)
     on_progress("done", 1.0)

@@ -116,7 +116,7 @@ def read_entry(path: Path) -> LawEntry:
         or not EFFECT_NAME_PATTERN.fullmatch(entry.name)
     ):
         raise _make_effect_error(
-            f"{path} defines no ENTRY, or one by a name of the catalogue.",
+            f"{path} defines no ENTRY with a valid name that is not in the catalogue.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
         )
     return entry
@@ -134,4 +134,4 @@ def _read_laws(source: Path) -> list[Law]:
 
 def _make_effect_error(explanation: str, advice: str) -> StudyError:
     """Make the error for a law or an effect file that cannot be used."""
-    return StudyError("There is no effect of your own", explanation, advice, saved="Nothing was written.")
+    return StudyError("The effect cannot be used", explanation, advice, saved="Nothing was written.")

@@ -22,7 +22,7 @@ from study.workflows.diagnosis.diagnosis_input import read_input
 from study.workflows.output_paths import require_new_outputs
 
 ERROR_TITLE = "The model was not made"
-"""Title of each error message of this command."""
+"""Title of the errors about the output file, a folder as input, and recordings that cannot be fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,8 @@ class FittedFirstModel:
 
 
 def fit_and_write_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FittedFirstModel:
-    """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
-    added weight, and where no structure fits; nothing is written then."""
+    """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError, among others for a folder, for
+    recordings with an added weight, and where no structure fits; nothing is written then."""
     requested_kind = _parse_structure(plan.structure)
     require_new_outputs(plan.out, title=ERROR_TITLE, kind="models")
     if folders := [path for path in plan.recordings if path.is_dir()]:
@@ -162,6 +162,7 @@ def _parse_structure(structure: str) -> Kind | None:
 def _make_refusal_error(explanation: str) -> StudyError:
     """Make the error for recordings to which no first model can be fitted. explanation: why, as a sentence."""
     return StudyError(
-        ERROR_TITLE, explanation, "Choose another --structure, or record positions or velocities along every command.",
+        ERROR_TITLE, explanation,
+        "Choose another --structure, or record positions or velocities along every command, without a weight.",
         saved="Nothing was written.",
     )  # fmt: skip

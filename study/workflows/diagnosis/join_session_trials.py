@@ -86,7 +86,7 @@ def join_session_trials(session: Path, seed: int) -> JoinedTrials:
     if not usable_trials:
         raise StudyError(
             "This session holds nothing to diagnose",
-            f"{session_folder.name} has {len(read_trials)} recordings of trials, and none is whole.",
+            f"{session_folder.name} has {len(read_trials)} recordings of trials, and none can be used.",
             "Give a session in which trials were measured, or recordings of `hapteq record`.",
             saved="Nothing was written.",
         )
@@ -245,6 +245,6 @@ def _write_remarks(
             "they were played, or the file was changed since."
         )
     yield (
-        f"Levels within {LEVEL_CLASS_DB:g} dB of each other count as one. Of each frequency and level, one trial in "
+        f"Levels are grouped in classes {LEVEL_CLASS_DB:g} dB wide. Of each frequency and class, one trial in "
         f"{TRIALS_PER_TEST_TRIAL} is kept for the test."
     )

@@ -70,5 +70,5 @@ def _describe_drifts(folder: SessionFolder, folded_session: FoldedSession) -> tu
     drift_text = "; ".join(drift.sentence for drift in DriftReader(folder).update(followed_session.probes))
     return (
         f"In its {len(followed_session.probes)} probes "
-        f"{f'there changed: {drift_text}' if drift_text else 'no change was detected'}.",
+        f"{f'these changes were detected: {drift_text}' if drift_text else 'no change was detected'}.",
     )

@@ -64,12 +64,12 @@ def describe_calibration(
         if axis_name in changing_axes
     )
     return (
-        f"The calibration of the {calibration.device} says {', '.join(f'{mass_kg:.3g}' for mass_kg in calibrated_kg)} "
-        f"kg at the centre; the recordings say {', '.join(f'{mass_kg:.3g}' for mass_kg in recorded_kg)} kg, up to "
-        f"{largest_relative_difference:.0%} apart. "
-        "The model has those of the recordings, with all that moves at the handle.",
-        f"How its inertia changes is the calibration's, as pose_dependent_inertia: {slope_text or 'nowhere'}. What "
-        "changes with the position across an axis is not in the model.",
+        f"Masses along x, y, z: by the calibration of the {calibration.device}, "
+        f"{', '.join(f'{mass_kg:.3g}' for mass_kg in calibrated_kg)} kg at the centre; by the recordings, "
+        f"{', '.join(f'{mass_kg:.3g}' for mass_kg in recorded_kg)} kg, up to {largest_relative_difference:.0%} apart. "
+        "The model has the masses of the recordings, which include all parts that move with the handle.",
+        "Its change of inertia with the position along each axis (pose_dependent_inertia) is that of the calibration: "
+        f"{slope_text or 'none'}. A change with the position across an axis is not in the model.",
     )
 
 

@@ -38,7 +38,7 @@ from study.workflows.output_paths import require_new_outputs
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
-"""Title of the errors of this workflow."""
+"""Title of the errors about output file, protocol, calibration and fit."""
 STANDARD_GRAVITY_MPS2 = 9.80665
 """Standard acceleration of free fall (m/s²), exact by definition (CGPM 1901)."""
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY_MPS2)
@@ -184,7 +184,8 @@ def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
 def _record_and_read(
     plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving
 ) -> Recording:
-    """Record by the plan and read the recording back. on_progress: called with the fraction done, 0 to 1."""
+    """Record by the plan and read the recording back, with the roles of `_assign_test_roles`. on_progress: called with
+    the fraction done, 0 to 1."""
     total_s = max(plan.total_s, 1e-9)  # not 0, which would be divided by
     record_device(plan, lambda seconds: on_progress(min(seconds / total_s, 1.0)), before_moving)
     return _assign_test_roles(read_recording(plan.out))

@@ -71,6 +71,7 @@ class IdentifiedDevice:
 
     plan: IdentifyPlan
     recordings: tuple[Recording, ...]
+    """Recordings as used for the fit: effects subtracted, and with the excitation as command (`plan.with_spring`)."""
     estimate: FrequencyResponse
     fitted: FrequencyResponse
     """Frequency response that the model was fitted to: the estimate, or its local averages."""
@@ -189,8 +190,8 @@ def _find_peak_amplitude_n(recordings: Sequence[Recording]) -> float:
 
 
 def _require_same_system(recordings: Sequence[Recording], with_spring: bool) -> None:
-    """Raise StudyError unless all recordings are of the same system: all with a hand or all without, and, where the
-    spring becomes part of the model, all under the same spring."""
+    """Raise StudyError unless all recordings are of the same system: all that state it with a hand or all without, and,
+    where the spring becomes part of the model, all under the same spring."""
     values_by_name = {
         "the hand on the handle": {
             str(recording.meta["hand"]) for recording in recordings if recording.meta.get("hand") is not None

@@ -102,7 +102,7 @@ def _compute_relative_noise_floor(state: IterationState) -> float:
 
 def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
     """Write the best forces so far to `plan.out`, and the document next to it; nothing where that is None. interrupted:
-    whether the repetition was stopped by the user. Raises CannotWriteError."""
+    whether the repetition was stopped by the user or by a fault of the device. Raises CannotWriteError."""
     if plan.out is None:
         return
     table = _make_force_table(plan, state)

@@ -2,7 +2,7 @@
 
 A program: `python -m study.workflows.files.format_docs docs`, which the Makefile calls, updates them;
 `tests/study/workflows/files/test_format_docs.py` fails where they differ from the code. Fixed texts of the pages are in
-`format_text` and `importing_docs`.
+`format_text` and `importing_text`.
 """
 
 import json

@@ -2,7 +2,7 @@
 
 The recognisers are tried in turn on the content. A file that none of them recognises, and that may be a recording of
 another program, is read as `hapteq import` would read it. Remarks on access rights and on idle commands are added.
-Called by `check_model_channels` and `validate_in_process`.
+Called by `validate_in_process`; `check_model_channels` extends its results.
 """
 
 import tomllib
@@ -141,7 +141,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
             return "TOML file", _explain_toml(content)
         case ".csv":
             return "table", f"its header, '{','.join(content.header)}', is not known; {KNOWN_KINDS}"
-    return "unknown file", f"nothing here knows this file; {KNOWN_KINDS}"
+    return "unknown file", f"the kind of this file is not known; {KNOWN_KINDS}"
 
 
 def _explain_json(content: FileContent) -> str:

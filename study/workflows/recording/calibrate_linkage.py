@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from study.devices.opening import LinkageSource
 
 ERROR_TITLE = "The linkage was not calibrated"
-"""Title of each error of this command."""
+"""Title of the errors about the output file and about inconsistent readings."""
 NOTHING_DONE = "Nothing moved and nothing was written."
-"""What each error states about the device and the files."""
+"""What the errors before the file is written state about the device and the files."""
 MAX_GRID_SIZE_M = 0.2
 """Largest accepted radius and depth of the grid (m). Chosen: larger values are mistyped or in another unit."""
 MAX_LISTED_PROBLEMS = 3

@@ -28,8 +28,9 @@ Progress = Callable[[float], None]
 
 
 def inspect_recordings(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
-    """Compute the overviews of hapteq recordings, and of foreign files that can be imported without a map. on_progress:
-    called after each file. Raises StudyError for other files."""
+    """Compute the overviews of hapteq recordings, and of foreign files that can be imported without a map; the remarks
+    on the import are added to their metadata. on_progress: called after each file. Raises StudyError for other
+    files."""
     overviews = []
     for count, path in enumerate(paths, start=1):
         recording, notes = read_any_recording(path)

@@ -24,7 +24,7 @@ another device."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedTake:
-    """The kept take of a piece; unless `is_clipped(health)`, nothing was at its limit."""
+    """The kept take of a piece, which may be clipped (`is_clipped(health)`)."""
 
     piece: RecordingPiece
     """The piece as finally played, with its amplitude."""

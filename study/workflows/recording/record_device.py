@@ -68,8 +68,9 @@ def record_device(
     repeated. `before_moving(notice)` is called before a real device moves, with the notice for the people around it;
     an exception from it keeps the device still. The default refuses every real device.
 
-    Raises StudyError before anything moves if `out` exists already; UserInterruptError after KeyboardInterrupt, and
-    DeviceError if the device fails, both after the complete pieces were written.
+    Raises StudyError before anything moves if `out` exists already or has no folder. Raises UserInterruptError after
+    KeyboardInterrupt, and DeviceError if the device fails or may still exert a force after the interruption; the
+    complete pieces are written before.
     """
     require_new_output(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()

@@ -149,7 +149,8 @@ def _write_files(
     provenance: Provenance,
     collected_trials: CollectedTrials,
 ) -> None:
-    """Remove figures and report of an earlier analysis, then write all files. Raises CannotWriteError."""
+    """Remove figures, detection.csv and report of an earlier analysis, then write all files. Raises
+    CannotWriteError."""
     figure_folder = folder / "figures"
     try:
         make_folder(figure_folder)

@@ -9,7 +9,7 @@ shows the drifts while a session runs; `session_references` reports them with a 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from analysis.device_change.compare_devices import ChangeLimits
+from analysis.device_change.compare_measurements import ChangeLimits
 from analysis.device_change.probe_drift import Drift, TimedProbe, find_drifts
 from analysis.device_change.probe_lines import compute_probe_lines
 from equalizer.signals.recording import Recording

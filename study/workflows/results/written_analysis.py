@@ -17,9 +17,10 @@ class WrittenAnalysis:
     """Thresholds of an analysis, and the path of the report that was written."""
 
     thresholds: "tuple[Threshold, ...]"
-    """Result of each run of the analysed sessions."""
+    """Threshold of each test run of the analysed sessions, incomplete runs included."""
     table: tuple[str, ...]
-    """Group means (N) by frequency, as lines of text."""
+    """Lines of text for the terminal: mean thresholds (N) by frequency, medians and the declared contrast, as
+    `analyze_data.format_threshold_lines` states them."""
     warnings: tuple[str, ...]
     """Sentences on excluded sessions, results written now, and warnings of the analysis."""
     report: Path

@@ -15,7 +15,7 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import write_quality_sentence
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.feedforward.equalizer import Equalizer, Identity
+from equalizer.tracking.feedforward.equalizer import Equalizer, IdentityEqualizer
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceInfo
@@ -57,7 +57,7 @@ class SessionEqualizer:
     """Model file to copy into the session folder; None without a model and in a resumed session."""
 
 
-NO_EQUALIZER = SessionEqualizer(Identity(), None)
+NO_EQUALIZER = SessionEqualizer(IdentityEqualizer(), None)
 """Identity equalizer of a study whose stimuli are commanded forces."""
 
 
@@ -113,7 +113,7 @@ def copy_model(equalized: SessionEqualizer, folder: SessionFolder) -> None:
 
 def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> SessionEqualizer:
     """Make the equalizer of a resumed session from the model in its folder; `NO_EQUALIZER` where the log states none.
-    Raises StudyError where the model is missing or its SHA-256 differs from the log."""
+    Raises StudyError where the model is missing, its SHA-256 differs from the log, or it does not match the device."""
     facts = state.opened.equalized
     if facts is None:
         return NO_EQUALIZER

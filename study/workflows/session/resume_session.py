@@ -158,8 +158,8 @@ def _judge_after_restart(
     """Judge an answered trial that the program did not judge before it ended; returns its event.
 
     With a usable recording, which is saved only for a trial that counts, the trial is measured from it. Otherwise the
-    trial is judged by the device's counters that were logged with the answer, and counts as unmeasured if they are
-    missing (older logs); if the protocol requires the accelerometer, it is void.
+    trial is judged by the device's counters that were logged with the answer (older logs have none); if it counts, it
+    is logged as unmeasured, or as void where the protocol requires the accelerometer.
     """
     try:
         measured_event = _measure_from_recording(state, presented, folder, clock)

@@ -86,7 +86,8 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 
 def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
-    """Prepare the sitting (forms, device check), show the instructions and perform the actions."""
+    """Prepare the sitting (forms, device check), assign the participant number, start the masking noise, show the
+    instructions and perform the actions."""
     state, end_reason = prepare_sitting(state, sitting)
     if state.is_finally_ineligible:
         return SessionEnd(close_ineligible_session(state, sitting), end_reason)

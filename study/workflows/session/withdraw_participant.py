@@ -111,8 +111,9 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 
 
 def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
-    """List the analyses and exports outside the data folder that name or may name the participant, a sentence each, as
-    far as their folders were recorded when they were written; the last sentence is a reminder of other copies."""
+    """List the analyses and exports that a withdrawal does not search and that name or may name the participant, a
+    sentence each, as far as their folders were recorded when they were written (`note_written_folder`); the last
+    sentence is a reminder of other copies."""
     recorded_paths = [path for path in read_written_folders(data) if path.exists()]
     naming_paths = [path for path in recorded_paths if is_subject_in_analysis(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in naming_paths), COPIES_REMINDER)

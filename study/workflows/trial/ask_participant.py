@@ -26,8 +26,8 @@ class StimulusReply:
     started_s: float
     """Time (s, by the session's clock) from which an answer was possible: the response time counts from here."""
     is_complete: bool
-    """Whether the device had no fault until the answer. A later fault, for example during a slow disk write, does not
-    make the trial void."""
+    """Whether the device had no fault until the answer (of a detection trial: until the release); False if the question
+    was not reached. A later fault, for example during a slow disk write, does not make the trial void."""
     play_result: PlaybackResult | None
     """Result of a stimulus that was released before the question; None if it is still held or never began."""
     holding: bool

@@ -1,9 +1,10 @@
 """Masking noise during a sitting, so that the participant cannot hear the device.
 
 Order: `conduct_session` opens the sound output; `run_session` starts the noise, checks it before every trial, and stops
-it in pauses and at the end; `present_trial` checks it at every answer. Every start, stop and failure is logged; a trial
-without noise is void. The sound is a loop of pink noise (`make_masking_noise`) from the protocol's seed, so that
-other sessions use the same sound.
+it in pauses and at the end; `present_trial` checks it at every answer. Starts, stops, and a failure that is found
+before a trial are logged; a start that fails raises DeviceError without an event. A trial during which the noise
+stopped is void. The sound is a loop of pink noise (`make_masking_noise`) from the protocol's seed, so that other
+sessions use the same sound.
 """
 
 import contextlib
@@ -28,9 +29,9 @@ LOOP_S = 60
 
 @contextlib.contextmanager
 def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[SoundOutput | None]:
-    """Open the sound output with the masking noise, attenuated by `settings.level_db` (dB) and not yet playing; it is
-    closed at the end of the context. Yields None where the protocol plays no noise, for a simulated participant
-    (`observer` is its name) and in virtual time. Raises DeviceError where there is no sound output."""
+    """Open the sound output with the masking noise, at the gain `settings.level_db` (dB, at most 0) and not yet
+    playing; it is closed at the end of the context. Yields None where the protocol plays no noise, for a simulated
+    participant (`observer` is its name) and in virtual time. Raises DeviceError where there is no sound output."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
@@ -42,7 +43,7 @@ def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | 
 
 def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
     """Start the masking noise, log it, and return the new state. Without a sound output the state is unchanged. Raises
-    DeviceError where the noise cannot be played."""
+    DeviceError where the noise cannot be played; nothing is logged then."""
     if sitting.masking_noise is None:
         return state
     sitting.masking_noise.start()

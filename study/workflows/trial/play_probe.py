@@ -108,8 +108,8 @@ def _test_and_play_reference(state: SessionState, hand_mass_kg: float, sitting: 
         )
     if free_probe.mass_kg > MAX_FREE_MASS_RATIO * hand_mass_kg:
         reason = (
-            f"the handle seems to be held: it answers like {free_probe.mass_kg:.2f} kg, and {hand_mass_kg:.2f} kg in "
-            "the hand"
+            f"the handle seems to be held: its apparent mass is {free_probe.mass_kg:.2f} kg, and {hand_mass_kg:.2f} kg "
+            "in the hand"
         )
         return ActionResult(_skip_reference(free_probe.state, reason, sitting))
     return _play_reference_commands(free_probe.state, sitting)

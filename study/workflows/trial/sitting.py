@@ -121,7 +121,8 @@ def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def release_device(sitting: Sitting) -> PlaybackResult:
-    """Release the stimulus, and report at once if the force could not be removed, before any disk access."""
+    """Release the stimulus, and report at once if the force could not be removed, before any disk access. A message of
+    the driver becomes a note."""
     play_result = sitting.device.release()
     if play_result.health.fault is Fault.FORCE_LEFT:
         with contextlib.suppress(OSError):

@@ -111,7 +111,7 @@ def _read_file_stamps(folder: SessionFolder) -> tuple[tuple[str, int, int, int],
 
 @lru_cache(maxsize=4096)  # more sessions than a data folder usually has
 def _make_cached_line(folder: SessionFolder, file_stamps: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
-    """Make the line of a session that is not withdrawn. file_stamp: key of the cache (`_read_file_stamps`); the result
+    """Make the line of a session that is not withdrawn. file_stamps: key of the cache (`_read_file_stamps`); the result
     depends only on these files. Raises StudyError where the log is invalid, OSError where it cannot be read."""
     content = read_regular(folder.log)
     session_opened = read_opening(folder.log)

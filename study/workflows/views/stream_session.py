@@ -148,7 +148,7 @@ def _parse_event(line: bytes) -> dict[str, Any]:
     """Parse the event in a line of the log. Raises ValueError where it is not a JSON object."""
     event = json.loads(line)
     if not isinstance(event, dict):
-        raise ValueError(f"a line of it is no fact: {line[:40]!r}")
+        raise ValueError(f"a line of it is no event: {line[:40]!r}")
     return event
 
 

@@ -47,7 +47,7 @@ def _is_study_protocol(path: Path) -> bool:
 
 def make_protocol_line(name: str, data: Path) -> ProtocolLine | None:
     """Make the line of a study protocol; None for a protocol of another kind. An invalid one is listed with its
-    problem."""
+    problem. name: of a shipped protocol, or the path of a file."""
     try:
         protocol_file = read_protocol(name, data)
     except ProtocolRefusedError as refusal:

@@ -31,7 +31,7 @@ def test_time_that_is_none_is_refused(files, spoil, sentence):
         ('time = "t"\ntime_unit = "m"', "Clock 'clock': time_unit is 'm', which is no unit of time."),
         ('time = "t"\ntime_unit = "sec"', "Clock 'clock': time_unit: 'sec' is not a unit known here"),
         ('time = "t[0]"\ntime_unit = "s"', "t[0] has the shape (); stamps are one row of two or more"),
-        ('rate = "u"', "'u' has the shape (400,); it must be one number"),
+        ('rate = "u"', "'u' has the shape (400,); it must be one finite number"),
         ('rate = "-fs"', "Clock 'clock': its rate, -fs, is -1000; it must be above 0."),
     ],
 )

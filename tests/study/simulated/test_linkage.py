@@ -9,7 +9,7 @@ from study.devices.simulated.linkage import solve_forward_kinematics
 from study.devices.simulated.packing import compute_isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import Linkage, Omega3Parameters
 
-PARAMETERS = pack_parameters(Omega3Parameters(), hand=False, place_m=(0, 0, 0))
+PARAMETERS = pack_parameters(Omega3Parameters(), has_hand=False, place_m=(0, 0, 0))
 coordinate = st.floats(-0.075, 0.075)
 places = st.tuples(coordinate, coordinate, coordinate).filter(lambda p: np.linalg.norm(p) <= 0.085).map(np.array)
 

@@ -178,7 +178,8 @@ def _make_slices(sample_counts: Sequence[int]) -> tuple[slice, ...]:
 
 
 def _extract_evidence_series(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
-    """Extract the samples of one axis from the evidence; None where its motion is not known, or no sample is usable."""
+    """Extract the samples of one axis from the evidence; None where its motion is not known, no sample is
+    usable, or its velocity is constant."""
     if not evidence or any(axis >= record.axis_force.shape[1] for record in evidence):
         return None
     position, velocity, force, missing_force = (

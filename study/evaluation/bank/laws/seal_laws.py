@@ -32,8 +32,8 @@ def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Call
     number of cases sealed so far. Returns the SHA-256 of labels.sha256. Raises StudyError where a sealed file has
     changed."""
     law_draws = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
-    write_case = {law_draw.number: partial(_seal_law, folder, law_draw) for law_draw in law_draws}
-    return seal_missing_cases(folder, write_case, workers, on_sealed)
+    case_writers = {law_draw.number: partial(_write_law_case, folder, law_draw) for law_draw in law_draws}
+    return seal_missing_cases(folder, case_writers, workers, on_sealed)
 
 
 def get_fresh_motions_path(folder: ProofFolder, number: int) -> Path:
@@ -49,7 +49,7 @@ def read_fresh_motions(
     with np.load(path) as arrays_file:
         motion_count = len({name.split("_")[1] for name in arrays_file.files})
         return tuple(
-            _read_motion(
+            _make_fresh_motion(
                 {name: arrays_file[f"{name}_{number}"] for name in _ARRAY_NAMES}, axes, law_axes, acts_on_response
             )
             for number in range(motion_count)
@@ -61,11 +61,11 @@ _ARRAY_NAMES = ("position", "velocity", "acceleration", "command", "reading", "l
 axis, the sensor reading (m/s²), and the force of the law (N)."""
 
 
-def _read_motion(
+def _make_fresh_motion(
     arrays: dict[str, Any], axes: Sequence[str], law_axes: Sequence[str], acts_on_response: bool
 ) -> FreshMotion:
-    """Make a fresh test motion of columns (t in s, and x, v, a and f by axis), with the law's contribution on the axes
-    `law_axes`: to the sensor reading (m/s²), or the force (N)."""
+    """Make a fresh test motion of the columns (t in s, and x, v, a and f by axis), with the law's contribution on the
+    axes `law_axes`: to the sensor reading (m/s²), or the force (N)."""
     columns = {"t": np.arange(len(arrays["command"])) / RATE_HZ}
     for column, axis in enumerate(axes):
         for prefix, name in zip(("", "v", "a", "f"), _ARRAY_NAMES, strict=False):
@@ -76,7 +76,7 @@ def _read_motion(
     )
 
 
-def _seal_law(folder: ProofFolder, law_draw: LawDraw) -> None:
+def _write_law_case(folder: ProofFolder, law_draw: LawDraw) -> None:
     """Write one case. The label is written after all other files: a case without a label is unfinished."""
     case_folder = begin_case(folder)
     law_case = generate_law_case(law_draw, case_folder.name)

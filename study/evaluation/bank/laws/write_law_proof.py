@@ -102,7 +102,8 @@ def write_law_table(path: Path, result: LawBlindTest) -> None:
 
 
 def format_law_lines(result: LawBlindTest) -> Iterator[str]:
-    """Yield lines for the terminal: each miss, each figure, the seal of the labels."""
+    """Yield lines for the terminal: the number of misses, each miss, each figure, a remark where several versions of
+    the diagnosis answered, the seal of the labels, and the folder."""
     yield f"{len(result.score.misses)} misses in {len(result.outcomes)} cases"
     for miss in result.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula

@@ -13,7 +13,7 @@ Each range goes from an effect that hardly shows in the recordings of the challe
 """
 
 from study.evaluation.challenge.actuator_kernel import DEAD_BAND, DELAY_S, FORCE_LIMIT, GAIN, LAG_S, SLEW_RATE
-from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_amplifier
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, replace_amplifier_cells
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import LEVELS_N
 
@@ -25,7 +25,7 @@ def _draw_saturation(context: EffectContext) -> dict[str, float]:
 
 def _build_saturation(device: Device, axis: int, values: Values) -> Device:
     """Build in the saturation of the force at an axis."""
-    return with_amplifier(device, axis, {FORCE_LIMIT: values["limit"]})
+    return replace_amplifier_cells(device, axis, {FORCE_LIMIT: values["limit"]})
 
 
 def _draw_deadband(context: EffectContext) -> dict[str, float]:
@@ -35,7 +35,7 @@ def _draw_deadband(context: EffectContext) -> dict[str, float]:
 
 def _build_deadband(device: Device, axis: int, values: Values) -> Device:
     """Build in the dead band of the command at an axis."""
-    return with_amplifier(device, axis, {DEAD_BAND: values["width"]})
+    return replace_amplifier_cells(device, axis, {DEAD_BAND: values["width"]})
 
 
 def _draw_slew(context: EffectContext) -> dict[str, float]:
@@ -45,7 +45,7 @@ def _draw_slew(context: EffectContext) -> dict[str, float]:
 
 def _build_slew(device: Device, axis: int, values: Values) -> Device:
     """Build in the slew limit at all axes; `axis` is not used."""
-    return with_amplifier(device, None, {SLEW_RATE: values["rate"]})
+    return replace_amplifier_cells(device, None, {SLEW_RATE: values["rate"]})
 
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:
@@ -55,7 +55,7 @@ def _draw_lag(context: EffectContext) -> dict[str, float]:
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
     """Build in the lag at all axes; `axis` is not used."""
-    return with_amplifier(device, None, {LAG_S: values["time_constant"]})
+    return replace_amplifier_cells(device, None, {LAG_S: values["time_constant"]})
 
 
 def _draw_delay(context: EffectContext) -> dict[str, float]:
@@ -65,7 +65,7 @@ def _draw_delay(context: EffectContext) -> dict[str, float]:
 
 def _build_delay(device: Device, axis: int, values: Values) -> Device:
     """Build in the delay at all axes; `axis` is not used."""
-    return with_amplifier(device, None, {DELAY_S: values["delay"]})
+    return replace_amplifier_cells(device, None, {DELAY_S: values["delay"]})
 
 
 def _draw_gain(context: EffectContext) -> dict[str, float]:
@@ -75,7 +75,7 @@ def _draw_gain(context: EffectContext) -> dict[str, float]:
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:
     """Build in the gain at an axis."""
-    return with_amplifier(device, axis, {GAIN: values["gain"]})
+    return replace_amplifier_cells(device, axis, {GAIN: values["gain"]})
 
 
 EFFECTS = (

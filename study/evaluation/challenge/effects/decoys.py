@@ -24,8 +24,8 @@ from study.evaluation.challenge.concealed_effect import (
     ConcealedEffect,
     EffectContext,
     Values,
-    with_amplifier,
-    with_forces,
+    replace_amplifier_cells,
+    replace_handle_forces,
 )
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import POSITION_DAMPING
@@ -53,7 +53,7 @@ def _draw_position_damping(context: EffectContext) -> dict[str, float]:
 
 def _build_position_damping(device: Device, axis: int, values: Values) -> Device:
     """Add the damping of the axis that grows with the square of its position."""
-    return with_forces(device, axis, {POSITION_DAMPING: values["damping_per_m2"]})
+    return replace_handle_forces(device, axis, {POSITION_DAMPING: values["damping_per_m2"]})
 
 
 def _draw_stiffness_switching(context: EffectContext) -> dict[str, float]:
@@ -119,7 +119,9 @@ def _draw_motor_heating(context: EffectContext) -> dict[str, float]:
 
 def _build_motor_heating(device: Device, axis: int, values: Values) -> Device:
     """Let the force constant of the axis fall with the mean square of its force."""
-    return with_amplifier(device, axis, {HEATING_LOSS: values["loss_per_n2"], HEATING_TIME_S: values["seconds"]})
+    return replace_amplifier_cells(
+        device, axis, {HEATING_LOSS: values["loss_per_n2"], HEATING_TIME_S: values["seconds"]}
+    )
 
 
 def _draw_force_hysteresis(context: EffectContext) -> dict[str, float]:
@@ -129,7 +131,7 @@ def _draw_force_hysteresis(context: EffectContext) -> dict[str, float]:
 
 def _build_force_hysteresis(device: Device, axis: int, values: Values) -> Device:
     """Add the play between command and motor force of the axis."""
-    return with_amplifier(device, axis, {HYSTERESIS_HALF_WIDTH: values["half_width"]})
+    return replace_amplifier_cells(device, axis, {HYSTERESIS_HALF_WIDTH: values["half_width"]})
 
 
 DECOYS = (

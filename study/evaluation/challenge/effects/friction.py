@@ -13,7 +13,7 @@ All ranges were chosen by hand. `EFFECTS` is part of the table from which `draw_
 
 from dataclasses import replace
 
-from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_cells
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, replace_cells
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.friction_kernel import (
     BRISTLE_STIFFNESS,
@@ -29,11 +29,11 @@ RIGID_BRISTLE_N_PER_M = 3e6
 """Stiffness of the bristle of an effect without presliding (N/m). Chosen: far stiffer than any part of a bench."""
 
 
-def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
-    """Set these columns of the friction on an axis; returns a new device. `RIGID_BRISTLE_N_PER_M` where `cells` has no
-    stiffness."""
+def _replace_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
+    """Replace these columns of the friction on an axis; returns a new device. The stiffness of the bristle is
+    `RIGID_BRISTLE_N_PER_M` where `cells` has none."""
     return replace(
-        device, friction=with_cells(device.friction, axis, {BRISTLE_STIFFNESS: RIGID_BRISTLE_N_PER_M} | cells)
+        device, friction=replace_cells(device.friction, axis, {BRISTLE_STIFFNESS: RIGID_BRISTLE_N_PER_M} | cells)
     )
 
 
@@ -44,7 +44,7 @@ def _draw_coulomb_friction(context: EffectContext) -> dict[str, float]:
 
 def _build_coulomb_friction(device: Device, axis: int, values: Values) -> Device:
     """Build in the same level for both directions."""
-    return _with_bristle(device, axis, {LEVEL_POSITIVE: values["level"], LEVEL_NEGATIVE: values["level"]})
+    return _replace_bristle(device, axis, {LEVEL_POSITIVE: values["level"], LEVEL_NEGATIVE: values["level"]})
 
 
 def _draw_asymmetric_friction(context: EffectContext) -> dict[str, float]:
@@ -58,7 +58,7 @@ def _draw_asymmetric_friction(context: EffectContext) -> dict[str, float]:
 
 def _build_asymmetric_friction(device: Device, axis: int, values: Values) -> Device:
     """Build in a level for each direction."""
-    return _with_bristle(
+    return _replace_bristle(
         device, axis, {LEVEL_POSITIVE: values["level_positive"], LEVEL_NEGATIVE: values["level_negative"]}
     )
 
@@ -77,7 +77,7 @@ def _build_stribeck_friction(device: Device, axis: int, values: Values) -> Devic
     """Build in the Stribeck friction; the ratio of the levels is 1 where the Coulomb level is 0."""
     coulomb_level_n = values["coulomb"]
     static_ratio = values["static"] / coulomb_level_n if coulomb_level_n > 0.0 else 1.0
-    return _with_bristle(
+    return _replace_bristle(
         device,
         axis,
         {
@@ -98,7 +98,7 @@ def _draw_presliding(context: EffectContext) -> dict[str, float]:
 def _build_presliding(device: Device, axis: int, values: Values) -> Device:
     """Build in a level with a soft bristle."""
     level_n = values["level"]
-    return _with_bristle(
+    return _replace_bristle(
         device, axis, {LEVEL_POSITIVE: level_n, LEVEL_NEGATIVE: level_n, BRISTLE_STIFFNESS: values["stiffness"]}
     )
 
@@ -124,7 +124,7 @@ def _build_position_dependent(device: Device, axis: int, values: Values) -> Devi
         LEVEL_SLOPE: values["slope_per_m"],
         LEVEL_CURVATURE: values["bend_per_m2"],
     }
-    return _with_bristle(device, axis, cells)
+    return _replace_bristle(device, axis, cells)
 
 
 EFFECTS = (

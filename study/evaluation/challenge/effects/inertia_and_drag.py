@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_forces
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, replace_handle_forces
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import QUADRATIC_DAMPING
 
@@ -58,7 +58,7 @@ def _draw_quadratic_damping(context: EffectContext) -> dict[str, float]:
 
 def _build_quadratic_damping(device: Device, axis: int, values: Values) -> Device:
     """Set the quadratic damping of one axis."""
-    return with_forces(device, axis, {QUADRATIC_DAMPING: values["coefficient"]})
+    return replace_handle_forces(device, axis, {QUADRATIC_DAMPING: values["coefficient"]})
 
 
 def _draw_pose_dependent_inertia(context: EffectContext) -> dict[str, float]:
@@ -99,7 +99,7 @@ def _build_extra_mode(device: Device, axis: int, values: Values) -> Device:
     direction /= np.linalg.norm(direction)
     if values["mass"] == 0.0:
         return device
-    oscillators = device.bench.oscillators.with_oscillator(
+    oscillators = device.bench.oscillators.append_oscillator(
         values["frequency"], values["mass"], values["damping_ratio"], direction
     )
     return replace(device, bench=replace(device.bench, oscillators=oscillators))

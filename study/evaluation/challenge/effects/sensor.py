@@ -22,7 +22,7 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.sensor import Sensor
 
 
-def _with_sensor(device: Device, sensor: Sensor) -> Device:
+def _replace_sensor(device: Device, sensor: Sensor) -> Device:
     """Replace the sensor; returns a new device."""
     return replace(device, sensor=sensor)
 
@@ -41,7 +41,7 @@ def _draw_lag(context: EffectContext) -> dict[str, float]:
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
     """Replace the bandwidth of all channels."""
-    return _with_sensor(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
+    return _replace_sensor(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
 
 
 def _draw_clipping(context: EffectContext) -> dict[str, float]:
@@ -51,7 +51,7 @@ def _draw_clipping(context: EffectContext) -> dict[str, float]:
 
 def _build_clipping(device: Device, axis: int, values: Values) -> Device:
     """Clip one channel at +-limit."""
-    return _with_sensor(
+    return _replace_sensor(
         device, replace(device.sensor, range_mps2=_set_channel(device.sensor.range_mps2, axis, values["limit"]))
     )
 
@@ -66,7 +66,7 @@ def _draw_misalignment(context: EffectContext) -> dict[str, float]:
 def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
     """Replace the orientation of the sensor by the rotation, also the cross-axis sensitivity of a nuisance effect."""
     rotation_deg = np.array([values["about_x"], values["about_y"], values["about_z"]])
-    return _with_sensor(
+    return _replace_sensor(
         device, replace(device.sensor, orientation=Rotation.from_rotvec(rotation_deg, degrees=True).as_matrix())
     )
 
@@ -78,7 +78,7 @@ def _draw_gain(context: EffectContext) -> dict[str, float]:
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:
     """Replace the gain of one channel."""
-    return _with_sensor(device, replace(device.sensor, gain=_set_channel(device.sensor.gain, axis, values["gain"])))
+    return _replace_sensor(device, replace(device.sensor, gain=_set_channel(device.sensor.gain, axis, values["gain"])))
 
 
 def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
@@ -88,7 +88,7 @@ def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
 
 def _build_nonlinearity(device: Device, axis: int, values: Values) -> Device:
     """Set the cubic coefficient of one channel."""
-    return _with_sensor(
+    return _replace_sensor(
         device, replace(device.sensor, cubic_gain=_set_channel(device.sensor.cubic_gain, axis, values["cubic"]))
     )
 
@@ -113,7 +113,7 @@ def _draw_drift(context: EffectContext) -> dict[str, float]:
 
 def _build_drift(device: Device, axis: int, values: Values) -> Device:
     """Set the drift of all channels."""
-    return _with_sensor(device, replace(device.sensor, drift_mps2=values["total"] * _stack_shares(values)))
+    return _replace_sensor(device, replace(device.sensor, drift_mps2=values["total"] * _stack_shares(values)))
 
 
 def _draw_quantization(context: EffectContext) -> dict[str, float]:
@@ -123,7 +123,7 @@ def _draw_quantization(context: EffectContext) -> dict[str, float]:
 
 def _build_quantization(device: Device, axis: int, values: Values) -> Device:
     """Set the quantization step of all channels."""
-    return _with_sensor(device, replace(device.sensor, resolution_mps2=values["step"]))
+    return _replace_sensor(device, replace(device.sensor, resolution_mps2=values["step"]))
 
 
 def _draw_hum(context: EffectContext) -> dict[str, float]:
@@ -139,7 +139,7 @@ def _draw_hum(context: EffectContext) -> dict[str, float]:
 def _build_hum(device: Device, axis: int, values: Values) -> Device:
     """Set the hum amplitude * share * sin(2 pi frequency t + phase): amplitudes of sine and cosine, (2, 3), m/s^2."""
     amplitudes = values["amplitude"] * _stack_shares(values)
-    return _with_sensor(
+    return _replace_sensor(
         device,
         replace(
             device.sensor,
@@ -156,7 +156,7 @@ def _draw_clock_error(context: EffectContext) -> dict[str, float]:
 
 def _build_clock_error(device: Device, axis: int, values: Values) -> Device:
     """Set the error of the sensor's clock."""
-    return _with_sensor(device, replace(device.sensor, clock_error_ppm=values["ppm"]))
+    return _replace_sensor(device, replace(device.sensor, clock_error_ppm=values["ppm"]))
 
 
 def _draw_lost_samples(context: EffectContext) -> dict[str, float]:
@@ -166,7 +166,7 @@ def _draw_lost_samples(context: EffectContext) -> dict[str, float]:
 
 def _build_lost_samples(device: Device, axis: int, values: Values) -> Device:
     """Set the fraction of lost samples."""
-    return _with_sensor(device, replace(device.sensor, lost_fraction=values["fraction"]))
+    return _replace_sensor(device, replace(device.sensor, lost_fraction=values["fraction"]))
 
 
 def _draw_cross_axis(context: EffectContext) -> dict[str, float]:
@@ -182,7 +182,7 @@ def _build_cross_axis(device: Device, axis: int, values: Values) -> Device:
     mixing = device.sensor.orientation.copy()
     mixing[axis, (axis + 1) % 3] = values["from_next"]
     mixing[axis, (axis + 2) % 3] = values["from_after_next"]
-    return _with_sensor(device, replace(device.sensor, orientation=mixing))
+    return _replace_sensor(device, replace(device.sensor, orientation=mixing))
 
 
 def _draw_offset(context: EffectContext) -> dict[str, float]:
@@ -192,7 +192,7 @@ def _draw_offset(context: EffectContext) -> dict[str, float]:
 
 def _build_offset(device: Device, axis: int, values: Values) -> Device:
     """Set the offset of one channel."""
-    return _with_sensor(
+    return _replace_sensor(
         device, replace(device.sensor, offset_mps2=_set_channel(device.sensor.offset_mps2, axis, values["offset"]))
     )
 
@@ -204,7 +204,7 @@ def _draw_logger_offset(context: EffectContext) -> dict[str, float]:
 
 def _build_logger_offset(device: Device, axis: int, values: Values) -> Device:
     """Set the delay of the acceleration."""
-    return _with_sensor(device, replace(device.sensor, delay_s=values["offset"]))
+    return _replace_sensor(device, replace(device.sensor, delay_s=values["offset"]))
 
 
 EFFECTS = (

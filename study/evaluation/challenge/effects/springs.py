@@ -12,7 +12,7 @@ The strength interpolates the range of the main parameter geometrically. `handle
 
 import numpy as np
 
-from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_forces
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, replace_handle_forces
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import (
     COGGING_AMPLITUDE,
@@ -34,7 +34,7 @@ def _draw_hardening_stiffness(context: EffectContext) -> dict[str, float]:
 
 def _build_hardening_stiffness(device: Device, axis: int, values: Values) -> Device:
     """Set the cubic stiffness of one axis."""
-    return with_forces(device, axis, {CUBIC_STIFFNESS: values["k3"]})
+    return replace_handle_forces(device, axis, {CUBIC_STIFFNESS: values["k3"]})
 
 
 def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
@@ -53,7 +53,7 @@ def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
 
 def _build_asymmetric_stiffness(device: Device, axis: int, values: Values) -> Device:
     """Set the square stiffness of one axis."""
-    return with_forces(device, axis, {SQUARE_STIFFNESS: values["k2"]})
+    return replace_handle_forces(device, axis, {SQUARE_STIFFNESS: values["k2"]})
 
 
 def _draw_constant_force(context: EffectContext) -> dict[str, float]:
@@ -63,7 +63,7 @@ def _draw_constant_force(context: EffectContext) -> dict[str, float]:
 
 def _build_constant_force(device: Device, axis: int, values: Values) -> Device:
     """Set the constant force on one axis."""
-    return with_forces(device, axis, {CONSTANT_FORCE: values["force"]})
+    return replace_handle_forces(device, axis, {CONSTANT_FORCE: values["force"]})
 
 
 def _draw_cogging(context: EffectContext) -> dict[str, float]:
@@ -78,7 +78,7 @@ def _draw_cogging(context: EffectContext) -> dict[str, float]:
 def _build_cogging(device: Device, axis: int, values: Values) -> Device:
     """Set the cogging force on one axis."""
     cells = {COGGING_AMPLITUDE: values["amplitude"], COGGING_PITCH: values["pitch"], COGGING_PHASE: values["phase"]}
-    return with_forces(device, axis, cells)
+    return replace_handle_forces(device, axis, cells)
 
 
 def _draw_end_stop(context: EffectContext) -> dict[str, float]:
@@ -97,7 +97,7 @@ def _build_end_stop(device: Device, axis: int, values: Values) -> Device:
     position_m = values["position"]
     near_side, far_side = (UPPER_STOP, LOWER_STOP) if position_m > 0.0 else (LOWER_STOP, UPPER_STOP)
     cells = {near_side: position_m, STOP_STIFFNESS: values["stiffness"]}
-    return with_forces(device, axis, cells | ({far_side: -position_m} if values["opposite"] else {}))
+    return replace_handle_forces(device, axis, cells | ({far_side: -position_m} if values["opposite"] else {}))
 
 
 EFFECTS = (

@@ -86,8 +86,8 @@ def _draw_slew_limit(motion: AxisMotion, strength: float, generator: np.random.G
 
 
 def _invert_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
-    """Make a command that steps at once to the end of each stretch of two or more steps in one direction at about the
-    highest rate."""
+    """Make a command that steps at once to the end of each stretch of two or more steps in one direction, each at
+    `from` times the rate `rate` or faster."""
     command_steps = np.diff(motion.command)
     is_limited = np.abs(command_steps) * motion.rate_hz >= values["from"] * values["rate"]
     is_continued = is_limited[1:] & is_limited[:-1] & (command_steps[1:] * command_steps[:-1] > 0)

@@ -7,8 +7,8 @@ forces.
 
 Written for the challenge only: no code is shared with the effects that a diagnosis compares, so that an error in those
 effects is not injected as well. Ranges of the drawn parameters are set by hand. Called by `injections`; positions,
-velocities and forces have the units of the recording. Divisors are at least 1e-300, so that a motion at rest divides by
-no zero.
+velocities and forces have the units of the recording. The rms values that scale a force are at least 1e-300, so that
+they can be divided by; cogging and presliding friction need a motion that is not at rest.
 """
 
 from collections.abc import Callable

@@ -70,7 +70,7 @@ class Injection:
     """A fault of sensor, clock or mains that can be injected."""
 
     effect: str
-    """Name in the vocabulary of effects."""
+    """Name in the vocabulary of effects, or a new name for a fault that is not in it, such as `sensor_play`."""
     draw: Draw
     apply: ApplyFault
     min_channels: int = 1
@@ -200,8 +200,8 @@ INJECTIONS: tuple[Injection, ...] = (
     ),
     Injection("sensor_misalignment", _draw_misalignment, rotate_readings, min_channels=3),
 )
-"""Faults of sensor, clock and mains: name in the vocabulary, draw of the parameters, and change of the response. In the
-draws, s is the strength and r the random generator; the ranges were chosen by hand."""
+"""Faults of sensor, clock and mains: name, draw of the parameters, and change of the response. In the draws, s is the
+strength and r the random generator; the ranges were chosen by hand."""
 
 
 def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> FaultyRecording:

@@ -41,7 +41,7 @@ class LawKind:
     along another axis, vx, vy, rx, ry: velocity and reading by axis, u: command, r: reading, t: time; lag(x, a): x
     after a first-order low pass with the time constant a (s)."""
     draw: Callable[[Random, PeakValues], tuple[float, float]]
-    """Draws the parameters a and b; 0 for a parameter that the formula does not contain."""
+    """Draws the parameters a and b; one that the formula does not contain has no effect."""
     variables: tuple[str, ...]
     """Sets of variables that are all accepted, each separated by spaces: x, y positions, vx, vy velocities, ax,
     ay readings, fx command, t time; x is the law's own axis."""

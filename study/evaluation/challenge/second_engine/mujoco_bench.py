@@ -107,8 +107,9 @@ def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray
     return acceleration, position
 
 
-def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
-    """Set a delay (s), rounded to whole steps and at least one, so that the label is exact; returns a new bench."""
+def replace_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
+    """Replace the delay (s), rounded to whole steps and at least one, so that the label is exact; returns a new
+    bench."""
     return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
 
 

@@ -26,13 +26,13 @@ from study.evaluation.challenge.draw_case import (
     make_truth,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
-from study.evaluation.challenge.nominal_models import as_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import convert_to_model, draw_calibration, retune
 from study.evaluation.challenge.second_engine.mujoco_bench import (
     MujocoBench,
     linearise,
     make_baseline_bench,
+    replace_delay,
     simulate_motion,
-    with_delay,
 )
 from study.evaluation.challenge.sensor import RANGE_MPS2, read_sensor
 
@@ -55,9 +55,11 @@ def draw_mujoco_case(
     base_motion = simulate_motion(baseline, plan.command)
     true_bench, measured, truth = baseline, Device(bench), []
     peak = np.minimum(np.abs(base_motion[0]).max(axis=0), RANGE_MPS2)
-    for effect, level in zip((EFFECTS[effect_name] for effect_name in effects), strength, strict=True):
+    for effect, effect_strength in zip((EFFECTS[effect_name] for effect_name in effects), strength, strict=True):
         axis = settings.axes[int(random.integers(len(settings.axes)))]
-        context = EffectContext(random, level, bench, axis, np.abs(base_motion[1]).max(axis=0), peak, settings.axes)
+        context = EffectContext(
+            random, effect_strength, bench, axis, np.abs(base_motion[1]).max(axis=0), peak, settings.axes
+        )
         values = effect.draw(context)
         if effect.name in SENSOR_EFFECTS:
             measured = effect.build(measured, axis, values)
@@ -82,7 +84,9 @@ def draw_mujoco_case(
         return replace(make_recording(name, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
 
     detectability = compute_detectability(Device(bench), measured, (base_motion, motion), settings) if effects else 0.0
-    return Case(recording, as_model(name, nominal, tolerance, settings.axes), tuple(truth), record_again, detectability)
+    return Case(
+        recording, convert_to_model(name, nominal, tolerance, settings.axes), tuple(truth), record_again, detectability
+    )
 
 
 def _add_on_axis(table: FloatArray, axis: int, value: float) -> FloatArray:
@@ -109,7 +113,7 @@ def _build_extra_mode(bench: MujocoBench, axis: int, values: Values) -> MujocoBe
     # In MuJoCo, an oscillator moves with the handle perpendicular to its direction: the mass that it adds there is
     # subtracted from the diagonal; the off-diagonal elements cannot be.
     subtracted_kg = values["mass"] * (1.0 - unit_direction**2)
-    extended_oscillators = bench.oscillators.with_oscillator(
+    extended_oscillators = bench.oscillators.append_oscillator(
         values["frequency"], values["mass"], values["damping_ratio"], unit_direction
     )
     return replace(bench, oscillators=extended_oscillators, mass_kg=bench.mass_kg - subtracted_kg)
@@ -150,7 +154,7 @@ BUILDERS: dict[str, BuildEffect] = {
         bench, limit_n=_add_on_axis(bench.limit_n, axis, values["limit"])
     ),
     "amplifier_lag": lambda bench, axis, values: replace(bench, lag_s=values["time_constant"]),
-    "transport_delay": lambda bench, axis, values: with_delay(bench, values["delay"]),
+    "transport_delay": lambda bench, axis, values: replace_delay(bench, values["delay"]),
 }
 """Effects that MuJoCo simulates, by name."""
 SENSOR_EFFECTS = ("sensor_lag", "sensor_gain")

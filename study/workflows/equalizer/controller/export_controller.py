@@ -37,7 +37,7 @@ from study.workflows.equalizer.controller.c_source import (
 from study.workflows.output_paths import require_new_outputs
 
 TITLE = "The controller was not exported"
-"""Title of each error message of this command."""
+"""Title of the errors that this module raises."""
 MAX_TRANSIENT_ROWS = 5000
 """Largest number of rows of a transient. Chosen: for a model of order 26 each row becomes 105 numbers of C source (3 x
 26 gains, 3 x 9 feedforward forces), all of which a compiler must read."""

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form, from_poles
+from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form, build_form_from_poles
 
 
 @given(seed=st.integers(0, 10_000), order=st.sampled_from([2, 4, 8]))
@@ -36,4 +36,4 @@ def test_both_sides_of_the_resolvent_agree_with_a_dense_solution(b):
 
 def test_poles_that_form_no_pairs_are_refused():
     with pytest.raises(ValueError, match="3 poles, 1 of them real, do not form pairs; choose an even order"):
-        from_poles(np.array([0.5, 0.2 + 0.1j, 0.2 - 0.1j]), np.ones((1, 3), complex))
+        build_form_from_poles(np.array([0.5, 0.2 + 0.1j, 0.2 - 0.1j]), np.ones((1, 3), complex))

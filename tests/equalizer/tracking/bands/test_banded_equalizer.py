@@ -203,8 +203,8 @@ def test_the_rendered_spring_is_left_its_part(band_model, low, high):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"low": None}, "the split has a low band beyond 4 Hz, but there is no model to play it"),
-        ({"high": None}, "the split has a high band beyond 36 Hz, but there is no model to play it"),
+        ({"low": None}, "the split has a low band with the edge 4 Hz, but there is no model to play it"),
+        ({"high": None}, "the split has a high band with the edge 36 Hz, but there is no model to play it"),
         ({"split": LinearPhaseSplit(BandEdges(4.0, None), RATE_HZ)}, "a model for a high band, but the split has none"),
         ({"split": LinearPhaseSplit(BandEdges(), 2000.0)}, "the split is at 2000 Hz, the model at 1000 Hz"),
         ({"weights": TrackingWeights(1e-6)}, r"weight is 1e-06; it must be within 0\.001 and 0\.01"),

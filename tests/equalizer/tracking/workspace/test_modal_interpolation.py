@@ -63,4 +63,7 @@ def test_a_remainder_that_no_smooth_model_holds_is_reported(three, monkeypatch):
     from equalizer.tracking.workspace import modal_interpolation as module
 
     monkeypatch.setattr(module, "REAL_POLES_PER_OCTAVE", 0.1)
-    assert "% off where it is worst" in build_modal_interpolation(three).interpolate_at((0.02, 0.01, 0.0)).remarks[0]
+    assert (
+        "the interpolated model has a fit error of up to"
+        in build_modal_interpolation(three).interpolate_at((0.02, 0.01, 0.0)).remarks[0]
+    )

@@ -18,7 +18,7 @@ def test_between_three_models_the_worst_place_is_flat_and_uncoupled(workspaces, 
 
 @pytest.mark.slow
 def test_also_where_modes_do_not_change_linearly_along_the_way(workspaces, three_bent):
-    worst = workspaces.worst(build_modal_interpolation(three_bent).at, bend=1.0)
+    worst = workspaces.worst(build_modal_interpolation(three_bent).interpolate_at, bend=1.0)
     assert worst.flatness_db <= 0.3
     assert worst.coupling_db <= -32
 
@@ -45,8 +45,8 @@ def test_figures_of_the_workspace_over_five_seeds(workspaces, order):
         middle = workspaces.models((0.5,), seed, bend=1.0, order=order).models
         bent = type(five)((five.models[0], *middle, five.models[4]))
         found["three"].append(workspaces.worst(build_modal_interpolation(three).interpolate_at))
-        found["three, bent"].append(workspaces.worst(build_modal_interpolation(bent).at, bend=1.0))
-        found["five"].append(workspaces.worst(build_modal_interpolation(five).at))
+        found["three, bent"].append(workspaces.worst(build_modal_interpolation(bent).interpolate_at, bend=1.0))
+        found["five"].append(workspaces.worst(build_modal_interpolation(five).interpolate_at))
     for name, rows in found.items():
         numbers = np.array([(row.flatness_db, row.coupling_db) for row in rows])
         flat, coupled = (0.3, -35) if name == "five" else (0.5, -28)

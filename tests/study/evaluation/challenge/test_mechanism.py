@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from study.evaluation.challenge.concealed_effect import with_cells, with_forces
+from study.evaluation.challenge.concealed_effect import replace_cells, replace_handle_forces
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import RATE_HZ
 from study.evaluation.challenge.friction_kernel import BRISTLE_STIFFNESS, LEVEL_NEGATIVE, LEVEL_POSITIVE
@@ -48,14 +48,14 @@ def test_a_sample_is_read_before_its_own_command_acts(bench):
 
 
 def test_friction_above_the_drive_holds_the_handle(bench, command):
-    held = with_cells(np.zeros((3, 7)), 0, {LEVEL_POSITIVE: 50.0, LEVEL_NEGATIVE: 50.0, BRISTLE_STIFFNESS: 3e6})
+    held = replace_cells(np.zeros((3, 7)), 0, {LEVEL_POSITIVE: 50.0, LEVEL_NEGATIVE: 50.0, BRISTLE_STIFFNESS: 3e6})
     _, position = simulate_motion(Device(bench, friction=held), command)
     assert np.abs(position[:, 0]).max() < 2e-5 < np.abs(position[:, 1]).max()
 
 
 def test_drag_takes_energy_away_and_an_even_spring_does_not_blow_up(bench, command):
     _, free = simulate_motion(Device(bench), command)
-    _, dragged = simulate_motion(with_forces(Device(bench), 0, {QUADRATIC_DAMPING: 50.0}), command)
+    _, dragged = simulate_motion(replace_handle_forces(Device(bench), 0, {QUADRATIC_DAMPING: 50.0}), command)
     assert dragged[:, 0].std() < free[:, 0].std()
 
 

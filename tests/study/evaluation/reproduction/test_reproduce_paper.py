@@ -116,7 +116,7 @@ def test_the_equalizer_is_better_at_the_centre_than_nothing(written):
 def test_friction_is_named_and_its_twin_stands_beside_it(written):
     devices = {row.device for row in written.reproduction.played}
     assert devices == {"simulated omega.3", "simulated omega.3 without friction"}
-    assert "What friction costs" in written.report.read_text()
+    assert "Effect of friction on the delivered acceleration" in written.report.read_text()
 
 
 @pytest.mark.slow

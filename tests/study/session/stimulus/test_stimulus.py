@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from equalizer.signals.signal import Signal
-from equalizer.tracking.feedforward.equalizer import Identity
+from equalizer.tracking.feedforward.equalizer import IdentityEqualizer
 from protocols.definition.apparatus import TestDirections
 from study.session.stimulus.limits import make_study_limits
 from study.session.stimulus.stimulus import compute_direction_vector, count_loop_samples, make_held_stimulus
@@ -43,7 +43,7 @@ def test_a_loop_holds_whole_periods(frequency_hz):
 def test_the_loop_is_a_sinusoid_along_the_direction_with_the_polarity_in_its_sign(small_protocol):
     vector = compute_direction_vector(small_protocol.directions, 2)
     plus, minus = (
-        make_held_stimulus(small_protocol.stimulus, vector, 25.0, level, Identity(), RATE_HZ).loop.samples
+        make_held_stimulus(small_protocol.stimulus, vector, 25.0, level, IdentityEqualizer(), RATE_HZ).loop.samples
         for level in (2.0, -2.0)
     )
     assert plus == pytest.approx(-minus)
@@ -54,7 +54,7 @@ def test_the_loop_is_a_sinusoid_along_the_direction_with_the_polarity_in_its_sig
 def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
     class HalfKilogram:
         name = "a mass of half a kilogram"
-        takes = "acceleration"
+        reference_quantity = "acceleration"
 
         def compute_loop_commands(self, wanted: Signal) -> Signal:
             assert wanted.unit == "m/s^2"
@@ -71,7 +71,7 @@ def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
 def test_without_an_equalizer_only_a_force_can_be_played():
     wanted = Signal(np.zeros((4, 3)), RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))
     with pytest.raises(ValueError, match="only a force can be played, not acceleration"):
-        Identity().compute_loop_commands(wanted)
+        IdentityEqualizer().compute_loop_commands(wanted)
 
 
 def test_the_slew_limit_is_just_above_the_steepest_stimulus(small_protocol):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.device_change.compare_devices import Change
+from analysis.device_change.compare_measurements import Change
 from study.cli.main import main
 from study.devices.force_dimension.acceptance import Acceptance, locate_acceptance_file, write_acceptance
 from study.devices.opening import get_device_folder

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.device_change import compare_devices
+from analysis.device_change import compare_measurements
 from analysis.device_change.measure_device import measure_device
 from equalizer.signals.recording import Recording
 from study.cli.main import main
@@ -76,7 +76,7 @@ def test_a_band_that_is_not_reliable_any_more_is_no_pass(recorded, monkeypatch):
     at_hz = found.response.frequency_hz
     cut = replace(found.response, reliable=found.response.reliable & (at_hz < 70))
     measured = iter([found, replace(found, response=cut)])
-    monkeypatch.setattr(compare_devices, "measure_device", lambda _: next(measured))
+    monkeypatch.setattr(compare_measurements, "measure_device", lambda _: next(measured))
     (response,) = (
         each for each in make_change_findings(compare_recordings(recording, recording)) if each.name == "Response"
     )

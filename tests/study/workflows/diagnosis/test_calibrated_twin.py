@@ -45,7 +45,7 @@ def test_the_model_says_how_the_inertia_changes_along_each_axis(folder, capsys):
         before, after = (linkage.compute_reading_at(sign * aside).inertia_kg[axis, axis] for sign in (-1, 1))
         driven_kg = model.mass[axis, axis]
         assert effect.parameters["per_m"] * driven_kg == pytest.approx((after - before) / (2 * step), rel=0.02)
-    assert any("0.282, 0.282, 0.282 kg at the centre; the recordings say" in note for note in said["notes"])
+    assert any("0.282, 0.282, 0.282 kg at the centre; by the recordings" in note for note in said["notes"])
     assert model.provenance["parents"][0]["file"] == "cal.h5"
     assert main(["validate", str(out)]) == ExitCode.DONE
 

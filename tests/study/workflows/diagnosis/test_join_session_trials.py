@@ -158,7 +158,7 @@ def test_a_session_without_a_whole_trial_is_refused(session, tmp_path):
     copy = copied(session, tmp_path)
     for path in (copy / "recordings").glob("*.h5"):
         path.unlink()
-    with pytest.raises(StudyError, match="has 0 recordings of trials, and none is whole") as refused:
+    with pytest.raises(StudyError, match="has 0 recordings of trials, and none can be used") as refused:
         join_session_trials(copy, 1)
     assert refused.value.title == "This session holds nothing to diagnose"
 
