@@ -102,9 +102,9 @@ def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ..
 def _repeat_on_device(
     plan: "EqualizePlan", options: "RepeatOptions", hands_off: bool
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
-    """Compute the forces, play them on the device and correct them by the measured error, at most
-    `options.repeats` times. Returns the summary for JSON, and the same as lines of text. hands_off: whether the user has confirmed that no
-    person holds the handle."""
+    """Compute the forces, play them on the device and correct them by the measured error, at most `options.repeats`
+    times. Returns the summary for JSON, and the same as lines of text. hands_off: whether the user has confirmed that
+    no person holds the handle."""
     from functools import partial
 
     from study.cli.progress import show_late_bar
