@@ -229,10 +229,11 @@ class ForceDimensionRig:
     def _record_failure(self, reason: str) -> DeviceError:
         """Record a failure and return its error. Only the first failure is kept: later calls return the same error."""
         if self._failure is None:
-            self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.RAISED_IN_PYTHON
             self._failure = DeviceError(
                 f"The {self.info.name} let go",
                 f"{reason}.",
                 "Check its power and its cable, then open it again; a session is continued with `hapteq resume`.",
             )
+            # After the error: another thread that reads the code then finds its reason.
+            self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.RAISED_IN_PYTHON
         return self._failure
