@@ -61,11 +61,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The export of this name, imported on access (PEP 562). Raises AttributeError for any other name."""
+    """Return the export of this name, imported on access (PEP 562). Raises AttributeError for any other name."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, _, own = _HOME[name].partition(":")
-    return getattr(import_module(module), own)
+    module, _, attribute = _HOME[name].partition(":")
+    return getattr(import_module(module), attribute)
 
 
 def __dir__() -> list[str]:

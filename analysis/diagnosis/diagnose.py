@@ -64,9 +64,8 @@ def diagnose(
 ) -> Findings:
     """Diagnose the physics that the model lacks. recordings: of one device, with the same channels, units and rate; not
     checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description of the
-    current step and the completed fraction, 0 to 1 (a rough
-    estimate). Raises IncomparableRecordingsError where clean recordings cannot be
-    compared."""
+    current step and the completed fraction, 0 to 1 (a rough estimate). Raises IncomparableRecordingsError where clean
+    recordings cannot be compared."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("testing laws in the force balance", 0.0)
@@ -143,9 +142,9 @@ def _diagnose_with_clean(
 ) -> Findings:
     """Diagnose by comparison with the clean recordings, or by a search with simulations of a given model.
 
-    The search is used where the model predicts the clean recordings well or the noise is known from repeats, unless the
-    comparison contradicts its result; otherwise where the comparison names no fault.
-    """
+    A model that was given is searched where it predicts the clean recordings well or the noise is known from repeats,
+    unless the comparison contradicts the result; otherwise where the comparison leaves a difference unexplained. For a
+    model that was fitted, only the comparison is used."""
     # Imported on demand: only some diagnoses have clean recordings.
     from analysis.diagnosis.reference.compare_with_reference import find_contrast, is_noise_from_repeats, predicts_clean
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
@@ -219,7 +218,7 @@ def _compute_balances(
 
     excluded = list_excluded_laws(settings.without, settings.discovery)
     fit_balances = partial(find_balances, recordings, excluded, settings.time_left, map_)
-    return settings.guard.run(BALANCE, "its weighing", fit_balances, ())
+    return settings.guard.run(BALANCE, "its calculation", fit_balances, ())
 
 
 def _judge_with_model(
@@ -235,7 +234,7 @@ def _judge_with_model(
     from analysis.diagnosis.confirm.decide_with_model import ResultWithModel, decide_with_model
 
     decide = partial(decide_with_model, recordings, fitting, result, settings.time_left)
-    decision = settings.guard.run(BALANCE, "its weighing", decide, ResultWithModel(result))
+    decision = settings.guard.run(BALANCE, "its calculation", decide, ResultWithModel(result))
     return replace(outcome, result=decision.result), decision.balances
 
 
@@ -258,7 +257,7 @@ def _assemble(
     else:
         diagnosis = add_balances_with_given_model(findings.diagnosis, balances, unconfirmed, channels)
     compute_maps = partial(compute_state_maps, diagnosis, balances, findings.evidence, recordings[0])
-    maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its making", compute_maps, ())
+    maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its calculation", compute_maps, ())
     guard_remarks = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear_remarks = describe_linear_terms(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
     remarks = tuple(

@@ -36,7 +36,7 @@ def diagnose_values(
     recordings: of one device, alike in channels, units and rate. model: None = a linear model is fitted to them, or to
     the clean recordings where there are any. settings: effects left out of the search, clean recordings of the device,
     compared signals. map_: as `map`, may run in parallel. progress: receives a description of the current step and the
-    share of it that is done, 0 to 1. Raises NothingToDiagnose with the errors in the recordings or the model,
+    share of it that is done, 0 to 1. Raises NothingToDiagnoseError with the errors in the recordings or the model,
     IncomparableRecordingsError where clean recordings cannot be compared with them."""
     recording_list = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or DiagnosisSettings()

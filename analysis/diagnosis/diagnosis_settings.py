@@ -31,7 +31,8 @@ class DiagnosisSettings:
     clean: tuple[Recording, ...] = ()
     """Recordings of the device without the fault. The error of the re-tuned model there does not count as mismatch."""
     fitted: bool = False
-    """Whether the program fitted the model to these recordings: laws are then tested in the force balance."""
+    """Whether the program fitted the model, to these recordings or to `clean`. Without `clean`, laws are then tested in
+    the force balance first."""
     balances: "tuple[Balance, ...] | None" = None
     """Result of `find_balances` for these recordings, where it is known already; None = it is computed."""
     compared: Compared = "auto"

@@ -88,7 +88,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     ),
     "sensor_lag": EffectWords("a low pass in the sensor", {"bandwidth": "at {}"}),
     "sensor_clipping": EffectWords("clipping in the sensor", {"limit": "at {}"}),
-    "sensor_misalignment": EffectWords("a turned sensor"),
+    "sensor_misalignment": EffectWords("a misaligned sensor"),
     "cross_axis_sensitivity": EffectWords(
         "cross-axis sensitivity of the sensor",
         {"from_next": "{} of the next axis", "from_after_next": "{} of the one after it"},

@@ -41,7 +41,7 @@ def prepare_recordings(
     """Prepare recordings by all steps of the module docstring. recordings: with the same channels, units and rate, in
     the order of names. without_model: whether to convert them to one motion per force (no model was given).
     accept_short: whether few cycles or samples are a remark instead of a refusal; None = the value of without_model.
-    Raises NothingToDiagnose for unsuitable recordings."""
+    Raises NothingToDiagnoseError for unsuitable recordings."""
     segment_results = [find_segments(recording) for recording in recordings]
     repeat_texts = [(name, text) for name, (_, text) in zip(names, segment_results, strict=True) if text]
     repeat_remarks = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in repeat_texts)
@@ -62,7 +62,7 @@ def prepare_recordings(
 
 def prepare_comparison(recordings: Sequence[Recording], names: Sequence[str], accept_short: bool) -> PreparedRecordings:
     """Prepare recordings by the last steps only (from the refusal on), for recordings that are prepared already, such
-    as the trials of a session. Raises NothingToDiagnose for unsuitable recordings."""
+    as the trials of a session. Raises NothingToDiagnoseError for unsuitable recordings."""
     require_different(recordings, names)
     weakness_remarks = tuple(
         f"{begin_sentence(problem)}." for problem in require_usable_data(recordings, names, accept_short)

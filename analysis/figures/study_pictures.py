@@ -182,7 +182,7 @@ def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(
-            name=f"staircases-{index}-{_sanitize_subject_code(subject)}",
+            name=f"staircases-{subject_number}-{_sanitize_subject_code(subject)}",
             title=f"{'Levels' if analysis.protocol.staircase.is_bayesian else 'Staircases'} of {subject}",
             caption=select_threshold_words(analysis.protocol.staircase).run_caption,
             figure=draw_staircases(
@@ -190,5 +190,5 @@ def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
             ),
             folded=True,
         )
-        for index, subject in enumerate(subjects, start=1)
+        for subject_number, subject in enumerate(subjects, start=1)
     ]

@@ -1,6 +1,6 @@
 """Result type of the plausibility checks of a recording: severity, finding and advice, in sentences for the user.
 
-All modules of this package return it; `overview` collects and sorts the results, `look_report` prints them.
+The functions `check_…` of this package return it; `overview` collects and sorts the results, `look_report` prints them.
 """
 
 from dataclasses import dataclass

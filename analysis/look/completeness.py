@@ -89,12 +89,12 @@ def _compare_pairs(channels: Sequence[Channel]) -> Iterator[Check]:
         scale = _match_channels(first.samples, second.samples)
         if scale is None:
             continue
-        scale_text = "" if abs(scale - 1) < _COPY_TOLERANCE else f" times {scale:.6g}, up to an offset"
+        scale_text = "" if abs(scale - 1) < _COPY_TOLERANCE else f" times {scale:.6g}"
         is_suspicious = {first.role, second.role} <= {"command", "response"}
         yield Check(
             COPIES_CHECK,
             "wrong" if is_suspicious else "notice",
-            f"{second.label} is {first.label}{scale_text}, sample by sample.",
+            f"{second.label} is {first.label}{scale_text}, up to an offset, sample by sample.",
             "Check the map: two sensors never agree to the last digit; leave one of them out.",
         )
 

@@ -1,5 +1,6 @@
-"""Checks of the excitation: driven frequency band of each command, multiple coherence of each response with all
-commands, and segments without excitation. Called by `overview`; `study.workflows.files` calls `find_silent_segments`.
+"""Checks of the excitation: driven frequency band of each excitation or command, multiple coherence of each response
+with all commands, and segments without excitation. Called by `overview`; `study.workflows.files` calls
+`find_silent_segments`.
 
 The multiple coherence of a response with q inputs is S_xy^H S_xx^-1 S_xy / S_yy at each spectral line, between 0 and 1.
 Source: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010, chapter 7. Unrelated signals have, for n averaged
@@ -93,9 +94,9 @@ def _is_varying(channel: Channel) -> bool:
 def estimate_coherences(
     spectra: CrossSpectra, channels: Sequence[Channel], bands: Sequence[DrivenBand]
 ) -> tuple[ResponseCoherence, ...]:
-    """Estimate the multiple coherence of each varying response with all driven commands. bands: their driven bands, by
-    the names of the commands. Empty if no command is driven, or if fewer than 2 q + 2 windows were averaged for q
-    inputs."""
+    """Estimate the multiple coherence of each varying response with all driven commands. bands: driven bands, by the
+    names of the commands, which excitations share. Empty if no command is driven, or if fewer than 2 q + 2 windows were
+    averaged for q inputs."""
     inputs = [
         index
         for index, candidate in enumerate(channels)
@@ -165,10 +166,8 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
     checks += [
         Check(DRIVEN_CHECK, "wrong", sentence, "Correct the segments.") for sentence in find_silent_segments(recording)
     ]
-    bands_text = "; ".join(
-        f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands
-    )
-    return (*checks, *((Check(DRIVEN_CHECK, "fine", f"Command {bands_text}."),) if bands_text else ()))
+    bands_text = "; ".join(f"'{band.command}' from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
+    return (*checks, *((Check(DRIVEN_CHECK, "fine", f"Driven bands: {bands_text}."),) if bands_text else ()))
 
 
 def find_silent_segments(recording: Recording) -> tuple[str, ...]:

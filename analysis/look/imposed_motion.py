@@ -18,7 +18,7 @@ _HALF_CYCLES_PER_STRETCH = 4
 _LEAST_REVERSAL_FRACTION = 0.1
 """Change against the direction of motion above which a half cycle ends, as a fraction of the signal's range: chosen
 above the noise of a sensor."""
-_TRIM_FRACTION = 0.7
+_KEPT_FRACTION = 0.7
 """Fraction of the samples that a fit keeps: the rest lie at the corners of ramps and trapezoids. Also the fraction of
 unchanged samples above which a signal is a series of steps. Chosen."""
 _REST_SPEED_FRACTION = 0.1
@@ -57,7 +57,7 @@ def compute_law_misfit(signal: FloatArray, *, is_ramp_law: bool = False) -> floa
     filled_signal = np.interp(np.arange(len(signal)), np.flatnonzero(is_finite), signal[is_finite])
     filled_signal = (filled_signal - filled_signal.mean()) / np.ptp(filled_signal)
     if (
-        np.mean(np.diff(filled_signal) == 0) > _TRIM_FRACTION
+        np.mean(np.diff(filled_signal) == 0) > _KEPT_FRACTION
         and len(np.unique(filled_signal)) < len(filled_signal) / _BLOCKS_PER_HALF_CYCLE
     ):
         return 0.0
@@ -99,7 +99,7 @@ def _count_half_cycles(scaled_signal: FloatArray) -> int:
 def _compute_stretch_misfit(block_means: FloatArray, term_count: int) -> float:
     """Compute the misfit of one stretch of block means (m,) to the first `term_count` terms of the quadratic; 1 for
     fewer than half `_BLOCKS_PER_HALF_CYCLE` blocks, or than a quarter of it in motion. Trimmed least squares: three
-    fits, each to the `_TRIM_FRACTION` of the blocks with the smallest residuals of the fit before."""
+    fits, each to the `_KEPT_FRACTION` of the blocks with the smallest residuals of the fit before."""
     if len(block_means) < _BLOCKS_PER_HALF_CYCLE // 2:
         return 1.0
     speed_squared = ((block_means[4:] - block_means[:-4]) / 4) ** 2
@@ -112,6 +112,6 @@ def _compute_stretch_misfit(block_means: FloatArray, term_count: int) -> float:
     for _ in range(3):
         coefficients = np.linalg.lstsq(regressors[is_well_fitted], speed_squared[is_well_fitted], rcond=None)[0]
         residual = np.abs(speed_squared - regressors @ coefficients)
-        is_well_fitted = residual <= np.quantile(residual, _TRIM_FRACTION)
+        is_well_fitted = residual <= np.quantile(residual, _KEPT_FRACTION)
     mean_speed_squared = float(np.mean(speed_squared))
     return float(np.mean(residual[is_well_fitted])) / mean_speed_squared if mean_speed_squared > 0 else 0.0

@@ -78,7 +78,8 @@ def _check_channel_resolution(channel: Channel) -> Check | None:
 
 @dataclass(frozen=True, slots=True)
 class ChannelSummary:
-    """Range, mean, rms and number of missing samples of a channel, in its unit; NaN without finite samples."""
+    """Range, mean, rms and number of missing samples of a channel, in its unit. Without finite samples range and mean
+    are NaN, and the rms is 0."""
 
     role: str
     """Role, name, quantity and unit: as in `Channel`."""
@@ -114,9 +115,9 @@ class Overview(SummaryDisplay):
     levels: tuple[SegmentLevel, ...]
     """Rms of each channel in each segment."""
     spectra: CrossSpectra | None
-    """Cross spectra of all channels; None where no stretch without gaps is long enough."""
+    """Cross spectra of all channels; None where no stretch is long enough, or every window lacks samples."""
     bands: tuple[DrivenBand, ...]
-    """Bands that the commands drive; empty without spectra."""
+    """Driven bands of the excitations, or of the commands where no excitation varies; empty without spectra."""
     coherences: tuple[ResponseCoherence, ...]
     """Coherence of responses with commands in these bands; empty without spectra."""
     pairs: tuple[KinematicPair, ...]
@@ -201,7 +202,7 @@ def _restate_in_samples(check: Check) -> Check:
 
 
 def _summarise_channel(channel: Channel) -> ChannelSummary:
-    """Summarise the finite samples of a channel; NaN where there are none."""
+    """Summarise the finite samples of a channel; without any, range and mean are NaN, and the rms is 0."""
     finite_samples = channel.finite_samples if channel.finite_samples.size else np.array([np.nan])
     return ChannelSummary(
         channel.role,

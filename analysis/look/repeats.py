@@ -19,7 +19,7 @@ from equalizer.signals.signal import FloatArray
 CHECK_NAME = "repeats"
 """Name of these checks in the overview."""
 ACCEPTED_DIFFERENCE, WRONG_DIFFERENCE = 0.02, 0.2
-"""Limits of the relative difference (`_check_period`) of the command between declared periods: up to the first the
+"""Limits of the relative difference (`_check_period`) of the excitation between declared periods: up to the first the
 period is accepted, above the second it is an error, in between a notice is given. Heuristic."""
 NOTABLE_NOISE = 0.3
 """Rms noise of a channel between repeats, as a share of its mean period's rms, above which a notice is given.
@@ -99,7 +99,7 @@ def check_repeats(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
             Check(
                 CHECK_NAME,
                 "notice",
-                f"The command repeats every {repeats.undeclared_period} samples "
+                f"The excitation repeats every {repeats.undeclared_period} samples "
                 f"({repeats.undeclared_period / recording.sample_rate_hz:.4g} s), {repeat_count:.3g} times, but no "
                 "segment says so.",
                 f"State period = {repeats.undeclared_period} in its segment: repetition separates noise "
@@ -132,7 +132,8 @@ def _check_noise(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Ch
 
 
 def _check_periods(recording: Recording) -> list[Check | None]:
-    """Check the segments' declared periods by the command's difference from period to period."""
+    """Check the declared periods of segments of at least two periods, by the difference of the excitation (the command
+    where no excitation varies) from period to period."""
     return [
         _check_period(find_designed_command(recording).samples[segment.start : segment.stop], segment, number)
         for number, segment in enumerate(recording.segments, start=1)
@@ -152,7 +153,7 @@ def _check_period(command: FloatArray, segment: Segment, number: int) -> Check |
     return Check(
         CHECK_NAME,
         "wrong" if relative_difference > WRONG_DIFFERENCE else "notice",
-        f"Segment {number} states a period of {segment.period} samples, but its command differs by "
+        f"Segment {number} states a period of {segment.period} samples, but its excitation differs by "
         f"{relative_difference:.1%} from one period to the next.",
         "Correct the period, or set it to 0.",
     )

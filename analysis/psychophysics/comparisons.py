@@ -71,7 +71,7 @@ def compare_group_means(anova: OneWayAnova, confidence: float = 0.95) -> Compari
     ANOVA has no mean square within groups (no spread, or values in fewer than two groups), the result has no pairs and
     a note. confidence: 0 to 1."""
     if anova.mean_square_within is None or anova.df_within is None:
-        return Comparisons(confidence, None, (), (), ("Without a spread within groups no pairs can be compared.",))
+        return Comparisons(confidence, None, (), (), ("Pairs need values in two groups and a spread within groups.",))
     groups = [group for group in anova.groups if group.n > 0]
     return compute_tukey_kramer(groups, anova.mean_square_within, anova.df_within, confidence)
 

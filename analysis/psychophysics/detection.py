@@ -23,7 +23,7 @@ from protocols.trial import Phase, Trial
 
 
 @dataclass(frozen=True, slots=True)
-class BelowDetection:
+class ThresholdBelowDetection:
     """A direction threshold below the detection threshold of the same participant and frequency, which is not
     plausible: a direction cannot be identified without detection."""
 
@@ -85,7 +85,9 @@ def _look_up_detection_threshold(
     return detection.values[row][column], detection.censored[row][column]
 
 
-def find_directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
+def find_thresholds_below_detection(
+    direction: ThresholdTable, detection: ThresholdTable
+) -> tuple[ThresholdBelowDetection, ...]:
     """Find participants and frequencies whose direction threshold lies below their detection threshold. Both tables in
     newtons; censored direction thresholds are left out."""
     detection_thresholds_n = {
@@ -95,7 +97,7 @@ def find_directions_below_detection(direction: ThresholdTable, detection: Thresh
         if threshold_n is not None
     }
     return tuple(
-        BelowDetection(subject, frequency_hz, threshold_n, detection_thresholds_n[subject, frequency_hz])
+        ThresholdBelowDetection(subject, frequency_hz, threshold_n, detection_thresholds_n[subject, frequency_hz])
         for subject, row, censored_flags in zip(direction.subjects, direction.values, direction.censored, strict=True)
         for frequency_hz, threshold_n, is_censored in zip(direction.frequencies_hz, row, censored_flags, strict=True)
         if threshold_n is not None

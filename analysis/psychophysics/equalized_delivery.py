@@ -1,4 +1,5 @@
-"""Ratio of delivered to requested acceleration by frequency and direction, in a study whose stimuli are equalized.
+"""Ratio of delivered to requested (target) acceleration by frequency and direction, in a study whose stimuli are
+equalized.
 
 The ratio is computed per direction of the device (its angle), not per number on the screen. The numbers may be swapped
 between people; a device that delivers too much along one direction and too little along the other would then seem
@@ -30,8 +31,8 @@ class Delivery:
     """Delivered over requested amplitude along the protocol's directions 1 and 2 (`_find_played_direction`); None for a
     direction without trials."""
     off_axis: float
-    """Delivered amplitude off the direction over that along it; 0 for a trial without a measurement off the
-    direction."""
+    """Delivered amplitude off the direction over that along it; a trial without a measurement off the direction counts
+    as 0."""
 
     @property
     def is_within_tolerance(self) -> bool:
@@ -65,12 +66,12 @@ def make_delivery_warning(deliveries: Sequence[Delivery]) -> str:
     deviation_texts = [
         f"{delivery.frequency_hz:g} Hz "
         f"({' and '.join(f'{100 * ratio:.0f} %' for ratio in delivery.along if ratio is not None)} "
-        f"of what was wanted, {100 * delivery.off_axis:.0f} % off the direction)"
+        f"of the target, {100 * delivery.off_axis:.0f} % off the direction)"
         for delivery in deviating_deliveries
     ]
     return (
-        f"The accelerations that arrived are not those that were wanted, by more than {100 * DELIVERY_TOLERANCE:.0f} % "
-        f"at the median: {conjoin(deviation_texts)}. Take the delivered accelerations, not the levels, for what was "
+        f"The delivered accelerations deviate from their targets by more than {100 * DELIVERY_TOLERANCE:.0f} % at the "
+        f"median: {conjoin(deviation_texts)}. Take the delivered accelerations, not the levels, for what was "
         "felt there."
     )
 

@@ -48,7 +48,8 @@ class Contrast:
     p: float
     """Two-sided p value of the t test, uncorrected."""
     p_holm: float
-    """p with Holm's correction over all planned contrasts, including those that are not reported."""
+    """p with Holm's correction over all planned contrasts, including those that are not reported (by the Tobit model:
+    over those reported)."""
     effect_size: float | None
     """Mean over standard deviation of the differences (Cohen's d_z); None where some of them rest on answers at other
     frequencies only."""

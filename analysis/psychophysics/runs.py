@@ -68,7 +68,8 @@ def recompute_runs(
     follow no staircase: a caller who passes TRAINING must leave them out of `trials` (see `study_analysis`).
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
-    answers before it lead to, or where a row is missing, doubled or too many.
+    answers before it lead to, a run has two frequencies, an answer has no `correct`, a catch trial was not played at
+    the cap, or a row is missing, doubled or too many.
     """
     phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
     trials_by_run: dict[tuple[str, str, int], list[Trial]] = {}

@@ -47,7 +47,7 @@ from protocols.trial import Phase, Trial
 
 @dataclass(frozen=True, slots=True)
 class PracticeRun:
-    """A practice run: short, at a fixed level, passed or not passed. Practice enters no other result."""
+    """A practice run: short, at a fixed or roved level, passed or not passed. Practice enters no other result."""
 
     subject: str
     session: str
@@ -118,7 +118,7 @@ class StudyAnalysis(SummaryDisplay):
     single_persons: SinglePersons | None
     """Each person's thresholds by maximum a posteriori; None where there is a hierarchical model, or no answer."""
     mean_contrasts: tuple[Contrast, ...]
-    """Differences of reversal means (dB) from the lowest frequency with answers, within participants."""
+    """Differences of reversal means (dB) from the lowest frequency (of `primary`, if any), within participants."""
     tobit: tuple[Contrast, ...]
     """The same contrasts by the Tobit model for values cut by the cap, a sensitivity analysis; empty where none is."""
     declaration: str
@@ -133,8 +133,8 @@ class StudyAnalysis(SummaryDisplay):
     catches: tuple[CatchTally, ...]
     practice: tuple[PracticeRun, ...]
     cues: tuple[CueFinding, ...]
-    cue_gaps: tuple[CueGap, ...]
     """Differences between the two directions in the delivered stimulus, and whether answers followed them."""
+    cue_gaps: tuple[CueGap, ...]
 
     def summary(self) -> Summary:
         table = self.table
@@ -233,7 +233,7 @@ def _compute_mean_contrasts(
 
 def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
     """Convert the statistics to JSON values, format `hapteq-anova`, version 1. A number that the data do not determine
-    is None; the notes of the same entry give the reason."""
+    is None; where the entry has notes, they give the reason."""
     return {
         "format": "hapteq-anova",
         "version": 1,

@@ -13,7 +13,7 @@ from scipy.stats import binom
 from analysis.psychophysics.bias import compute_criterion_variance
 from analysis.psychophysics.catch_trials import CatchTally, compute_wilson_interval
 from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
-from analysis.psychophysics.detection import find_directions_below_detection
+from analysis.psychophysics.detection import find_thresholds_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.threshold_words import select_threshold_words
@@ -280,7 +280,7 @@ def _warn_of_detection_at_chance(detection: Sequence[Threshold]) -> str:
 def _warn_of_direction_below_detection(table: ThresholdTable, detection_table: ThresholdTable) -> str:
     cells = [
         f"{case.subject} at {case.frequency_hz:g} Hz ({case.direction_n:.2f} N, detected from {case.detection_n:.2f} N)"
-        for case in find_directions_below_detection(table, detection_table)
+        for case in find_thresholds_below_detection(table, detection_table)
     ]
     if not cells:
         return ""

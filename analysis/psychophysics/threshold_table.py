@@ -28,7 +28,8 @@ class ThresholdTable:
     values: tuple[tuple[float | None, ...], ...]
     """values[subject][frequency]; None where there is no completed run, or it has no value of this quantity."""
     censored: tuple[tuple[bool, ...], ...]
-    """Same shape as `values`: True where the value is cut by the cap."""
+    """Same shape as `values`: True where the cap cut into the threshold of the completed run, also where `values` has
+    None for lack of a measurement."""
     stopped: tuple[tuple[bool, ...], ...]
     """Same shape as `values`: True where there is no value because the trial limit ended a run and none was
     completed."""
@@ -45,7 +46,7 @@ class ThresholdTable:
 
     @property
     def censored_count(self) -> int:
-        """Number of values that are cut by the cap (censored)."""
+        """Number of thresholds into which the cap cut (censored)."""
         return sum(map(sum, self.censored))
 
     @property

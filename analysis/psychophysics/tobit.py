@@ -57,7 +57,8 @@ def compute_tobit_contrasts(
 
     A frequency without an uncensored run is left out, because its likelihood has no maximum. Empty where no run is
     censored (the analysis of the plain means then suffices), the first frequency is left out, or there are fewer than
-    three people (chosen). Raises LinAlgError as `fit_tobit` does.
+    three people (chosen). `Contrast.p_holm` is corrected over the contrasts that are returned alone. Raises LinAlgError
+    as `fit_tobit` does.
     """
     is_measured = np.isfinite(values_db)
     has_uncensored: NDArray[np.bool_] = np.asarray((is_measured & ~is_censored).any(axis=0))
@@ -139,7 +140,8 @@ def fit_tobit(values_db: FloatArray, is_censored: NDArray[np.bool_]) -> TobitFit
 def _compute_second_difference(
     compute_cost: Callable[[FloatArray], float], centre: FloatArray, first_step: FloatArray, second_step: FloatArray
 ) -> float:
-    """Compute the central second difference of the cost along the steps a and b, not divided by their lengths."""
+    """Compute the central second difference of the cost along `first_step` and `second_step`, not divided by their
+    lengths."""
     return (
         compute_cost(centre + first_step + second_step)
         - compute_cost(centre + first_step - second_step)

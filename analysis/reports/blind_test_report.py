@@ -71,14 +71,14 @@ def render_blind_test_report(
         Section("Figures", tables=(_make_score_table(score),)),
         *_make_follow_up_sections(metadata.follow_ups),
         *_make_control_sections(metadata.controls),
-        Section("Which, from where on, how sure", pictures=tuple(pictures)),
-        Section("How it was done", METHOD_PARAGRAPHS, points=_describe_reproduction(metadata)),
+        Section("Detection, confusions and calibration", pictures=tuple(pictures)),
+        Section("Method", METHOD_PARAGRAPHS, points=_describe_reproduction(metadata)),
     )
     return render_page(
         Page(
             title="Blind test of the diagnosis on concealed physics",
-            summary=f"{len(outcomes)} devices were diagnosed blind; {len(score.misses)} answers are not as they should "
-            "be. All of them are listed.",
+            summary=f"{len(outcomes)} devices were diagnosed blind; {len(score.misses)} answers are wrong. "
+            "All of them are listed.",
             banner=" ".join(metadata.remarks),
             sections=sections,
             generated=generated,
@@ -95,7 +95,7 @@ def _make_control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section,
         (control.name, control.claim, "held" if control.held else "did not hold", "; ".join(control.said))
         for control in controls
     )
-    table = Table("What is changed, and what must come of it", ("control", "claim", "outcome", "said"), rows)
+    table = Table("Altered recordings and their claims", ("control", "claim", "outcome", "diagnosis"), rows)
     return (Section("Controls", tables=(table,)),)
 
 
@@ -107,13 +107,13 @@ def _make_follow_up_sections(follow_ups: Sequence[FollowUp]) -> tuple[Section, .
     rows = tuple(
         (
             str(follow_up.number), follow_up.effect, ", ".join(follow_up.returned),
-            follow_up.proposed or "nothing would tell",
+            follow_up.proposed or "no recording would decide",
             _describe_returned(follow_up.proposed, follow_up.after_proposed), follow_up.drawn or "-",
             _describe_returned(follow_up.drawn, follow_up.after_drawn),
         )
         for follow_up in follow_ups
     )  # fmt: skip
-    header = ("number", "concealed", "left at first", "proposed", "left then", "drawn at random", "left then")
+    header = ("number", "concealed", "names at first", "proposed", "names then", "random", "names then")
     notes = ("A random recording comes from the same menu, and may be the proposed one.",)
     table = Table("Single effects whose first recording left several names", header, rows, notes)
     return (Section("The next experiment", tables=(table,)),)
@@ -145,8 +145,8 @@ def _make_miss_table(misses: Sequence[Outcome]) -> Table:
         )
         for miss in misses
     )  # fmt: skip
-    header = ("number", "kind, bank", "concealed", "strength", "said", "re-tuned / noise", "after / noise")
-    return Table("Every answer that is not as it should be", header, rows)
+    header = ("number", "kind, bank", "concealed", "strength", "diagnosis", "re-tuned / noise", "after / noise")
+    return Table("Every wrong answer", header, rows)
 
 
 def _make_score_table(score: Score) -> Table:
@@ -157,5 +157,5 @@ def _make_score_table(score: Score) -> Table:
         sum(probability_bin.of for probability_bin in calibration.bins),
     )  # fmt: skip
     rows = tuple((estimate.name, format_figure(estimate)) for estimate in (*score.figures, calibration_estimate))
-    notes = ("95 % intervals: shares after Wilson, others by resampling. Singles, pairs and outside: the detectable.",)
-    return Table("With 95 % intervals", ("what", "measured"), rows, notes)
+    notes = ("95 % intervals: Wilson for shares, else resampling. Singles, pairs and outside: detectable cases.",)
+    return Table("Scores with 95 % intervals", ("score", "value"), rows, notes)

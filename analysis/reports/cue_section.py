@@ -9,7 +9,7 @@ Called by `analysis.reports.study_report`.
 
 from collections.abc import Sequence
 
-from analysis.psychophysics.cues.answers_on_delivery import CUE_ONLY_SLOPE, AnswersOnDelivery
+from analysis.psychophysics.cues.answers_on_delivery import CUE_ONLY_SLOPE, AnswerRegression
 from analysis.psychophysics.cues.cue_findings import CueFinding, describe_cue_gaps, make_cue_warnings
 from analysis.psychophysics.cues.cue_sensitivity import INTERNAL_NOISE_DB, TYPICAL_NOISE_DB
 from analysis.psychophysics.cues.delivered_cues import CueGap
@@ -56,7 +56,7 @@ def _describe_no_cue(findings: Sequence[CueFinding]) -> str:
         f"No measured difference is one that a participant with an internal noise of {TYPICAL_NOISE_DB:g} dB notices, "
         "and no answers are shown to depend on what was delivered."
         + (
-            " Delivery varied too little within a direction to test whether answers depend on it: "
+            " Within a direction, these data cannot test whether answers depend on the delivery: "
             f"{conjoin(untestable_cues)}. A roved level (rove_db of [stimulus]) allows the test for intensity."
             if untestable_cues
             else ""
@@ -116,7 +116,7 @@ def _tabulate_regressions(findings: Sequence[CueFinding]) -> Table:
     )  # fmt: skip
 
 
-def _format_slope_and_interval(answers: AnswersOnDelivery) -> tuple[str, str]:
+def _format_slope_and_interval(answers: AnswerRegression) -> tuple[str, str]:
     """Format the slope of the regression (logits per dB) and its 95 % interval; `MISSING` where they are not
     determined."""
     if answers.slope is None or answers.lower is None or answers.upper is None:

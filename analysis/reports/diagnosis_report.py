@@ -57,7 +57,7 @@ def render_diagnosis_report(
         *_make_answer_sections(findings),
         _make_localisation_section(findings, pictures),
         *make_distortion_sections(findings),
-        *(_make_effect_section(findings, number, pictures) for number in range(len(diagnosis.effects))),
+        *(_make_effect_section(findings, effect_index, pictures) for effect_index in range(len(diagnosis.effects))),
         *_make_candidate_sections(findings),
         *_make_rival_sections(pictures),
         _make_error_section(findings, pictures),
@@ -133,9 +133,10 @@ def _make_localisation_section(findings: Findings, pictures: Sequence[Picture]) 
     )
 
 
-def _make_effect_section(findings: Findings, number: int, pictures: Sequence[Picture]) -> Section:
-    """Make the section on the effect with this index: equation, source, rivals, signature curves and parameters."""
-    effect = findings.diagnosis.effects[number]
+def _make_effect_section(findings: Findings, effect_index: int, pictures: Sequence[Picture]) -> Section:
+    """Make the section on the effect with this index (from 0): equation, source, rivals, signature curves and
+    parameters."""
+    effect = findings.diagnosis.effects[effect_index]
     catalogue_effect = next((match.effect for match in findings.named if match.effect.name == effect.effect), None)
     paragraphs = [describe_share(effect)]
     if catalogue_effect is not None:

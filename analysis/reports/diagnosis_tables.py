@@ -37,7 +37,7 @@ def tabulate_parameters(effect: NamedEffect) -> Table:
         (name.replace("_", " "), format_estimate(parameter).partition(" [")[0], _format_interval(parameter))
         for name, parameter in effect.parameters.items()
     )
-    return Table("Its parameters", ("Number", "Value", "95 % interval"), rows)
+    return Table("Its parameters", ("Parameter", "Value", "95 % interval"), rows)
 
 
 def tabulate_rivals(effect: NamedEffect) -> Table:
@@ -72,7 +72,7 @@ def tabulate_candidates(findings: Findings) -> Table | None:
     )
     if not rows:
         return None
-    header = ("Candidate", "Numbers", "Held-out gain", "Of what all laws explain", "Reason not to name it")
+    header = ("Candidate", "Parameters", "Held-out gain", "Of what all laws explain", "Reason not to name it")
     note = (
         "Held-out gain: share of the error's power that the law explains on held-out data, in addition to the other "
         "laws of the best sum. The next column gives the same as a share of what all laws together explain of the "
@@ -98,8 +98,8 @@ def tabulate_errors(findings: Findings) -> Table:
 
 def tabulate_channel_errors(findings: Findings, part: Literal["fit", "test"]) -> Table | None:
     """Tabulate the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
-    where there are no time series. part: set of samples, a key of `_PART_NAMES`. Where a statistic was fitted, its
-    chance error takes the place of the noise."""
+    where there are no time series. Channels without a known noise are left out. part: set of samples, a key of
+    `_PART_NAMES`. Where a statistic was fitted, its chance error takes the place of the noise."""
     if not findings.time_series:
         return None
     channel_names, channel_units, noise_rms_by_channel = (
@@ -185,8 +185,8 @@ def tabulate_retuned(findings: Findings) -> Table | None:
         )
         for retuned, completed in zip(retuned_parameters, final_parameters, strict=True)
     )
-    header = ("Number", "Re-tuned", "Standard deviations", "With the effects found", "Standard deviations")
-    return Table("Every free parameter, by the size of its change", header, rows, folded=True)
+    header = ("Parameter", "Re-tuned", "Standard deviations", "With the effects found", "Standard deviations")
+    return Table("Every free parameter and its change", header, rows, folded=True)
 
 
 def _format_stage_error(errors: Errors, stage: str) -> str:

@@ -24,8 +24,8 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     """Make the section with rates of right answers, tallies by kind and by recording, and all misses: wrong answers
     where the fault was detectable or a wrong fault was named. Tables without rows are left out."""
     rate_table = Table(
-        "How often it was right",
-        ("what", "rate, 95 % interval"),
+        "Rates of correct answers",
+        ("rate", "value, 95 % interval"),
         tuple((rate.name, format_rate(rate)) for rate in score_injections(outcomes)),
     )
     kind_table = _make_tally_table("Detectable faults by kind", "injected", make_tallies(outcomes, classify_injection))

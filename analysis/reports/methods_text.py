@@ -27,7 +27,7 @@ _LEVEL_SENTENCES = {
     "commanded_force": "The level of a trial is the amplitude of the commanded force.",
     "delivered_acceleration": "Stimuli were accelerations of the handle, equal for both directions, commanded through "
     "an identified model of the device. The level of a trial is the highest force that either direction needs for that "
-    "acceleration; the table of trials has the acceleration that was wanted and the one that was measured.",
+    "acceleration; the table of trials has the target and the measured acceleration.",
 }
 """Meaning of the level of a trial, by `stimulus.quantity`."""
 _STIMULUS_NOUNS = {"commanded_force": "sinusoidal force", "delivered_acceleration": "sinusoidal vibration"}

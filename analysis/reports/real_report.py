@@ -187,7 +187,7 @@ def describe_parameter(parameter: OwnParameter) -> str:
     other means, with its deviation from it in %, which a known value of 0 does not have."""
     interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
     value_text = (
-        f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after everything"
+        f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after the last fit"
     )
     if parameter.nominal is None:
         return f"{value_text}."
@@ -212,7 +212,7 @@ def _describe_pair(pair: PairOutcome | None) -> tuple[str, ...]:
     return (
         f"A change that was really made: {pair.changed} ({pair.before}, then {pair.after}). What the model missed "
         f"before the change, {format_error(pair.expected_left)} of the signal, counts as no mismatch.",
-        f"Named as the change: {effect_names}. Errors after it on held-out data: the model of before as it is "
+        f"Named as the change: {effect_names}. Held-out errors after it: the model from before, unchanged, "
         f"{format_error(pair.as_before)}, with one factor re-tuned {format_error(pair.gain)}, re-tuned within its "
         f"tolerances {format_error(pair.retuned)}, with what is named {format_error(pair.with_effects)}.",
     )

@@ -34,15 +34,15 @@ _MODEL_NOTE = (
 )
 """Note below the table of model errors."""
 _ROW_NOTES = (
-    "Over every line of the band, worst axis: flatness is the largest deviation from the wanted level; coupling the "
-    "largest off-axis response over that along the axis; axis error the largest angle between the wanted axis and what "
-    "is played; error the root mean square of what differs from what was wanted. Rows that are not equalized are "
+    "Over every line of the band, worst axis: flatness is the largest deviation from the target level; coupling the "
+    "largest off-axis response over that along the axis; axis error the largest angle between the target axis and what "
+    "is played; error the root mean square of the deviation from the target. Rows that are not equalized are "
     "scaled by their mean gain first.",
 )
 """Notes below the table of the rows of figure 5."""
 _BASELINE_NOTES = (
     "Swept sines, as in the figure. Every row but the last of 'edge' and 'in the hand' uses only what was identified "
-    "at the centre without a hand. 'Nothing' commands the wanted number of m/s² in N, so its flatness is a gain that "
+    "at the centre without a hand. 'Nothing' commands the target number of m/s² in N, so its flatness is a gain that "
     "was never set; 'static gain' sets it. The rigid-body model is fitted to the whole band here; the raw estimate "
     "is the measured response, inverted line by line. Cost: multiplications and additions per sample, of a form that "
     "runs sample by sample.",
@@ -171,7 +171,7 @@ def _make_remark_tables(figure: FigureFindings) -> tuple[Table, ...]:
 def _make_played_tables(reproduction: Reproduction) -> tuple[Table, ...]:
     """Make the table of the quality of every row of figure 5, and, where the document has baselines, a second one of
     other ways of driving the device."""
-    header = ("", "Device", "Wanted", *_MEASURE_HEADINGS)
+    header = ("", "Device", "Target", *_MEASURE_HEADINGS)
     rows = tuple((row.name, row.device, row.signal, *_format_measures(row)) for row in reproduction.played)
     tables = [Table("What was played, row by row", header, rows, notes=_ROW_NOTES)]
     if reproduction.baselines:

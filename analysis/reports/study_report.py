@@ -175,7 +175,7 @@ def _make_supplementary_sections(analysis: StudyAnalysis) -> list[Section]:
         sections.append(Section("Catch trials", paragraphs=(catch_note,), tables=(make_catch_table(analysis),)))
     if analysis.practice:
         practice_note = (
-            "Short runs at a fixed level, before the test runs. They enter no result and excluded no participant."
+            "Short runs without a staircase, before the test runs. They enter no result and excluded no participant."
         )
         sections.append(Section("Practice", paragraphs=(practice_note,), tables=(make_practice_table(analysis),)))
     return sections

@@ -15,7 +15,7 @@ from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Table
 from analysis.threshold_words import select_threshold_words
-from analysis.wording import MISSING, format_count, format_number, format_p, format_signed, mark_cut
+from analysis.wording import MISSING, format_count, format_number, format_p, format_p_text, format_signed, mark_cut
 
 
 def make_threshold_table(analysis: StudyAnalysis) -> Table:
@@ -47,7 +47,8 @@ def make_threshold_table(analysis: StudyAnalysis) -> Table:
 
 def make_group_table(analysis: StudyAnalysis) -> Table:
     """Make the table of the frequencies: number, mean and standard deviation of the thresholds (N), comparison
-    interval, and how many were cut by the cap or stopped by the trial limit."""
+    interval, and how many were cut by the cap or stopped by the trial limit; the mean is marked as cut where any
+    was."""
     intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
     cut_counts, stop_counts = (
         [sum(column) for column in zip(*cells, strict=True)]
@@ -187,7 +188,7 @@ def make_within_table(analysis: StudyAnalysis) -> Table:
             f"generalized η² = {format_number(anova.generalized_eta_squared)}."
         )
     if anova.mauchly_w is not None:
-        notes.append(f"Sphericity (Mauchly): W = {format_number(anova.mauchly_w)}, p = {format_p(anova.mauchly_p)}.")
+        notes.append(f"Sphericity (Mauchly): W = {format_number(anova.mauchly_w)}, {format_p_text(anova.mauchly_p)}.")
     if friedman.p is not None:
         rows.append(
             (

@@ -35,7 +35,7 @@ def make_detection_table(analysis: StudyAnalysis) -> Table:
         )
     ]
     return Table(
-        caption="Thresholds of detection (N)",
+        caption="Detection thresholds (N)",
         header=("Participant", "Frequency", "Felt from", "Direction felt from", "Direction above detection (dB)"),
         rows=tuple(rows),
         notes=(
@@ -68,8 +68,8 @@ def make_detection_run_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
-    """Make the table of delivered over requested acceleration by frequency; empty without trials of known delivered
-    acceleration."""
+    """Make the table of delivered over requested acceleration by frequency; empty without trials that have a requested
+    and a measured acceleration."""
     rows = tuple(
         (
             f"{delivery.frequency_hz:g} Hz",
@@ -82,8 +82,8 @@ def make_delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
     if not rows:
         return ()
     header = ("Frequency", "Trials", "Along, direction 1", "Along, direction 2", "Off the direction")
-    note = "Medians of trials. Along: delivered over wanted. Off: over what was delivered along the direction."
-    return (Table("What arrived of what was wanted", header, rows, notes=(note,)),)
+    note = "Medians of trials. Along: delivered over target. Off: over the delivered acceleration along the direction."
+    return (Table("Delivered over target acceleration", header, rows, notes=(note,)),)
 
 
 def _format_percent(share: float | None) -> str:

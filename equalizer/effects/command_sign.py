@@ -32,7 +32,7 @@ CROSS_AXIS_TILTS = {"extra_mode": ("tilt_next", "tilt_after_next")}
 reversed and the other is not."""
 
 
-def with_reversed_commands(
+def reverse_commands(
     model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> MechanicalModel:
     """Convert a model such that its response to the command times `signs` (1 or -1 per input) equals that of `model` to

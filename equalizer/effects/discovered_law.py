@@ -136,9 +136,9 @@ def get_law_values(law: Law) -> Values:
     return {f"p{number}": value for number, value in enumerate(law.numbers)}
 
 
-def with_law_values(law: Law, values: Values) -> Law:
+def set_law_values(law: Law, values: Values) -> Law:
     """Return the law with the values p0, p1, … as its free parameters; the inverse of `get_law_values`."""
-    return law.with_numbers([values[f"p{number}"] for number in range(len(law.numbers))])
+    return law.replace_numbers([values[f"p{number}"] for number in range(len(law.numbers))])
 
 
 def make_law_parameters(law: Law) -> tuple[Parameter, ...]:
@@ -250,7 +250,7 @@ def _make_force_action(
                 f"the law {law.text} needs conditions that were not recorded; record them, or leave the law out"
             )
         header = [m, reads_acceleration, q if len(condition_samples) else 0, len(condition_samples), rate_hz]
-        numbers = program.with_numbers(with_law_values(law, values).numbers)
+        numbers = program.insert_numbers(set_law_values(law, values).numbers)
         return np.concatenate([header, condition_samples.ravel(), numbers])
 
     memory = STACK_SIZE + 1 + SIGNALS_PER_AXIS * m + q + program.memory_size
@@ -270,7 +270,7 @@ def _make_command_action(law: Law, channels: Channels) -> OnCommand:
     ) -> tuple[FloatArray, FloatArray]:
         """Compute the law in place of the command: `OnCommand.of_all`."""
         signal_values = {name: commands[:, channel_index] for name, channel_index in signals.items()}
-        step_values = evaluate_held(with_law_values(law, values), signal_values, 1 / step_s)
+        step_values = evaluate_held(set_law_values(law, values), signal_values, 1 / step_s)
         return np.asarray(step_values.mean(axis=0)), step_values[1]
 
     return OnCommand(lambda commands, step_s, values: commands, fine=has_memory(law), of_all=compute_force)
@@ -286,7 +286,7 @@ def _make_response_action(law: Law, channels: Channels) -> OnResponse:
         """Replace the channel by the law: `OnResponse.change`."""
         new_response = response.copy()
         signal_values = {name: response[:, column] for name, column in signals.items()}
-        new_response[:, list(sites)] = evaluate(with_law_values(law, values), signal_values, sample_rate_hz)[:, None]
+        new_response[:, list(sites)] = evaluate(set_law_values(law, values), signal_values, sample_rate_hz)[:, None]
         return new_response
 
     return OnResponse(change)

@@ -33,9 +33,9 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
     at the end depends on its force (implicit step). parameters: as `_pack_parameters` returns them. step_motion: see
     `instant`; the force at the end is written to it."""
     force = force_at_end = 0.0
-    for side in range(2):
-        side_sign = parameters[2 + side]
-        stiffness = parameters[1] if side == 0 else parameters[1] * parameters[4]
+    for stop_index in range(2):
+        side_sign = parameters[2 + stop_index]
+        stiffness = parameters[1] if stop_index == 0 else parameters[1] * parameters[4]
         start_penetration = max(side_sign * step_motion[X] - parameters[0], 0.0)
         end_penetration = side_sign * (step_motion[X_FREE] + step_motion[X_PER_N] * force) - parameters[0]
         # Weight of the end: 1/2 (trapezoidal rule) for a soft stop, towards 1 (backward Euler) for a stop that is too

@@ -12,10 +12,10 @@ import numpy as np
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.attached_oscillator import (
     AttachedOscillator,
+    attach_oscillator,
     estimate_missing_force_spectra,
     find_likely_oscillators,
     subtract_oscillator,
-    attach_oscillator,
 )
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import compute_driven_axes

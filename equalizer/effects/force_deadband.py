@@ -42,7 +42,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 def _remove_jump(values: Values) -> tuple[Values, ...]:
     """Convert to the dead band without a jump that gives the same force beyond the band: the two differ only for
-    commands between both widths, where a recording has few samples."""
+    commands between both widths, where a recording has few samples. Empty for a jump of 0 or 1."""
     jump = values.get("jump", 0.0)
     return ({"width": values["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
 

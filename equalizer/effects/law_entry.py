@@ -135,7 +135,7 @@ def _make_starting_value_finder(
 def _isolate_factor(law: Law, factors: Sequence[int], selected: int) -> Law:
     """Isolate a factor: the law with p<selected> set to 1 and the other factors to 0 is the regressor of that
     factor."""
-    return law.with_numbers(
+    return law.replace_numbers(
         [float(index == selected) if index in factors else value for index, value in enumerate(law.numbers)]
     )
 

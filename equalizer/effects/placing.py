@@ -2,7 +2,7 @@
 values).
 
 A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
-file, `to_model_effects` back. Called by `analysis.diagnosis` and its figures, by `command_sign`, and by
+file, `convert_to_model_effects` back. Called by `analysis.diagnosis` and its figures, by `command_sign`, and by
 `study.workflows.files.check_model_channels` to check a model.
 """
 
@@ -15,7 +15,7 @@ from equalizer.effects.discovered_law import (
     collect_channels,
     get_law_values,
     make_law_effect,
-    with_law_values,
+    set_law_values,
 )
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.laws.law import Law
@@ -49,14 +49,14 @@ def place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEff
     return tuple(_place_effect(effect, model_channels) for effect in model.effects)
 
 
-def to_model_effects(
+def convert_to_model_effects(
     placed_effects: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[ModelEffect, ...]:
     """Convert placed effects to entries of a model file, the inverse of `place_effects`: an entry per site, or a single
     entry without an axis where an effect acts on all sites with the same values. Raises PlacingError for a site beyond
     the channels."""
     return tuple(
-        _to_model_effect(placed_effect, axis_name)
+        _convert_to_model_effect(placed_effect, axis_name)
         for placed_effect in placed_effects
         for axis_name in _iterate_axis_names(
             placed_effect, output_channels if find_place(placed_effect.effect) == "sensor" else input_channels
@@ -70,13 +70,13 @@ def find_place(effect: Effect) -> Place:
     return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
 
 
-def _to_model_effect(placed_effect: PlacedEffect, axis: str | None) -> ModelEffect:
+def _convert_to_model_effect(placed_effect: PlacedEffect, axis: str | None) -> ModelEffect:
     """Convert a placed effect to an entry of a model file: reported parameters, or the law with its fitted
     parameters."""
     law = placed_effect.effect.law
     if law is None or axis is None:
         return ModelEffect(placed_effect.effect.name, axis, dict(placed_effect.effect.report(placed_effect.values)))
-    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(with_law_values(law, placed_effect.values), axis=axis))
+    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(set_law_values(law, placed_effect.values), axis=axis))
 
 
 def shorten_axis_name(channel: str, channels: tuple[str, ...]) -> str:

@@ -27,7 +27,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
     The force is a weighted mean of those at both ends of the step: weight 1/2 (trapezoidal rule) for a soft bristle,
     towards the end (backward Euler, stable) for a stiff one. Newton's method ends at a correction of 1e-7 of the slip
-    deflection, or after 20 iterations. parameters: level, stiffness; memory: deflection z (m).
+    deflection, or after 20 iterations. parameters: level, stiffness; memory: deflection z (m), advanced;
+    step_motion: see `instant`; the force at the end is written to it. A level of 0 or less gives 0 and writes nothing.
     """
     if parameters[0] <= 0:
         return 0.0

@@ -35,8 +35,8 @@ def _replace_bandwidth_hz(model_bandwidth_hz: float, values: Values) -> float:
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Find the bandwidth that fits a channel's measured response best in place of the model's, from ten in geometric
-    sequence (chosen); empty where none improves the fit."""
+    """Find the bandwidth that fits a channel's measured response best in place of the model's, by search over a
+    geometric grid of ten (chosen), refined by golden section; empty where none improves the fit."""
     sample_rate_hz, model_bandwidth_hz = evidence.sample_rate_hz, evidence.model.sensor.bandwidth_hz
     bandwidth = find_response_parameter(
         evidence,

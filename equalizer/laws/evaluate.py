@@ -26,7 +26,7 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
     """
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty(len(signals)), np.zeros(program.memory_size)
-    run_interpolated(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
+    run_interpolated(program.insert_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
     return values
 
 
@@ -36,7 +36,7 @@ def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: f
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty((2, len(signals))), np.zeros(program.memory_size)
     memory[0] = FROM_ZERO
-    run_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
+    run_held(program.insert_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
     return values
 
 

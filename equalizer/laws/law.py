@@ -78,7 +78,7 @@ class Law:
             if isinstance(exponent, FreeParameter | Number)
         )
 
-    def with_numbers(self, numbers: Sequence[float]) -> "Law":
+    def replace_numbers(self, numbers: Sequence[float]) -> "Law":
         """Return the law with other values of p0, p1, … in SI units. Raises LawError for another number of them."""
         return replace(self, numbers=tuple(float(number) for number in numbers))
 

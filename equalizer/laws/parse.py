@@ -38,7 +38,8 @@ ALLOWED_ELEMENTS = "allowed are numbers, signals, pi, + - * / ** and " + ", ".jo
 
 
 class LawError(ValueError):
-    """The text is not a formula of this language. The message states the error and, where known, its position."""
+    """A law cannot be read or evaluated: its text is not a formula of this language, or its parameters, its axis or the
+    signals that it is given do not fit it. The message states the error and, where known, its position."""
 
 
 @dataclass(slots=True)

@@ -44,7 +44,7 @@ class Program:
     memory_size: int
     """Number of values in the memory, the first of which is its state (`SETTLED`, ... in `equalizer.laws.kernel`)."""
 
-    def with_numbers(self, numbers: Sequence[float]) -> FloatArray:
+    def insert_numbers(self, numbers: Sequence[float]) -> FloatArray:
         """Insert the values of the free parameters p0, p1, … (SI units); returns the rows one after the other, (2
         k,)."""
         codes = self.codes.copy()

@@ -26,7 +26,7 @@ the direction of gravity. Chosen above rounding errors."""
 
 
 def compute_reflection(azimuth_rad: float) -> FloatArray:
-    """(3, 3): reflection about the plane that contains the axis x and has this azimuth, from y towards z."""
+    """Compute the reflection (3, 3) about the plane that contains the axis x and has this azimuth, from y towards z."""
     normal = np.array([0.0, -np.sin(azimuth_rad), np.cos(azimuth_rad)])
     mirror: FloatArray = np.eye(3) - 2 * np.outer(normal, normal)
     return mirror
@@ -111,7 +111,8 @@ def _find_same_position(positions_m: FloatArray, target_m: FloatArray) -> int | 
 
 
 def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
-    """The reading reflected about a mirror line, as at the mirrored position. line: index of the arm in that plane."""
+    """Reflect a reading about a mirror line: returns the reading at the mirrored position. line: index of the arm in
+    that plane."""
     reflection = compute_reflection(azimuth_rad)
     joint_order = [line if joint == line else 3 - line - joint for joint in range(3)]
     is_upright = abs(np.cos(azimuth_rad)) < LARGEST_UPRIGHT_COMPONENT

@@ -85,7 +85,7 @@ class IdentifiedModel(SummaryDisplay):
         """(k,): the entries of A, B, C and D in this order, each matrix row by row."""
         return np.concatenate([matrix.ravel() for matrix in (self.A, self.B, self.C, self.D)])
 
-    def with_parameters(self, parameters: FloatArray) -> Self:
+    def replace_parameters(self, parameters: FloatArray) -> Self:
         """Copy the model with other entries of A, B, C, D. parameters: (k,), in the order of the property
         `parameters`. Raises ValueError for another number of entries."""
         shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]

@@ -78,7 +78,7 @@ def write_quality_sentence(quality: ModelQuality | None) -> str:
     noise_text = "" if quality.held_out_noise is None else f", noise of the record {100 * quality.held_out_noise:.2f} %"
     return (
         f"Measured on {quality.held_out_s or 0:g} s held out for a test, the error of the model is "
-        f"{100 * quality.held_out_error:.2f} %{noise_text}; expected from misfit and scatter: "
+        f"{100 * quality.held_out_error:.2f} %{noise_text}; expected error, exceeded in 5 % of cases: "
         f"{100 * quality.expected_error:.2f} %."
     )
 

@@ -48,7 +48,7 @@ def filter_by_gain(
 
 
 def extend_as_odd(samples: FloatArray) -> FloatArray:
-    """A period, (at least 2 n - 2, k), of samples (n, k) that are extended as an odd function at both ends. Zeros in
+    """Extend samples (n, k) as an odd function at both ends; returns a period of it, (at least 2 n - 2, k). Zeros in
     the middle of the extension, far from both ends, pad it to a length with small prime factors: with a large prime
     factor the FFT takes twenty times as long."""
     mirrored = -samples[-2:0:-1]
@@ -58,14 +58,14 @@ def extend_as_odd(samples: FloatArray) -> FloatArray:
 
 
 def compute_end_to_end_line(samples: FloatArray) -> FloatArray:
-    """(n, k): the straight line from the first to the last sample of each channel. samples: (n, k)."""
+    """Compute the straight line (n, k) from the first to the last sample of each channel. samples: (n, k)."""
     relative_time = np.linspace(0.0, 1.0, len(samples))[:, None]
     return np.asarray((1 - relative_time) * samples[0] + relative_time * samples[-1])
 
 
 def filter_low_pass(samples: FloatArray, sample_rate_hz: float, band_hz: float, delay_s: float = 0.0) -> FloatArray:
-    """Low pass with gain 1/2 at band_hz of samples (n, k), delayed by delay_s seconds. Missing samples (NaN) are not
-    allowed and are not detected."""
+    """Filter samples (n, k) by the low pass, with gain 1/2 at band_hz, and delay them by delay_s seconds. Missing
+    samples (NaN) are not allowed and are not detected."""
 
     def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
         """(lines, k, k): gain and delay, the same for all channels."""

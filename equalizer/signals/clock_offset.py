@@ -91,8 +91,8 @@ def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
 
 
 def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Normalised cross-correlation r (module docstring) of signals (n,) and (m,) at the n + m - 1 lags -(m - 1) to
-    n - 1."""
+    """Compute the normalised cross-correlation r (module docstring) of signals (n,) and (m,) at the lags -(m - 1) to n
+    - 1."""
     # Imported here and below, because SciPy's signal and interpolation modules take long to import.
     from scipy import signal as sg
 
@@ -107,7 +107,7 @@ def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def _has_enough_overlap(lags: IntArray, first_length: int, second_length: int) -> BoolArray:
-    """Mask (lags,) of the lags at which signals of these lengths overlap by at least `LEAST_OVERLAP`."""
+    """Whether signals of these lengths overlap by at least `LEAST_OVERLAP` at each lag, (lags,)."""
     overlap_samples = np.minimum(first_length, lags + second_length) - np.maximum(0, lags)
     has_overlap: BoolArray = overlap_samples >= LEAST_OVERLAP * min(first_length, second_length)
     return has_overlap

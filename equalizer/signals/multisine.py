@@ -78,7 +78,7 @@ def _draw_group(lines: IntArray, period_samples: int, axes: int, generator: np.r
     phase_factors = np.exp(2j * np.pi * np.outer(np.arange(axes), np.arange(axes)) / axes)
 
     def draw_period() -> FloatArray:
-        """One group with random phases, not scaled."""
+        """Draw a group with random phases, not scaled."""
         phases = generator.uniform(0, 2 * np.pi, (len(lines), axes))
         spectrum = np.zeros((axes, period_samples // 2 + 1, axes), dtype=complex)
         spectrum[:, lines] = np.exp(1j * phases) * phase_factors[:, None, :]
@@ -94,7 +94,7 @@ def make_interleaved_multisine(lines: IntArray, period_samples: int, axes: int, 
     generator, axis_of_line = np.random.default_rng(seed), np.arange(len(lines)) % axes
 
     def draw_period() -> FloatArray:
-        """One period with random phases, not scaled."""
+        """Draw a period with random phases, not scaled."""
         spectrum = np.zeros((period_samples // 2 + 1, axes), dtype=complex)
         spectrum[lines, axis_of_line] = np.exp(2j * np.pi * generator.uniform(size=len(lines)))
         return np.fft.irfft(spectrum, period_samples, axis=0)

@@ -79,7 +79,7 @@ def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
         )
     is_finite = np.isfinite(samples.values)
     if is_finite.sum() < 2:
-        raise ValueError("all samples but one are missing; at least two are needed")
+        raise ValueError("fewer than two samples have a value; at least two are needed")
     if method == "held":
         sample_indices = np.searchsorted(samples.times_s, times_s + tolerance_s, side="right") - 1
         resampled: FloatArray = samples.values[np.maximum(sample_indices, 0)].copy()

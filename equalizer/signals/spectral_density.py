@@ -44,7 +44,8 @@ def compute_line_spectra(periods: FloatArray) -> ComplexArray:
 def _average_segments(
     first: FloatArray, second: FloatArray, rate_hz: float, length: int
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies (lines,) and one-sided density, averaged over windowed segments; (lines,) or (lines, c)."""
+    """Average the spectra of windowed segments: returns the frequencies (lines,) and the one-sided density, (lines,) or
+    (lines, c)."""
     length = min(length, len(first))
     window = hann(length).reshape(-1, *[1] * (first.ndim - 1))
     starts = range(0, len(first) - length + 1, length - length // 2)
@@ -62,5 +63,5 @@ def _average_segments(
 
 
 def _transform_windowed(segment: FloatArray, window: FloatArray) -> ComplexArray:
-    """Spectrum of one segment, without its mean and windowed."""
+    """Compute the FFT of a segment, without its mean and windowed."""
     return np.asarray(np.fft.rfft(window * (segment - segment.mean(axis=0)), axis=0))

@@ -84,8 +84,8 @@ _AMPLITUDE = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.
 
 
 def respell(text: str, known_symbols: Collection[str]) -> str:
-    """Rewrite a unit in the spelling of `signals.units`; unknown symbols are unchanged, but signs, powers and products
-    beside them are rewritten. known_symbols: symbols of that spelling, which are not changed."""
+    """Rewrite a unit in the spelling of `signals.units`, by the listed spellings and the rules of this module; other
+    parts are unchanged. known_symbols: symbols of that spelling, which are not changed."""
     spelling = text.strip()
     if amplitude_match := _AMPLITUDE.fullmatch(spelling):
         return amplitude_match["unit"]
@@ -119,7 +119,7 @@ def find_nearest_unit(text: str, known_symbols: Collection[str]) -> str:
 
 
 def _convert_to_ascii(text: str) -> str:
-    """Replace the signs of `_ASCII_BY_SIGN`, each once."""
+    """Replace the signs of `_ASCII_BY_SIGN` in a text."""
     return "".join(_ASCII_BY_SIGN.get(character, character) for character in text)
 
 

@@ -50,7 +50,7 @@ class UnitSystem:
         return self._format_unit(powers["N"], powers["m"], powers["s"])
 
     def _format_unit(self, force_power: int, length_power: int, time_power: int) -> str:
-        """The product of force, length and time to these powers, such as "A s^2/m"."""
+        """Format the product of force, length and time to these powers, such as "A s^2/m"."""
         base_powers = [(self.force, force_power), (self.length, length_power), (self.time, time_power)]
         factors = [(f"({name})" if "/" in name else name, power) for name, power in base_powers if name != "1"]
         numerator = [
@@ -95,7 +95,7 @@ def _decompose_base_unit(name: str) -> tuple[tuple[str, int], ...]:
 
 
 def _format_power(name: str, power: int) -> str:
-    """A unit to a power, such as "s^2"; a name of several units gets parentheses."""
+    """Format a unit to a power, such as "s^2"; a name of several units gets parentheses."""
     if power == 1:
         return name
     return f"{f'({name})' if ' ' in name else name}^{power}"

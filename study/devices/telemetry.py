@@ -79,11 +79,11 @@ class Ring:
                 Path(self.path).unlink()
             self.path = ""
 
-    def _make_ring_file(self, rows: int) -> None:
+    def _make_ring_file(self, row_count: int) -> None:
         """Make, lock and fill the ring's file; without memory for all rows, no ring is made."""
         # Kept open: as long as it is locked, the ring is in use.
         self._descriptor, self.path = tempfile.mkstemp(RING_FILE_SUFFIX, RING_FILE_PREFIX, _choose_ring_folder())
-        empty_rows = np.zeros((1 + rows, cells.RING_WIDTH))
+        empty_rows = np.zeros((1 + row_count, cells.RING_WIDTH))
         empty_rows[0, cells.RING_FORMAT] = FORMAT_VERSION
         try:
             # Written, not reserved: a page that the system cannot give must fail here and not in the loop.

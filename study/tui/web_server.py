@@ -108,7 +108,7 @@ class ScreenServer(Server):
         if first_path_part == "download" and await self._is_offered_download(request.path.rpartition("/")[2]):
             return await handler(request)
         if not hmac.compare_digest(first_path_part.encode("utf-8", "replace"), self._token.encode()):
-            raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
+            raise web.HTTPNotFound(text="The study is only at the whole address that hapteq serve printed.")
         if request.path == f"/{self._token}":
             raise web.HTTPFound(f"/{self._token}/")
         return await handler(request)

@@ -33,7 +33,7 @@ def test_an_unstable_model_can_be_built_and_reports_it(model):
 
 def test_parameters_go_out_and_in_row_by_row(model):
     assert model.parameters.tolist() == [0.9, 0.1, -0.1, 0.9, 1.0, 0.0, 0.5, 0.5, 0.0]
-    other = model.with_parameters(np.arange(9.0))
+    other = model.replace_parameters(np.arange(9.0))
     assert other.A.tolist() == [[0.0, 1.0], [2.0, 3.0]]
     assert other.D.tolist() == [[8.0]]
 

@@ -16,7 +16,7 @@ from study.evaluation.challenge.bench import Bench, draw_bench
 from study.evaluation.challenge.device import Device, record
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
 from study.evaluation.challenge.drive_plan import LEVELS_N, RATE_HZ
-from study.evaluation.challenge.nominal_models import convert_to_model, draw_calibration
+from study.evaluation.challenge.nominal_models import draw_calibration, make_model
 
 PERIOD, PERIODS, REST = 1000, 3, 300
 LAST_LINE = 200
@@ -85,7 +85,7 @@ def _recording(commands, response, position, axes, segments) -> Recording:
 
 
 def _model(known: Bench, tolerance, axes) -> MechanicalModel:
-    whole = convert_to_model("short", known, tolerance)
+    whole = make_model("short", known, tolerance)
     return MechanicalModel(
         "short", "acceleration", whole.mass, whole.damping, whole.stiffness,
         whole.input[:, list(axes)], whole.output[list(axes)], whole.sensor, tolerance=tolerance,

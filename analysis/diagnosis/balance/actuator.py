@@ -98,15 +98,15 @@ def find_balance(
     if judged_law.gain_low <= 0 or judged_law.gain < FURTHER_LAW_SHARE:
         return balance
     if judged_law.gain < COMMAND_LAW_GAIN and not actuator.replaces_motion_laws:
-        motion_laws = tuple(_withdraw_if_curved(law, actuator) for law in balance.laws)
+        judged_motion_laws = tuple(_withdraw_if_curved(law, actuator) for law in balance.laws)
         further_laws = tuple(sorted((*balance.further_laws, judged_law), key=lambda item: -item.gain))
-        return replace(balance, laws=motion_laws, further_laws=further_laws)
-    laws = (
+        return replace(balance, laws=judged_motion_laws, further_laws=further_laws)
+    listed_laws = (
         [replace(item, objection=item.objection or UNNECESSARY_REASON) for item in balance.laws]
         if actuator.needs_no_motion_law
         else balance.laws
     )
-    return replace(balance, laws=(judged_law, *laws))
+    return replace(balance, laws=(judged_law, *listed_laws))
 
 
 def _withdraw_if_curved(law: JudgedLaw, actuator: ActuatorFit) -> JudgedLaw:
@@ -162,7 +162,7 @@ LawKinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
 
 
 def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozenset[str]) -> LawKinds:
-    """List the kinds of laws to try: electromagnets only with a measured translation; none where the command is zero."""
+    """List the kinds of laws to try: electromagnets only with measured translations; none where the command is zero."""
     motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
@@ -223,7 +223,7 @@ def _list_sums(search: StructureSearch) -> list[tuple[int, ...]]:
     """List the best sums of laws of the motion, first none. Laws that are linear in the motion are left out: as filters
     of the acceleration they would reproduce it."""
     laws = search.regression.laws
-    sums = [s.laws for s in search.ranked if s.laws and not any(laws[k].linear for k in s.laws)]
+    sums = [s.laws for s in search.ranked if s.laws and not any(laws[k].is_linear for k in s.laws)]
     return [(), *sums[:SUMS_BESIDE_COMMAND_LAW]]
 
 

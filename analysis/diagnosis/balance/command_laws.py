@@ -64,7 +64,8 @@ class CommandLaw:
     scale: float = 1.0
     """Scale that converts a single column to a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
-    """From values and scale: formula that a simulation uses for the command, where the catalogue has no such effect."""
+    """From values and scale: formula that a simulation uses for the command; None where the catalogue has the effect,
+    or no formula expresses the law."""
 
     @property
     def lag_column_count(self) -> int:
@@ -88,7 +89,7 @@ class CommandLaw:
         return replace(self, scale=self.scale * float(force @ command) / max(float(force @ force), 1e-300))
 
     def as_formula(self) -> Formula | None:
-        """Convert the law to a formula with its values and scale; None where the catalogue has the effect."""
+        """Convert the law to a formula with its values and scale; None for a law without one."""
         return None if self.formula is None else self.formula(self.values, self.scale)
 
 

@@ -33,9 +33,9 @@ MOST_COMPARED_SUMS = 12
 
 
 def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balance:
-    """Compare a balance with sums that contain a law outside the catalogue: the better of the two; the given balance
-    also where it has a law of the command or a given model, or no test. excluded: names of effects that are left
-    out."""
+    """Compare a balance with sums that contain a law outside the catalogue, and return the better of the two. The
+    balance is returned unchanged where it has a law of the command, has a given model as its base, or was not tested on
+    held-out data. excluded: names of effects that are left out."""
     regression = balance.search.regression
     has_law_of_command = any(not law.has_column for law in balance.laws)
     if excluded >= FREE_LAWS or not balance.tested or has_law_of_command or regression.prior is not None:

@@ -185,5 +185,5 @@ def make_damping_laws(channel: int, scales: Scales) -> Iterator[Law]:
                 motion.velocity[:, [channel]], motion.rate_hz, lambda s: n[0] / (1 + n[0] * s)
             ),
             lambda w, n, mass: {"stiffness": float(w[0]), "time_constant": n[0]} if w[0] > 0 else None,
-            linear=True, bounds=((0.1 / scales.band_hz, scales.duration_s / 4),),
+            is_linear=True, bounds=((0.1 / scales.band_hz, scales.duration_s / 4),),
         )  # fmt: skip

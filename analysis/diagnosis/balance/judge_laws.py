@@ -1,4 +1,5 @@
-"""Test the laws of a force balance on held-out data. Called by `balances`, `actuator` and `confirm.balance_with_model`.
+"""Test the laws of a force balance on held-out data. Called by `balances`, `actuator`, `compare_free_laws` and
+`confirm.balance_with_model`.
 
 No model of a real device reaches the sensor noise, so that a test against the noise rejects all. A law is named by the
 relative decrease of the held-out squared error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat.
@@ -84,7 +85,7 @@ class Balance:
     @property
     def linear_laws(self) -> tuple[Law, ...]:
         """Linear laws in addition to mass, damping and stiffness, of the base terms and of the chosen structure."""
-        return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.linear))
+        return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.is_linear))
 
     def withdraw_names(self, reason: str) -> "Balance":
         """Copy the balance with no law named. reason: objection, as a clause, to each law that has none yet."""
@@ -166,23 +167,23 @@ def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float
 
 
 def _judge_law(
-    regression: Regression, laws: Sequence[int], law_index: int, reference: tuple[FloatArray, float, float]
+    regression: Regression, law_indices: Sequence[int], law_index: int, reference: tuple[FloatArray, float, float]
 ) -> JudgedLaw:
-    """Test law `law_index` of `laws` (indices). reference: squared errors (blocks,) with all of `laws`; decrease of
-    their sum by all laws of the regression together; share of that decrease by `laws`."""
+    """Test law `law_index` of `law_indices`. reference: squared errors (blocks,) with all of these laws; decrease of
+    their sum by all laws of the regression together; share of that decrease by these laws."""
     full, decrease, coverage = reference
-    other_laws = tuple(index for index in laws if index != law_index)
+    other_laws = tuple(index for index in law_indices if index != law_index)
     reduced = _compute_errors(regression, other_laws)
     gain, gain_low = bootstrap_gain(reduced, full)
     share, law = float((reduced - full).sum()) / decrease, regression.laws[law_index]
-    values = dict(zip(laws, fit_values(regression, laws), strict=True))[law_index]
+    values = dict(zip(law_indices, fit_values(regression, law_indices), strict=True))[law_index]
     equivalents, probability = _find_equivalents(regression, other_laws, law_index, (reduced, full))
     force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_power(regression)))
     weakness = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
     objection = _find_objection(law, values, (gain, gain_low, share, coverage), equivalents) or (
         weakness if force_share < LAW_FORCE_SHARE else ""
     )
-    ratio = compute_force_ratio(regression, laws, law_index)
+    ratio = compute_force_ratio(regression, law_indices, law_index)
     if not objection and ratio > LARGEST_LAW_FORCE:
         objection = f"its force would be {ratio:.0f} times the recorded force, almost cancelled by other terms"
     stands_for = ""
@@ -192,7 +193,9 @@ def _judge_law(
     return JudgedLaw(
         law_index, law, values or {}, gain, gain_low, share, equivalents, probability, objection, stands_for,
         formula=law.make_formula(values), is_physical=values is not None and ratio <= LARGEST_LAW_FORCE,
-        confirmed_by_folds=is_confirmed_by_folds((reduced, full), _compute_fold_errors(regression, (other_laws, laws))),
+        confirmed_by_folds=is_confirmed_by_folds(
+            (reduced, full), _compute_fold_errors(regression, (other_laws, law_indices))
+        ),
     )  # fmt: skip
 
 
@@ -200,7 +203,7 @@ def _compute_fold_errors(regression: Regression, law_sets: Sequence[Sequence[int
     """Compute cross-validated errors (fit blocks,) of each set of laws; empty if these blocks are the test blocks."""
     if select_test_blocks(regression) is not regression.test:
         return [np.zeros(0) for _ in law_sets]
-    return [regression.cross_validate(regression.select_columns(laws)) for laws in law_sets]
+    return [regression.cross_validate(regression.select_columns(law_indices)) for law_indices in law_sets]
 
 
 def _find_equivalents(
@@ -211,24 +214,24 @@ def _find_equivalents(
     tested_law = regression.laws[law_index]
     best_by_effect: dict[str, tuple[float, tuple[int, ...]]] = {}
     for index, law in enumerate(regression.laws):
-        if law.effect == tested_law.effect or law.linear or (tested_law.linear and not law.linear):
+        if law.effect == tested_law.effect or law.is_linear or (tested_law.is_linear and not law.is_linear):
             continue
         if law.effect in FREE_LAWS and tested_law.effect not in FREE_LAWS:
             continue  # a formula without a name is no reason to withdraw a name
-        laws = (*other_laws, index)
-        if any(regression.laws[k].key == law.key for k in other_laws) or fit_values(regression, laws)[-1] is None:
+        indices = (*other_laws, index)
+        if any(regression.laws[k].key == law.key for k in other_laws) or fit_values(regression, indices)[-1] is None:
             continue
-        error = float(regression.cross_validate(regression.select_columns(laws)).sum())
+        error = float(regression.cross_validate(regression.select_columns(indices)).sum())
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
-            best_by_effect[law.effect] = error, laws
+            best_by_effect[law.effect] = error, indices
     decrease, draws = float((reduced_errors - full_errors).sum()), draw_bootstrap_blocks(len(full_errors))
     equivalents, is_best = [], np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
-    for effect, (_, laws) in best_by_effect.items():
-        increases = _compute_errors(regression, laws) - full_errors
+    for effect, (_, indices) in best_by_effect.items():
+        increases = _compute_errors(regression, indices) - full_errors
         if tested_law.effect not in list_special_cases(effect):
             is_best &= increases[draws].sum(axis=1) >= 0
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
-        has_more_parameters = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
+        has_more_parameters = count_parameters(regression, indices[-1:]) > count_parameters(regression, [law_index])
         limit = 0.0 if has_more_parameters and effect not in find_family(tested_law.effect) else RIVAL_MARGIN * decrease
         if tested_law.effect in FREE_LAWS:  # rivals of a strong law leave less than four times as much
             limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
@@ -242,7 +245,7 @@ def _find_objection(
 ) -> str:
     """Find the reason not to name a law, empty if none. scores: gain, its lower bound, share and coverage."""
     gain, gain_low, share, coverage = scores
-    if law.linear:
+    if law.is_linear:
         return "it is a linear model of a higher order: part of the first model and no missing physics"
     if values is None:
         return "its parameters have signs that such physics cannot have"
@@ -280,13 +283,16 @@ def _judge_further_laws(
             best_by_effect[law.effect] = error, index
     further_laws = []
     for _, index in sorted(best_by_effect.values())[:8]:
-        errors = _compute_errors(regression, laws := (*chosen.laws, index))
+        errors = _compute_errors(regression, law_indices := (*chosen.laws, index))
         gain, gain_low = bootstrap_gain(chosen_errors, errors)
-        values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
+        values, share = fit_values(regression, law_indices)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
         objection = ("it explains too little in addition to the named laws" if chosen.laws
                   else WEAK_GAIN_OBJECTIONS[gain > FURTHER_LAW_GAIN])  # fmt: skip
         if gain > 0 and gain_low > 0:
-            law, is_physical = regression.laws[index], compute_force_ratio(regression, laws, index) <= LARGEST_LAW_FORCE
+            law, is_physical = (
+                regression.laws[index],
+                compute_force_ratio(regression, law_indices, index) <= LARGEST_LAW_FORCE,
+            )
             further_law = JudgedLaw(
                 index, law, values, gain, gain_low, share, (), 0.0, objection, is_physical=is_physical
             )

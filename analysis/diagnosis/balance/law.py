@@ -52,16 +52,17 @@ class Law:
     """Index of the motion's channel that it depends on; -1 = none."""
     numbers: NonlinearParameters
     """Values of its nonlinear parameters."""
-    columns: Columns
+    make_columns: Columns
     """Makes the regressors (n, weights) of a motion."""
-    values: WeightConverter
+    convert_weights: WeightConverter
     """Converts fitted weights to the parameters of the effect."""
-    linear: bool = False
+    is_linear: bool = False
     """Whether it is linear in the motion, so that a linear model of a higher order could replace it."""
     bounds: tuple[tuple[float, float], ...] = ()
     """Bounds of each nonlinear parameter within which it is refined; empty: it keeps its given value."""
     formula: Callable[[dict[str, float]], Formula] | None = None
-    """Maps its parameters to the formula that simulations use where the catalogue has no such effect."""
+    """Maps its parameters to the formula that simulations use; None where the catalogue has the effect, or the law is
+    not simulated."""
 
     @property
     def key(self) -> tuple[str, int]:
@@ -69,7 +70,7 @@ class Law:
         return self.effect, self.channel
 
     def make_formula(self, values: dict[str, float] | None) -> Formula | None:
-        """Make the formula with these parameters; None where the catalogue has the effect, or without parameters."""
+        """Make the formula with these parameters; None for a law without one, or without parameters."""
         return self.formula(values) if self.formula is not None and values else None
 
 

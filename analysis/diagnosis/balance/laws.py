@@ -203,13 +203,13 @@ def make_dynamic_laws(channel: int, scales: Scales) -> Iterator[Law]:
             yield Law(
                 "extra_mode", channel, (float(frequency_hz), damping_ratio),
                 lambda motion, n: _compute_mode_force(motion, channel, n), _convert_mode_weight,
-                linear=True, bounds=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
+                is_linear=True, bounds=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
             )  # fmt: skip
     # With a first-order lag, the command is (1 + T s) times the delivered force. Only T s M a is no base term.
     yield Law(
         "amplifier_lag", channel, (),
         lambda motion, _: filter_from_rest(motion.acceleration[:, [channel]], motion.rate_hz, lambda s: s),
-        lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, linear=True,
+        lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, is_linear=True,
     )  # fmt: skip
 
 

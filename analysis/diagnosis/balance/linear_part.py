@@ -94,7 +94,7 @@ def _extend_base(search: StructureSearch, base_terms: BaseTerms) -> BaseTerms:
     linear laws as cross-validation supports. The delay is estimated before or after these laws; the smaller error
     decides."""
     regression, simplest_laws = search.regression, choose_simplest_structure(search).laws
-    nonlinear_laws = [k for k in simplest_laws if not regression.laws[k].linear]
+    nonlinear_laws = [k for k in simplest_laws if not regression.laws[k].is_linear]
     delay_s = 0.0 if base_terms.delay_s else _find_delay_s(keep_laws(regression, nonlinear_laws))
     if not delay_s and len(nonlinear_laws) == len(simplest_laws):
         return base_terms
@@ -112,7 +112,7 @@ def _complete_base(
     it with its cross-validated error without a later delay. Where there is no delay yet, one is estimated after these
     laws. nonlinear_laws: indices of the chosen laws that are not linear."""
     base_laws = tuple(law for law in base_terms.laws if not (delay_s and law.effect in DELAY_LIKE_LAWS))
-    linear_laws = [law for law in regression.laws if law.linear and not (delay_s and law.effect in DELAY_LIKE_LAWS)]
+    linear_laws = [law for law in regression.laws if law.is_linear and not (delay_s and law.effect in DELAY_LIKE_LAWS)]
     motions = [_delay_forces(motion, delay_s) for motion in regression.motions]
     candidate_laws = [*(regression.laws[k] for k in nonlinear_laws), *linear_laws]
     extended_regression = build_regression(
@@ -127,7 +127,7 @@ def _complete_base(
         if improved_fit is None:
             break
         extended_regression, chosen_structure = improved_fit
-    added_laws = [extended_regression.laws[k] for k in chosen_structure.laws if extended_regression.laws[k].linear]
+    added_laws = [extended_regression.laws[k] for k in chosen_structure.laws if extended_regression.laws[k].is_linear]
     if not delay_s and not base_terms.delay_s:
         delay_s = _find_delay_s(keep_laws(extended_regression, chosen_structure.laws))
     return replace(
@@ -140,7 +140,7 @@ def _add_linear_law(regression: Regression, base_structure: Structure) -> tuple[
     significant."""
     best_structure: Structure | None = None
     for law_index, law in enumerate(regression.laws):
-        if not law.linear or law_index in base_structure.laws:
+        if not law.is_linear or law_index in base_structure.laws:
             continue
         law_indices = (*base_structure.laws, law_index)
         trial_structure = Structure(law_indices, regression.cross_validate(regression.select_columns(law_indices)))

@@ -44,8 +44,8 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Motion and force in one part of a recording, n samples at the recording's rate, in SI units. Position, velocity
-    and acceleration, (n, d) each, are band-limited; force and conditions are not."""
+    """Motion and force in one part of a recording, n samples at its rate, in SI units. Position, velocity and
+    acceleration, (n, d), are band-limited and may be advanced or 0 (`compute_motions`); force and conditions not."""
 
     rate_hz: float
     """Sample rate in Hz."""

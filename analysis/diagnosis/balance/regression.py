@@ -73,10 +73,10 @@ class Regression:
     mass: float | None = None
     """Mass of a given model in kg (kg m^2); None = it is estimated, as the weight of the driven acceleration."""
 
-    def select_columns(self, laws: Sequence[int]) -> list[int]:
+    def select_columns(self, law_indices: Sequence[int]) -> list[int]:
         """Select the columns (indices) of the base and of these laws; a law of the command (index < 0) has none."""
         law_columns = [
-            k for law in laws if law >= 0 for k in range(self.column_ranges[law].start, self.column_ranges[law].stop)
+            k for i in law_indices if i >= 0 for k in range(self.column_ranges[i].start, self.column_ranges[i].stop)
         ]
         return [*range(self.base_column_count), *law_columns]
 
@@ -177,7 +177,7 @@ def compute_signal_power(blocks: Sequence[Block]) -> float:
 def _make_linear_columns(motion: Motion, turns: bool, linear_laws: Sequence[Law]) -> FloatArray:
     """Make (n, k): columns of acceleration, velocity, position and linear laws; no position where a shaft turns freely,
     because it has no stiffness."""
-    law_columns = [law.columns(motion, law.numbers) for law in linear_laws]
+    law_columns = [law.make_columns(motion, law.numbers) for law in linear_laws]
     return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *law_columns])
 
 
@@ -188,7 +188,7 @@ def _make_base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
 
 def _make_law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
     """Make a law's filtered and decimated columns per motion; None where any is zero or not finite."""
-    columns = [motion.decimate(law.columns(motion, law.numbers)) for motion in motions]
+    columns = [motion.decimate(law.make_columns(motion, law.numbers)) for motion in motions]
     is_usable = all(np.isfinite(column).all() for column in columns) and all(_is_above_rounding(columns))
     return columns if is_usable else None
 

@@ -187,7 +187,7 @@ def fit_values(regression: Regression, laws: Sequence[int]) -> list[dict[str, fl
     for law_index in laws:
         law, column_range = regression.laws[law_index], regression.column_ranges[law_index]
         count = column_range.stop - column_range.start
-        values.append(law.values(weights[first_weight : first_weight + count], law.numbers, mass))
+        values.append(law.convert_weights(weights[first_weight : first_weight + count], law.numbers, mass))
         first_weight += count
     return values
 
@@ -268,8 +268,7 @@ def choose_simplest_structure(search: StructureSearch) -> Structure:
 
 
 def add_further_laws(search: StructureSearch, base: Structure, ceiling: float) -> Structure | None:
-    """Add laws to `base` that explain most of what all laws (error: ceiling) could explain, and at least
-    `FURTHER_LAW_SHARE` of its error; None without such laws."""
+    """Add laws to `base` that explain most of what all laws (error: ceiling) could explain; None without such laws."""
     limit = base.error - max(FURTHER_LAW_EXCESS * (base.error - ceiling), FURTHER_LAW_SHARE * base.error)
     extensions = [
         s

@@ -61,7 +61,9 @@ def find_balances_with_model(
                 search_structures(
                     [_select_axis(entry.motion, axis) for entry in prepared], axis, model.rotational, excluded,
                     time_left,
-                    GivenModelBase(tuple(entry.columns[axis] for entry in prepared), float(mass[axis]), LAW_FORCE_SHARE),
+                    GivenModelBase(
+                        tuple(entry.columns[axis] for entry in prepared), float(mass[axis]), LAW_FORCE_SHARE
+                    ),
                 )
             )
             for axis in range(model.inputs)

@@ -11,16 +11,14 @@ simulation compares responses.
 
        E(with laws) <= E(without) + ln(CONFIRMED_RATIO)          (a tenth less error)
 
-   and if the model with the laws explains more than half of the held-out power (`held_out_gain.explains_half`). Else
-   the last law is left out, and the others are fitted again.
+   and if the model with them explains more than half of the held-out power (`explains_half`). Else the last is dropped.
 3. A law whose amplitude's 95 % interval contains zero is withdrawn, or replaced by the special case that lacks the
    undetermined parameter, and the remaining laws are fitted again (`_find_undetermined_law`, `_prefer_special_case`).
 4. The verdict is `explained` only if the noise is known from repeats, the residual is as good as noise, and held-out
    errors are at most `HELD_OUT_ERROR`; else `partly_explained`.
 
 References: Ljung, System Identification (1999), section 16.6 (validation on fresh data); Swevers and others, IEEE
-Control Systems 27(5):58 (2007) (laws by inverse dynamics, validated by simulation).
-"""
+Control Systems 27(5):58 (2007) (laws by inverse dynamics, validated by simulation)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -94,7 +92,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise
     ]
     if not named_laws:
         return None
-    full_context = context.with_choosing_samples_fitted()
+    full_context = context.join_fit_and_choose()
     forces = estimate_constant_forces(balances)
     given_fit = evaluate_fit(
         full_context.measure, full_context.tuning, np.zeros(len(full_context.tuning.names)), forces

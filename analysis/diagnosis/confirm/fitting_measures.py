@@ -25,7 +25,8 @@ from equalizer.signals.signal import FloatArray
 
 CONSTANT_ADDED = (
     "The fitted model contains no constants, so a constant was added to the command, for which the mean error on the "
-    "fitted data is about zero. It includes weights, offsets of sensor and amplifier, and the operating point of the device."
+    "fitted data is about zero. It includes weights, offsets of sensor and amplifier, and the operating point of the "
+    "device."
 )
 """Remark of a diagnosis whose measure has such a constant."""
 

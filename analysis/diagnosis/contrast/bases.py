@@ -41,8 +41,8 @@ def build_bases(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[t
             force_bases = bases if all(compute_unexplained_share(base, clean) < MISFIT_SHARE for base in bases) else []
     if force_bases:
         yield force_bases, motions
-    fewest_known_samples = min(sum(len(part.known) for part in part_set) for part_set in (clean, faulty) if part_set)
-    decimation_step = max(min(choose_decimation_step((*clean, *faulty)), fewest_known_samples // (2 * LEAST_ROWS)), 1)
+    fewest_samples = min(sum(len(part.known) for part in part_set) for part_set in (clean, faulty) if part_set)
+    decimation_step = max(min(choose_decimation_step((*clean, *faulty)), fewest_samples // (2 * LEAST_ROWS)), 1)
     response_count = len(recording.response.channels)
     yield (
         [

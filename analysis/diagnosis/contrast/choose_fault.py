@@ -1,12 +1,12 @@
 """Choose which fault to name after a comparison with clean recordings: a fault, a class of faults, or none.
 
-Of the faults that pass all tests of `_find_flaw`, the one with the smallest error is the best, or a special case of it
-that these data cannot distinguish from it. Its class contains the rivals whose error is not significantly larger
+Of the faults that pass all tests of `_find_objection`, the one with the smallest error is the best, or a special case
+of it that these data cannot distinguish from it. Its class contains the rivals whose error is not significantly larger
 (bootstrap over blocks; a rival that contains the best as a special case only where it is significantly better), and
-those that failed a test but fit about as well (`_find_inconclusive`). No fault is named where the class is too large, a
-fault that failed a test has a clearly smaller error, the best explains too small a share of the difference, or its axis
-is ambiguous. Errors and gains are those of `rank_faults`. Called by `compare_with_reference`.
-"""
+those that failed a test but fit about as well (`_find_inconclusive`), the latter only until the class with the best has
+`LARGEST_FAULT_CLASS` members. No fault is named where the class is too large, a fault that failed a test has a clearly
+smaller error, the best explains too small a share of the difference, or its axis is ambiguous. Errors and gains are
+those of `rank_faults`. Called by `compare_with_reference`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ ALIASES = {
 constant force in any recording."""
 
 NO_GAIN_REASON = "it contains the named fault as a special case, and its error is not significantly smaller"
-RIVAL_REASON = "another fault explains more of the difference between these recordings"
+RIVAL_REASON = "another fault explains as much of the difference between these recordings, or more"
 """Reasons, in messages, why a rival of the named fault is not named."""
 
 
@@ -63,25 +63,23 @@ class Decision:
 
 def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     """Choose the fault or class to name, and list the other candidates. response_count: number of response channels."""
-    tested = [(fault, _find_flaw(fault, comparison.has_difference_without(fault))) for fault in comparison.faults]
+    tested = [(fault, _find_objection(fault, comparison.has_difference_without(fault))) for fault in comparison.faults]
     accepted_faults = [fault for fault, flaw in tested if flaw == ""]
     unnamed = tuple((fault, flaw) for fault, flaw in tested if fault.gain > 0 and flaw)
     if not accepted_faults:
         return Decision(None, (), 0.0, unnamed)
     best = _choose_simplest(accepted_faults, comparison)
     rivals = [fault for fault in accepted_faults if fault is not best]
-    distinct_rivals = [rival for rival in rivals if not _is_wider(rival, best)]
-    inseparable_faults = [rival for rival in distinct_rivals if _is_inseparable(best, rival, comparison)]
-    failed = [fault for fault, flaw in tested if flaw and fault.gain >= LEAST_FAULT_GAIN and not _is_wider(fault, best)]
-    inseparable_faults += [
-        fault for fault in rivals if _is_wider(fault, best) and _is_significantly_better(fault, best)
-    ]
+    distinct_rivals = [rival for rival in rivals if not _subsumes(rival, best)]
+    inseparable = [rival for rival in distinct_rivals if _is_inseparable(best, rival, comparison)]
+    failed = [fault for fault, flaw in tested if flaw and fault.gain >= LEAST_FAULT_GAIN and not _subsumes(fault, best)]
+    inseparable += [fault for fault in rivals if _subsumes(fault, best) and _is_significantly_better(fault, best)]
     members = (
-        *inseparable_faults,
-        *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable_faults), 0)],
+        *inseparable,
+        *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
     )
     better_faults = [
-        fault for fault in failed if fault.gain_low > 0 and _sum_gap(fault, best) < -_compute_margin(best, comparison)
+        fault for fault in failed if fault.gain_low > 0 and _sum_excess(fault, best) < -_find_margin(best, comparison)
     ]
     aliases = ALIASES.get(best.fault.effect, ()) if response_count == 1 or best.fault.effect == "force_offset" else ()
     equivalents = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in members), *aliases))
@@ -89,7 +87,7 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     other_axes = [rival.fault.axis for rival in members if rival.fault.effect == best.fault.effect]
     reason = ""
     if better_faults:
-        reason = f"{get_noun(better_faults[0].fault.effect)} explains more, but is not significant itself"
+        reason = f"{get_noun(better_faults[0].fault.effect)} explains more, but did not pass all tests itself"
     elif best.share < LEAST_FAULT_SHARE:
         reason = (f"it explains {100 * best.share:.0f} % of the difference between these recordings: "
                   "the main cause is another")  # fmt: skip
@@ -97,7 +95,7 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
         reason = "these data cannot distinguish it from " + ", ".join(equivalents)
     elif other_axes:
         reason = f"these data do not show whether it is on {best.fault.axis} or on {', '.join(other_axes)}"
-    unnamed_rivals = tuple((rival, NO_GAIN_REASON if _is_wider(rival, best) else RIVAL_REASON) for rival in rivals)
+    unnamed_rivals = tuple((rival, NO_GAIN_REASON if _subsumes(rival, best) else RIVAL_REASON) for rival in rivals)
     if reason:
         return Decision(None, (), 0.0, ((best, reason), *unnamed_rivals, *unnamed))
     unnamed_candidates = tuple(candidate for candidate in (*unnamed_rivals, *unnamed) if candidate[0] not in members)
@@ -107,20 +105,19 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
 def _find_inconclusive(
     failed_faults: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison
 ) -> list[JudgedFault]:
-    """Find the candidates of other effects that failed a test of `_find_flaw`, whose gain has a lower bound above 0,
-    and whose error differs too little from that of the best to exclude them."""
+    """Find the candidates of other effects that failed a test of `_find_objection`, whose gain has a lower bound above
+    0, and whose error differs too little from that of the best to exclude them."""
     return [
         judged_fault
         for judged_fault in failed_faults
         if judged_fault.fault.effect != best.fault.effect
         and judged_fault.gain_low > 0
-        and abs(_sum_gap(judged_fault, best)) <= _compute_margin(best, comparison)
+        and abs(_sum_excess(judged_fault, best)) <= _find_margin(best, comparison)
     ]
 
 
-def _is_wider(candidate: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `candidate` is the more general fault: it contains `best` as a special case at the same axis, so that it
-    cannot fit worse."""
+def _subsumes(candidate: JudgedFault, best: JudgedFault) -> bool:
+    """Whether `candidate` contains `best` as a special case at the same axis, so that it cannot fit worse."""
     return best.fault.effect in candidate.fault.simpler and best.fault.axis == candidate.fault.axis
 
 
@@ -129,46 +126,46 @@ def _choose_simplest(accepted_faults: Sequence[JudgedFault], comparison: Compari
     it."""
     best = min(accepted_faults, key=lambda judged_fault: float(judged_fault.block_squares.sum()))
     for candidate in accepted_faults:
-        if _is_wider(best, candidate) and _is_inseparable(best, candidate, comparison):
+        if _subsumes(best, candidate) and _is_inseparable(best, candidate, comparison):
             return candidate
     return best
 
 
-def _find_flaw(fault: JudgedFault, sets_differ: bool) -> str:
-    """Find the flaw of a fault, the reason not to name it; empty if it passes all tests. sets_differ: whether the clean
+def _find_objection(candidate: JudgedFault, sets_differ: bool) -> str:
+    """Find the reason not to name a fault, as a clause; empty if it passes all tests. sets_differ: whether the clean
     and the faulty set differ by more than stretches of a single set do. If not, the gain must be steady: its lower
     bound at least `FAULT_INTERVAL_RATIO` of it, and the fault constant during a recording."""
-    if fault.gain < LEAST_FAULT_GAIN or fault.gain_low <= 0:
+    if candidate.gain < LEAST_FAULT_GAIN or candidate.gain_low <= 0:
         return "its gain is not larger than its variation between stretches of the recordings"
-    is_steady = fault.gain_low >= FAULT_INTERVAL_RATIO * fault.gain and not fault.fault.varies
+    is_steady = candidate.gain_low >= FAULT_INTERVAL_RATIO * candidate.gain and not candidate.fault.varies
     if not sets_differ and not is_steady:
         return "stretches of one set differ as much as the sets do"
-    if fault.gain <= FAULT_GAIN_FACTOR * fault.control_gain:
+    if candidate.gain <= FAULT_GAIN_FACTOR * candidate.control_gain:
         return (
-            f"its gain between stretches of one set is {fault.control_gain:.2g} already, and {fault.gain:.2g} between "
-            "the two sets"
+            f"its gain between stretches of one set is {candidate.control_gain:.2g} already, and "
+            f"{candidate.gain:.2g} between the two sets"
         )
-    main_parameter = next(iter(fault.values))
+    main_parameter = next(iter(candidate.values))
     if (
-        abs(_compute_distance_from_no_fault(fault, main_parameter))
-        <= T_QUANTILE * fault.standard_errors[main_parameter]
+        abs(_compute_distance_from_no_fault(candidate, main_parameter))
+        <= T_QUANTILE * candidate.standard_errors[main_parameter]
     ):
         return "the confidence interval of its parameter includes the value without the fault"
     return ""
 
 
-def _compute_distance_from_no_fault(fault: JudgedFault, name: str) -> float:
+def _compute_distance_from_no_fault(candidate: JudgedFault, name: str) -> float:
     """Compute the difference of a parameter from its value without a fault: 1 for a gain, else 0."""
-    return fault.values[name] - (1.0 if name == "gain" else 0.0)
+    return candidate.values[name] - (1.0 if name == "gain" else 0.0)
 
 
 def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Comparison) -> bool:
-    """Whether the error of `rival` exceeds that of the best by at most `_compute_margin`, or not significantly
+    """Whether the error of `rival` exceeds that of the best by at most `_find_margin`, or not significantly
     (bootstrap over blocks)."""
     excess_errors = rival.block_squares - best.block_squares
     draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(
-        excess_errors.sum() <= _compute_margin(best, comparison)
+        excess_errors.sum() <= _find_margin(best, comparison)
         or np.quantile(excess_errors[draws].sum(axis=1), BOOTSTRAP_LEVEL) <= 0
     )
 
@@ -182,13 +179,13 @@ def _is_significantly_better(generalisation: JudgedFault, best: JudgedFault) -> 
     )
 
 
-def _sum_gap(rival: JudgedFault, best: JudgedFault) -> float:
-    """Sum the squared errors with `rival` undone, less those with the best undone."""
+def _sum_excess(rival: JudgedFault, best: JudgedFault) -> float:
+    """Compute the sum of squared errors with `rival` undone, less that with the best undone."""
     return float((rival.block_squares - best.block_squares).sum())
 
 
-def _compute_margin(best: JudgedFault, comparison: Comparison) -> float:
-    """Compute the difference between the error sums of a rival and the best above which they are distinguished: the
+def _find_margin(best: JudgedFault, comparison: Comparison) -> float:
+    """Find the difference between the error sums of a rival and the best above which they are distinguished: the
     smaller of `FAULT_RIVAL_GAIN_MARGIN` of the reduction by the best and `FAULT_RIVAL_ERROR_MARGIN` of its remaining
     error."""
     remaining_error = float(best.block_squares.sum())

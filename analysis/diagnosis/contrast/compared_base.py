@@ -139,22 +139,22 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
         clean, faulty = ([part for part in parts if len(part.known) > least_samples] for parts in (clean, faulty))
     rows = base.build_rows(clean), base.build_rows(faulty)
     valid = tuple(base.mask_valid_samples(parts) for parts in (clean, faulty))
-    gap_reach = min(_choose_gap_reach(side) for side in valid)
-    masks = tuple(tuple(_mask_interior(mask, gap_reach) for mask in side) for side in valid)
+    gap_reach = min(_choose_gap_reach(part_masks) for part_masks in valid)
+    masks = tuple(tuple(_mask_interior(mask, gap_reach) for mask in part_masks) for part_masks in valid)
     least_rows = max(LEAST_ROWS, 2 * rows[0][0].shape[1])
-    if any(sum(int(mask.sum()) for mask in side) < least_rows for side in masks):
+    if any(sum(int(mask.sum()) for mask in part_masks) < least_rows for part_masks in masks):
         raise ValueError("too few samples of one of the two sets remain for a comparison")
-    all_rows = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
+    all_rows = np.vstack([part[mask] for index in (0, 1) for part, mask in zip(rows[index], masks[index], strict=True)])
     column_rms = np.sqrt(np.mean(all_rows**2, axis=0))
     column_rms = np.where(column_rms > 0, column_rms, 1.0)
-    residuals = [_compute_residuals(rows[side], masks[side], column_rms) for side in (0, 1)]
+    residuals = [_compute_residuals(rows[index], masks[index], column_rms) for index in (0, 1)]
     whitening = _fit_whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
-    sides = []
-    for parts, side_rows, side_masks in zip((clean, faulty), rows, masks, strict=True):
-        white = _whiten(whitening, side_rows, side_masks) / column_rms
+    recording_sets = []
+    for parts, set_rows, set_masks in zip((clean, faulty), rows, masks, strict=True):
+        white = _whiten(whitening, set_rows, set_masks) / column_rms
         scale = _compute_white_error(white)
-        sides.append(RecordingSet(tuple(parts), side_rows, side_masks, scale, white / scale))
-    return ComparedBase(base, sides[0], sides[1], whitening, column_rms, gap_reach)
+        recording_sets.append(RecordingSet(tuple(parts), set_rows, set_masks, scale, white / scale))
+    return ComparedBase(base, recording_sets[0], recording_sets[1], whitening, column_rms, gap_reach)
 
 
 def _mask_interior(valid: Mask, gap_reach: int) -> Mask:
@@ -294,6 +294,6 @@ def _compute_spread_ratio(data: RecordingSet, rows: Sequence[FloatArray]) -> flo
     """Compute the standard deviation of the predicted signal before undoing over that after it (1 where that is 0): a
     weaker actuator must not reduce all errors."""
     original_spread, undone_spread = (
-        float(np.std(np.concatenate([part[:, 0] for part in side_rows]))) for side_rows in (data.rows, rows)
+        float(np.std(np.concatenate([part[:, 0] for part in set_rows]))) for set_rows in (data.rows, rows)
     )
     return original_spread / undone_spread if undone_spread > 0 else 1.0

@@ -26,8 +26,8 @@ class JudgedFault:
     """Standard error of each parameter: jackknife that leaves out a sixth of either set, so that the variation within
     the clean set counts as well as that within the faulty set."""
     block_squares: FloatArray
-    """(blocks,): sums of squared errors of one base for both sets with the fault undone, blocks of the faulty set, then
-    of the clean one; times 1 + the median gain in the negative control."""
+    """(blocks,): sums of squared errors over all bases, each fitted to both sets with the fault undone, blocks of the
+    faulty set, then of the clean one; times 1 + the median gain in the negative control."""
     gain: float
     """Sum of `Comparison.block_squares` (no fault undone) over the sum of `block_squares`, minus 1; above 0 = undoing
     it helps."""
@@ -35,13 +35,13 @@ class JudgedFault:
     """The largest gain in the negative control minus the median: the gain that the free parameters of the fault yield
     where there is no fault."""
     share: float
-    """Share of the excess error (`Comparison.excess`) that is removed with the fault undone."""
+    """Share of the excess error (`Comparison.excess`) that is removed with the fault undone; 0 without an excess."""
     held_out_squares: float
     """Cross-validated sum of squared errors of the faulty set, with the fault undone."""
     gain_low: float
     """Lower confidence bound of `gain`, by bootstrap over blocks."""
     control_excess: float
-    """The largest excess between stretches of one set, with the fault undone in the faulty set."""
+    """The largest excess between stretches of the faulty set, with the fault undone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,17 +52,17 @@ class Comparison:
     faults: tuple[JudgedFault, ...]
     """The best fault first."""
     block_squares: FloatArray
-    """(blocks,): sums of squared errors of one base for both sets, with no fault undone; blocks as in
-    `JudgedFault.block_squares`."""
+    """(blocks,): sums of squared errors as `JudgedFault.block_squares`, with no fault undone."""
     sample_count: int
-    """Number of samples of both sets. It is also E0, because the errors of separate bases are scaled to white noise
-    with rms 1."""
+    """Number of samples of both sets, summed over the bases. It is also E0, because the errors of separate bases are
+    scaled to white noise with rms 1."""
     faulty_sample_count: int
-    """Number of samples of the faulty set."""
+    """Number of samples of the faulty set, summed over the bases."""
     held_out_squares: float
     """Cross-validated sum of squared errors of the faulty set, with no fault undone."""
     faulty_share: float
-    """Rms error of a base fitted to the faulty set alone, relative to the rms of the predicted signal."""
+    """Standard deviation of the error of the first base, fitted to the faulty set alone, over that of its signal; at
+    most 1."""
     control_excess: float
     """The largest `excess` between stretches of one set."""
     clean_control_excess: float

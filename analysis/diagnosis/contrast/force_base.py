@@ -57,7 +57,7 @@ class ForceBase:
         base_regression = build_regression(motions, self.axis, (), self.is_free_rotation)
         part_rows = []
         for force_column, motion, linear_columns in zip(force_columns, motions, base_regression.columns, strict=True):
-            law_columns = [motion.decimate(law.columns(motion, law.numbers)) for law in self.laws]
+            law_columns = [motion.decimate(law.make_columns(motion, law.numbers)) for law in self.laws]
             part_rows.append(np.hstack([force_column, linear_columns, *law_columns]))
         return tuple(part_rows)
 

@@ -1,13 +1,14 @@
 """Faults of a mechanism: additional forces along the measured motion, each undone by subtracting it from the command.
 `rank_faults` fits them.
 
-With q the position from the middle of the travel, v the velocity, a the acceleration and sigma = tanh(v / width):
+With x the measured position, q its distance from the middle of the travel, v the velocity, a the acceleration and
+sigma = tanh(v / width):
 
     added_mass             M a               hardening_stiffness    k3 q^3
     viscous_damping        d v               coulomb_friction       F sigma
     quadratic_damping      c v |v|           asymmetric_friction    F+ max(sigma, 0) + F- min(sigma, 0)
     added_stiffness        k q               presliding_hysteresis  F z (Dahl's law, `compute_bristle_deflection`)
-    end_stop               k max(|q| - q0, 0) sgn q                cogging   A sin(2 pi q / pitch + phase)
+    end_stop               k max(|q| - q0, 0) sgn q                cogging   A sin(2 pi x / pitch + phase)
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,8 +33,8 @@ WIDTH_FACTORS = (1.0, 3.0, 8.0, 20.0)
 PRESLIDING_SHARES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
 """Tried presliding distances, relative to the travel. Chosen by hand."""
 COGGING_PERIOD_COUNTS = tuple(np.arange(2.0, 40.0, 0.35).tolist())
-"""Tried numbers of periods of a cogging force within the travel, so close that neighbours cannot be distinguished.
-Chosen by hand."""
+"""Tried numbers of periods of a cogging force within the travel, or within a turn of a shaft that turns farther, so
+close that neighbours cannot be distinguished. Chosen by hand."""
 STOP_SHARES = tuple(np.arange(0.05, 0.5, 0.05).tolist())
 """Tried distances of an end stop from the middle of the travel, relative to the travel. Chosen by hand."""
 
@@ -93,7 +94,8 @@ def make_mechanism_faults(
 ) -> Iterator[Fault]:
     """Make all faults of the mechanism along an axis; its motion is the channel of the same index, or the last channel
     where there are fewer channels than axes. motions: of all compared parts, whose range the grids span. get_motion:
-    maps a part to its motion. is_rotational: whether the axis turns; pitches of cogging are then at most a turn."""
+    maps a part to its motion. is_rotational: whether the axis turns; pitches of cogging are then at most half a
+    turn."""
     channel = min(axis_index, len(motions[0].channels) - 1)
     position = np.concatenate([motion.position[:, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])

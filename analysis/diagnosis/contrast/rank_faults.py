@@ -69,12 +69,12 @@ def rank_faults(
     """Compare the faulty recordings with the clean ones, by the first kind of base that fits: force balances, else
     autoregressive models. excluded: names of effects that are not tested. None where there is too little data, no base
     fits, or one set moves far less than the other."""
-    sides = split_into_parts(clean), split_into_parts(recordings)
-    if not all(sides) or not has_similar_motion(*sides):
+    part_sets = split_into_parts(clean), split_into_parts(recordings)
+    if not all(part_sets) or not has_similar_motion(*part_sets):
         return None
-    for bases, motions in build_bases(*sides):
+    for bases, motions in build_bases(*part_sets):
         with suppress(np.linalg.LinAlgError, ValueError):
-            compared_bases, faults = _prepare_bases(*sides, bases, motions)
+            compared_bases, faults = _prepare_bases(*part_sets, bases, motions)
             fault_fits = fit_faults(
                 compared_bases, [fault for fault in faults if fault.effect not in excluded], time_left
             )
@@ -134,7 +134,7 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits)
     held_out_squares = sum(compute_held_out_error(fold_pairs, np.zeros(0), left_out) for left_out, fold_pairs in folds)
     clean, faulty = [pair.unchanged for pair in unchanged_pairs], [pair.undone.blocks for pair in unchanged_pairs]
     control_excesses = [
-        max(_yield_control_excesses([np.array(products) for products in side])) for side in (clean, faulty)
+        max(_yield_control_excesses([np.array(products) for products in grams])) for grams in (clean, faulty)
     ]
     first_base = compared_bases[0]
     return Comparison(
@@ -184,12 +184,12 @@ def _undo_fault(compared: ComparedBase, fitted_variant: FittedVariant) -> tuple[
     return rows, masks
 
 
-def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
+def _yield_control_excesses(products_by_base: Sequence[FloatArray]) -> Iterator[float]:
     """Yield the relative excess error within one set: for each division into two stretches, the error of a single fit
-    to both over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
+    to both over the sum of separate fits, less 1. products_by_base: of the set, (blocks, k, k) each."""
 
     def sum_errors(blocks: Sequence[int]) -> float:
-        return sum(compute_residual_squares(products[list(blocks)].sum(axis=0)) for products in sides)
+        return sum(compute_residual_squares(products[list(blocks)].sum(axis=0)) for products in products_by_base)
 
     joint_error = sum_errors(ALL_BLOCKS)
     for stretch in CONTROL_STRETCHES:
@@ -245,12 +245,12 @@ def _estimate_standard_errors(
 ) -> dict[str, float]:
     """Estimate the standard error of each value of a fault: root of the sum of the jackknife variances of both sets,
     from the sizes with each sixth left out, and of the squared error due to the spacing of the variants."""
-    sides = [[variant.parameters_of(sizes) for sizes in fold_sizes] for fold_sizes in (without_faulty, without_clean)]
+    by_set = [[variant.parameters_of(sizes) for sizes in fold_sizes] for fold_sizes in (without_faulty, without_clean)]
     return {
         name: float(
-            np.sqrt(variant.grid_error**2 + sum(_estimate_variance([fold[name] for fold in side]) for side in sides))
+            np.sqrt(variant.grid_error**2 + sum(_estimate_variance([fold[name] for fold in folds]) for folds in by_set))
         )
-        for name in sides[0][0]
+        for name in by_set[0][0]
     }
 
 
@@ -289,12 +289,12 @@ def _yield_control_gains(
     varies with time also differs between stretches of the faulty set, which is then no control."""
     for is_clean in (True,) if fault.varies else (True, False):
         common_sizes = np.zeros_like(sizes) if is_clean else sizes
-        sides = [compared.clean if is_clean else compared.faulty for compared in compared_bases]
-        products = [
-            compared.compute_grams(side, undo_fault_in_rows(compared, side, fault, variant))
-            for compared, side in zip(compared_bases, sides, strict=True)
+        recording_sets = [compared.clean if is_clean else compared.faulty for compared in compared_bases]
+        by_base = [
+            compared.compute_grams(recording_set, undo_fault_in_rows(compared, recording_set, fault, variant))
+            for compared, recording_set in zip(compared_bases, recording_sets, strict=True)
         ]
         for stretch in CONTROL_STRETCHES:
             other_blocks = [block for block in ALL_BLOCKS if block not in stretch]
-            pairs = [SetPair(grams, stretch, tuple(grams.undo_fault(common_sizes)[other_blocks])) for grams in products]
+            pairs = [SetPair(grams, stretch, tuple(grams.undo_fault(common_sizes)[other_blocks])) for grams in by_base]
             yield compute_error(pairs, common_sizes) / max(fit_sizes(pairs, variant).error, 1e-300) - 1

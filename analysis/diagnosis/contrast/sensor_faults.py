@@ -7,9 +7,8 @@
     clock_drift    y(t / (1 + rate error))   sensor_misalignment     y + R y, R skew-symmetric (three axes)
     sensor_lag     (y(t) - k y(t - Dt)) / (1 - k), k = exp(-Dt / T)
 
-T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `compute_drift_shape`. Grids of
-tried values and limits are chosen by hand; a lag is tried from Dt / 10 on. Called by `rank_faults`.
-"""
+T: delay or time constant in s; Dt: time between rows of the base; ramp: `compute_drift_shape`. Grids of tried values
+and limits are chosen by hand; a lag is tried from Dt / 10 on. Called by `rank_faults`."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -102,7 +101,8 @@ def make_sensor_faults(index: int, name: str, parts: Sequence[Part], lags: Lags)
     yield channel.make_fault("sensor_play", [_make_backlash(channel, share * channel.std) for share in BACKLASH_SHARES])
     for other_channel in range(longest_part.response.shape[1]):
         if other_channel != index:
-            yield _make_cross_axis_fault(channel, other_channel)
+            is_after_next = (other_channel - index) % longest_part.response.shape[1] == 2
+            yield _make_cross_axis_fault(channel, other_channel, "from_after_next" if is_after_next else "from_next")
 
 
 def make_shared_faults(parts: Sequence[Part], lags: Lags) -> Iterator[Fault]:
@@ -174,8 +174,8 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     return np.asarray(y + gap * relative_lead)
 
 
-def _make_cross_axis_fault(channel: _Channels, other_channel: int) -> Fault:
-    """Make cross-axis sensitivity: the reading of this channel contains that of another one, times the size."""
+def _make_cross_axis_fault(channel: _Channels, other_channel: int, share_name: str) -> Fault:
+    """Make cross-axis sensitivity to another channel; share_name: name of its share in the catalogue."""
     (channel_index,) = channel.indices
 
     def undo(part: Part) -> Part:
@@ -183,7 +183,7 @@ def _make_cross_axis_fault(channel: _Channels, other_channel: int) -> Fault:
         response[:, channel_index] -= part.response[:, other_channel]
         return replace(part, response=response)
 
-    return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), scale_parameter("from_next"))])
+    return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), scale_parameter(share_name))])
 
 
 def _make_gain(channel: _Channels, gain: float) -> Variant:

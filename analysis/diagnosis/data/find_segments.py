@@ -1,10 +1,10 @@
-"""Find periodic segments in a recording that declares none: parts whose command repeats exactly.
+"""Find periodic segments in a recording that declares none: parts whose excitation repeats exactly.
 
-A candidate period is the first high peak of the command's autocorrelation. It is accepted only where the command
-itself, sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat
-approximately, are not used. Without such a part, no segments are declared. Called by `prepare_recordings` and
-`study.importing.build_recording`; `analysis.look.repeats` uses the search for a period.
-"""
+The excitation is tested where it was recorded, else the command (`find_designed_command`); below, both are called
+command. A candidate period is the first high peak of its autocorrelation. It is accepted only where the command itself,
+sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat approximately,
+are not used. Without such a part, no segments are declared. Called by `prepare_recordings` and
+`study.importing.build_recording`; `analysis.look.repeats` uses the search for a period."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -42,7 +42,8 @@ LARGEST_SAMPLE = 1e100
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:
     """Find the segments. Returns the recording with them, and a sentence about them; the recording unchanged and an
-    empty string where it has segments, or no part of its command repeats."""
+    empty string where it has segments, or no part of its excitation repeats. Parts that do not repeat become segments,
+    too, without a period."""
     if recording.segments:
         return recording, ""
     parts = find_parts(recording)
@@ -169,12 +170,12 @@ def _describe_segments(segments: Sequence[Segment]) -> str:
     periods_text = conjoin([str(period) for period in sorted({segment.period for segment in periodic_segments})])
     levels_text = conjoin([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic_segments})])
     subject_text = (
-        "The command"
+        "The excitation"
         if len(periodic_segments) == len(segments)
-        else f"In {len(periodic_segments)} of {len(segments)} parts the command"
+        else f"In {len(periodic_segments)} of {len(segments)} parts the excitation"
     )
     fewest_periods = min((segment.stop - segment.start) // segment.period for segment in periodic_segments)
     return (
         f"{subject_text} repeats exactly, every {periods_text} samples, {fewest_periods} times or more in each part: "
-        f"segments with that period were made, with peaks of {levels_text} (SI units)."
+        f"segments with that period were made, with command peaks of {levels_text} (SI units)."
     )

@@ -17,29 +17,29 @@ QUANTITY_AND_UNIT = {"m": ("force", "N"), "rad": ("torque", "N m")}
 """Quantity and unit of the converted command, by the unit of length of the motion."""
 
 
-class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
+class ForceConstantError(ValueError):
     """The constants do not suit the recording; the message is a sentence without a full stop."""
 
 
-def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
+def convert_commands_to_forces(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
     """Convert the commands to forces, and also an excitation with as many channels. Returns the recording and a
     sentence about it. constants: a single value for all commands or a value for each, in N or N m per unit of the
-    command. Raises NoForceConstant where the motion has no SI unit, a command is a force already, or the constants are
-    of a wrong number, zero or not finite."""
+    command. Raises ForceConstantError where the motion has no SI unit, a command is a force already, or the constants
+    are of a wrong number, zero or not finite."""
     command, length_unit = (
         recording.command,
         determine_unit_system(recording.command.units, recording.response.units).length,
     )
     if length_unit not in QUANTITY_AND_UNIT:
-        raise NoForceConstant(
+        raise ForceConstantError(
             f"the motion is in {length_unit}: no force constant makes SI of it, so give its unit in the map"
         )
     if any(unit in FORCE_UNITS for unit in command.units):
-        raise NoForceConstant(f"the command is a force already (in {command.units[0]}), so it has no force constant")
+        raise ForceConstantError(f"the command is a force already (in {command.units[0]}), so it has no force constant")
     if len(constants) not in (1, len(command.channels)):
-        raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
+        raise ForceConstantError(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
     if not all(np.isfinite(constant) and constant for constant in constants):
-        raise NoForceConstant("a force constant must be a number other than 0")
+        raise ForceConstantError("a force constant must be a number other than 0")
     quantity, unit = QUANTITY_AND_UNIT[length_unit]
     factors = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
 

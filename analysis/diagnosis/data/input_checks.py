@@ -30,17 +30,17 @@ from equalizer.signals.recording_checks import find_unusable_channels, format_ch
 from equalizer.signals.signal import Signal
 
 
-class NothingToDiagnose(ListedProblemsError):  # noqa: N818 - an answer that a user reads
+class NothingToDiagnoseError(ListedProblemsError):
     """The recordings cannot be diagnosed. `problems`: one sentence each, without a full stop."""
 
 
 def require_comparable(
     recordings: Sequence[Recording], names: Sequence[str], remedy: str = "diagnose them one at a time"
 ) -> None:
-    """Require recordings with the same channels, units and rate. Raises NothingToDiagnose where they differ, or without
-    recordings. names: of the recordings. remedy: clause that ends each problem."""
+    """Require recordings with the same channels, units and rate. Raises NothingToDiagnoseError where they differ, or
+    without recordings. names: of the recordings. remedy: clause that ends each problem."""
     if not recordings:
-        raise NothingToDiagnose(("there is no recording",))
+        raise NothingToDiagnoseError(("there is no recording",))
     reference, problems = recordings[0], []
     for recording, name in zip(recordings[1:], names[1:], strict=True):
         for property_name, expected, actual in (
@@ -51,7 +51,7 @@ def require_comparable(
             if expected != actual:
                 problems.append(f"{name} has the {property_name} {actual}, {names[0]} has {expected}; {remedy}")
     if problems:
-        raise NothingToDiagnose(tuple(problems))
+        raise NothingToDiagnoseError(tuple(problems))
 
 
 def require_usable_data(
@@ -59,7 +59,7 @@ def require_usable_data(
 ) -> tuple[str, ...]:
     """Require a command without gaps, and responses that change and depend on it, for long enough. allow_short: whether
     recordings with at least `LEAST_SAMPLES` samples that are too short to name physics are accepted, and a sentence
-    about that is returned. Raises NothingToDiagnose."""
+    about that is returned. Raises NothingToDiagnoseError."""
     problems = [
         gap for recording, name in zip(recordings, names, strict=True) for gap in _find_gaps(recording.command, name)
     ]
@@ -94,7 +94,7 @@ def require_usable_data(
                 "the recording is noise or of another device, or its command was not played"
             )
     if problems:
-        raise NothingToDiagnose(tuple(problems))
+        raise NothingToDiagnoseError(tuple(problems))
     return shortness
 
 
@@ -126,7 +126,7 @@ def _describe_shortness(recordings: Sequence[Recording]) -> Iterator[str]:
 
 def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
     """Require recordings that differ: a duplicate would be tested by the data that it was fitted to. Raises
-    NothingToDiagnose."""
+    NothingToDiagnoseError."""
     problems = [
         f"{names[second]} holds the same samples as {names[first]}, and a recording counts once"
         for first, second in combinations(range(len(recordings)), 2)
@@ -134,12 +134,12 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
         and np.array_equal(recordings[first].command.samples, recordings[second].command.samples, equal_nan=True)
     ]
     if problems:
-        raise NothingToDiagnose(tuple(problems))
+        raise NothingToDiagnoseError(tuple(problems))
 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
     """Require a model that fits the recordings' device: channels, quantities, units, magnitudes, payloads, modes and
-    effects. recordings: with the same channels, units and rate. Raises NothingToDiagnose."""
+    effects. recordings: with the same channels, units and rate. Raises NothingToDiagnoseError."""
     first_recording = recordings[0]
     names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
     problems = (
@@ -156,7 +156,7 @@ def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) ->
             *_find_misplaced_effects(model, first_recording),
         )
     if problems:
-        raise NothingToDiagnose(problems)
+        raise NothingToDiagnoseError(problems)
 
 
 def _find_gaps(command: Signal, name: str) -> Iterator[str]:
@@ -172,14 +172,14 @@ def _find_gaps(command: Signal, name: str) -> Iterator[str]:
 
 def _find_impossible_values(recording: Recording, name: str) -> Iterator[str]:
     """Yield a sentence for each channel with a magnitude above `LARGEST_VALUE`."""
-    for side in ("command", "response", "position"):
-        signal: Signal | None = getattr(recording, side)
+    for signal_name in ("command", "response", "position"):
+        signal: Signal | None = getattr(recording, signal_name)
         for channel in range(0 if signal is None else len(signal.channels)):
             assert signal is not None
             largest = float(np.nanmax(np.abs(signal.samples[:, channel]), initial=0.0))
             if largest > LARGEST_VALUE:
                 yield (
-                    f"{name} holds values up to {largest:.3g} {signal.units[channel]} in {side} "
+                    f"{name} holds values up to {largest:.3g} {signal.units[channel]} in {signal_name} "
                     f"{signal.channels[channel]}, which no device reaches"
                 )
 
@@ -191,13 +191,13 @@ def _find_constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
             "the command never changes, so the device was not excited; a free motion, measured as positions or speeds "
             "over time, is diagnosed without a model"
         )
-    for side in ("response", "position"):
-        signals = [signal for recording in recordings if (signal := getattr(recording, side)) is not None]
+    for signal_name in ("response", "position"):
+        signals = [signal for recording in recordings if (signal := getattr(recording, signal_name)) is not None]
         for name, is_empty in find_unusable_channels(signals):
             if is_empty:
-                yield f"{side} {name} contains only missing values"
-            elif side == "response":
-                yield f"{side} {name} never changes: it was not connected, or nothing moved"
+                yield f"{signal_name} {name} contains only missing values"
+            elif signal_name == "response":
+                yield f"{signal_name} {name} never changes: it was not connected, or nothing moved"
 
 
 def _count_command_cycles(recording: Recording) -> float:
@@ -210,15 +210,15 @@ def _count_command_cycles(recording: Recording) -> float:
 
 def _compare_channel_counts(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     """Yield a sentence for commands, and one for responses, whose number differs from that of the model."""
-    for side, expected, channels in (
+    for signal_name, expected, channels in (
         ("command", model.inputs, recording.command.channels),
         ("response", model.outputs, recording.response.channels),
     ):
         if expected != len(channels):
-            port = "input" if side == "command" else "output"
+            port = "input" if signal_name == "command" else "output"
             yield (
                 f"the model has {expected} {port}{'s' if expected != 1 else ''}, but the recording has {len(channels)} "
-                f"{side} channel{'s' if len(channels) != 1 else ''} ({', '.join(channels)})"
+                f"{signal_name} channel{'s' if len(channels) != 1 else ''} ({', '.join(channels)})"
             )
 
 
@@ -227,7 +227,7 @@ def _compare_quantities(model: MechanicalModel, recording: Recording) -> Iterato
     other_quantities = [quantity for quantity in recording.response.quantities if quantity != model.quantity]
     if other_quantities:
         quantity_names = ", ".join(sorted(set(other_quantities)))
-        yield f"the model answers with {model.quantity}, but the recording's response is {quantity_names}"
+        yield f"the model's response is {model.quantity}, but the recording's is {quantity_names}"
     is_rotational = _is_rotational(recording)
     if is_rotational is not None and is_rotational != model.rotational:
         descriptions = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
@@ -287,7 +287,7 @@ def _find_too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterat
     slowest_hz = min((float(mode_hz) for mode_hz in natural_hz if mode_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
         yield (
-            f"the model swings at {slowest_hz:.3g} Hz and faster, which cannot be seen at a rate of "
+            f"the model's lowest natural frequency is {slowest_hz:.3g} Hz, above half the sample rate of "
             f"{recording.sample_rate_hz:g} Hz; the recording must state its rate in hertz"
         )
 

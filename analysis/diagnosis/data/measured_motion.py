@@ -30,7 +30,8 @@ class MeasuredMotion:
     position: FloatArray
     """(n, m), finite: positions of the model's first m outputs."""
     noise: FloatArray
-    """(lines, m): density of its noise, as `ChannelNoise.density`; NaN where unknown."""
+    """(lines, m): density of its noise, as `ChannelNoise.density`; of the response's noise where that of a measured
+    position is not known; NaN where unknown."""
 
 
 def has_motion(recording: Recording, model: MechanicalModel) -> bool:
@@ -42,8 +43,9 @@ def has_motion(recording: Recording, model: MechanicalModel) -> bool:
 
 
 def choose_measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFloor) -> MeasuredMotion:
-    """Choose the position where it was measured, else the response: a velocity is integrated by the trapezoidal rule,
-    and its noise divided by (2 pi f)². floor: noise of the recording. See `has_motion`."""
+    """Choose the position where it was measured, else the response without the sensor's low pass: a velocity is
+    integrated by the trapezoidal rule, and its noise divided by (2 pi f)². Missing samples are interpolated. floor:
+    noise of the recording. See `has_motion`."""
     axis_count, rate_hz = model.inputs, recording.sample_rate_hz
     if _has_position(recording, model):
         assert recording.position is not None
@@ -108,7 +110,8 @@ def is_driven(recordings: Sequence[Recording]) -> bool:
 
 def convert_to_force_driven(recording: Recording) -> Recording:
     """Exchange command and response of a recording with an imposed motion: the measured force becomes the command, the
-    motion the response, and `imposed` is set in its meta. Other recordings are returned unchanged."""
+    motion the response, an excitation is removed, and `imposed` is set in its meta. Recordings with fewer commands than
+    responses, and all others, are returned unchanged."""
     is_motion_command = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
     is_force_response = set(recording.response.quantities) <= _FORCE_QUANTITIES
     if not (

@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion
 from analysis.diagnosis.settings import MOST_GROWTH
-from equalizer.effects.command_sign import with_reversed_commands
+from equalizer.effects.command_sign import reverse_commands
 from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.linear_simulation import compute_driven_axes, compute_growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -63,7 +63,7 @@ def apply_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> t
     return tuple(adapted_effects)
 
 
-def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+def adapt_to_recorded_commands(model: MechanicalModel, recording: Recording) -> MechanicalModel:
     """Adapt the model to the commands as they were recorded. model: for the recording as it is compared, in which
     commands may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit
     masses."""
@@ -73,7 +73,7 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
     if not isinstance(reversed_channels, Sequence) or not set(reversed_channels) & set(channels):
         return model
     signs = [-1.0 if channel in reversed_channels else 1.0 for channel in channels]
-    return with_reversed_commands(model, signs, channels, recording.response.channels)
+    return reverse_commands(model, signs, channels, recording.response.channels)
 
 
 def find_payload_problems(
@@ -84,12 +84,13 @@ def find_payload_problems(
     key = _choose_payload_key(model)
     bad_key = ADDED_MASS_KEY if key == ADDED_INERTIA_KEY else ADDED_INERTIA_KEY
     problems = [
-        f"{name} says {bad_key}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
+        f"{name} states {bad_key}, but the model's device {'rotates' if model.rotational else 'translates'}: "
+        f"state {key}"
         for recording, name in zip(recordings, names, strict=True)
         if bad_key in recording.meta
     ]
     problems += [
-        f"{name} says {key} = {recording.meta[key]!r}, which must be a number from 0 on"
+        f"{name} states {key} = {recording.meta[key]!r}, which must be a number from 0 on"
         for recording, name in zip(recordings, names, strict=True)
         if key in recording.meta and not _is_valid_payload(recording.meta[key])
     ]

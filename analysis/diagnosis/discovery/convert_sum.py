@@ -77,7 +77,7 @@ def list_fitted_laws(hypothesis: Hypothesis) -> tuple[Law | None, ...]:
     return tuple(
         None
         if claim.effect.law is None
-        else claim.effect.law.with_numbers(_list_values_in_order(hypothesis.list_effects_of(claim_index)[0].values))
+        else claim.effect.law.replace_numbers(_list_values_in_order(hypothesis.list_effects_of(claim_index)[0].values))
         for claim_index, claim in enumerate(hypothesis.claims)
     )
 

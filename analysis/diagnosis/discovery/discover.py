@@ -89,11 +89,11 @@ def discover_laws(
     max_laws: int = LAW_MOST_ROUNDS,
     single_term: bool = False,
 ) -> Discovery | None:
-    """Search laws by forward selection: at most `max_laws`, fitted by output error; None where the error is that of the
-    noise, where no law is worth its parameters or, with single_term, where such a law does not suffice.
-    catalogue_explanation: by effects of the catalogue; its re-tuned model is the start. single_term: only laws of
-    single terms that are likely to explain the whole error; the search ends where a screen or a fit shows that they do
-    not, unless such a law depends on another axis."""
+    """Search laws by forward selection: at most `max_laws` (an antisymmetric pair counts as one), fitted by output
+    error; None where the error is that of the noise, where no law is worth its parameters or, with single_term, where
+    such a law does not suffice. catalogue_explanation: by effects of the catalogue; its re-tuned model is the start.
+    single_term: only laws of single terms that are likely to explain the whole error; the search ends where a screen or
+    a fit shows that they do not, unless such a law depends on another axis."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = catalogue_explanation.retuned.fitted
     current = context.score_fit(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))

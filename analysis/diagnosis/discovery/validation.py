@@ -1,4 +1,4 @@
-"""Checks that a discovered law must pass before it is named; each check that fails gives a sentence.
+"""Checks that a discovered law must pass before it is named; each check that fails gives a reason, as a clause.
 
 Of the many formulas that the search tries, some fit any data. A law is named only where held-out stretches of another
 kind than the fitted ones confirm it (extrapolation), where its parameters agree between stretches (stability), where
@@ -51,7 +51,7 @@ COUPLING_EXPLAINS_HALF = (
 def find_failed_checks(
     context: SearchContext, discovery: Discovery, rivals: Sequence[FittedCandidate]
 ) -> tuple[str, ...]:
-    """List the reasons, as sentences, not to name the laws; empty where they pass all checks. rivals: the best of the
+    """List the reasons, as clauses, not to name the laws; empty where they pass all checks. rivals: the best of the
     catalogue, with held-out error."""
     return tuple(dict.fromkeys(_run_checks(context, discovery, rivals)))
 
@@ -101,14 +101,14 @@ def _put_first(round_: Round, chosen_sum: Sum) -> Round:
 
 
 def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
-    """Yield a sentence for each check that fails, some possibly repeated: extrapolation, stability, negative control,
+    """Yield a clause for each check that fails, some possibly repeated: extrapolation, stability, negative control,
     equally good laws, steep exponents, coupling, and the gain over the re-tuned model and over the rivals."""
     if not describe_held_out_kinds(context.full_measure.records):
         yield NO_OTHER_EXCITATION
     for round_index, round_ in enumerate(discovery.rounds):
         best_sum = round_.sums[0]
         if best_sum.factor_error > LAW_FACTOR_ERROR and not is_confirmed_on_held_out(discovery.explanation):
-            yield f"its parameters differ by {100 * best_sum.factor_error:.0f} % from stretch to stretch"
+            yield f"its factor has a standard error of {100 * best_sum.factor_error:.0f} % between stretches"
         removed_share, chance_share = round_.shares_above_noise
         if 1 - removed_share > SHUFFLED_RATIO * (1 - chance_share):
             yield (
@@ -155,7 +155,7 @@ def _check_held_out_gain(
 
 
 def _check_rival_laws(context: SearchContext, discovery: Discovery, round_index: int) -> Iterator[str]:
-    """Yield a reason, as a sentence, for each law of other variables that fits as well as the best of the round, that
+    """Yield a reason, as a clause, for each law of other variables that fits as well as the best of the round, that
     held-out data do not distinguish from it either, and whose prediction differs."""
     round_ = discovery.rounds[round_index]
     best_candidate = round_.fitted_candidates[0]

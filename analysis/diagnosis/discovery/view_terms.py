@@ -27,8 +27,8 @@ from analysis.diagnosis.discovery.periodic_terms import find_periodic_terms
 
 
 def list_view_terms(view: View) -> tuple[Term, ...]:
-    """List all candidate terms of a view. Spatial periods and frequencies of periodic terms are estimated from its
-    first recording."""
+    """List all candidate terms of a view. Starting values and bounds, and the periods and frequencies of periodic
+    terms, are taken from its first record."""
     record = view.records[0]
     if view.acts_on == "response":
         return list_reading_terms(record.columns, view.axis, len(record.reading_units))

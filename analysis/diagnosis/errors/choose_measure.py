@@ -50,8 +50,8 @@ REQUESTED_MOTION_REMARK = (
     "the automatic choice would have compared forces."
 )
 NO_STATE_REMARK = (
-    "The model integrates freely and the sensors do not show its state, so it was simulated from rest; errors grow "
-    "with time."
+    "Short windows would be suitable, but the sensors do not show the model's state, so it was simulated from rest; "
+    "errors may grow with time."
 )
 """Remarks for the user on the chosen measure; those of the rule are in `error_measure_rule`."""
 
@@ -74,8 +74,8 @@ def make_measure(
     compared: Compared = "auto",
 ) -> MeasureChoice:
     """Make the error measure that the rule or `compared` selects. companions: further recordings that must suit the
-    same measure but are not part of it. Windows without an estimable state become a free simulation or, by the rule,
-    forces."""
+    same measure but are not part of it. Where the state for windows cannot be estimated, forces are compared; if motion
+    was requested or none was measured, a free simulation."""
     if compared == "force":
         return make_force_measure(recordings, model, None)
     records, companion_records = (

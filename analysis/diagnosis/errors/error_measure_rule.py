@@ -70,8 +70,8 @@ CLOSED_LOOP_WINDOWS = (
     "simulated in short windows, each from a state estimated from the measured motion."
 )
 DRIFTS = (
-    "The model integrates freely, so that small errors would grow without bound; it is simulated in short windows, "
-    "each from a state estimated from the measured motion."
+    "The model's free motion does not decay within the recording, so that small errors would persist or grow; it is "
+    "simulated in short windows, each from a state estimated from the measured motion."
 )
 NOT_AT_REST = (
     "The recording does not begin at rest; the model is simulated in short windows, each from a state estimated from "

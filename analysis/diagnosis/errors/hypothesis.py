@@ -51,7 +51,7 @@ class FreeParameter:
         return min(max(value, p.lower), p.upper)
 
     def to_coordinate(self, value: float) -> float:
-        """Convert a value (SI) to a coordinate: its logarithm on a log scale, else the value over `unit`."""
+        """Convert a value (SI), within its limits, to a coordinate: the logarithm on a log scale, else over `unit`."""
         p = self.parameter
         clipped = min(max(value, p.lower), p.upper)
         return float(np.log(clipped)) if p.scale == "log" else clipped / self.unit

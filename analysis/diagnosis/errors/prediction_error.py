@@ -43,18 +43,18 @@ class PredictionError:
     without_gain: float | None
     """The error of the model without any gain factor."""
     with_gain: float | None
-    """The error with one gain factor for all channels, fitted to the samples that are not held out; to all where all
-    are compared. None also where no gain can be fitted."""
+    """The error with one gain factor for all channels, fitted to the samples that are not held out; to the compared
+    samples where all are compared, or none is left to fit. None also where no gain can be fitted."""
     channels: tuple[ChannelRms, ...]
     """Errors of each response channel, without the gain factor; empty where they are not finite, no sample is compared,
-    or other signals than the responses are compared."""
+    or fewer signals are compared than there are responses."""
 
 
 def compute_prediction_error(
     recording: Recording, model: MechanicalModel, selection: PredictedSamples
 ) -> PredictionError:
     """Compute the error of a model, with the effects that it contains, on a recording. selection: samples on which the
-    error is computed; with "test", the gain factor is fitted to the other samples."""
+    error is computed; with "test", the gain factor is fitted to the other samples, if there are any."""
     measure = make_measure((recording,), model).measure
     measured, predicted, test_masks, fit_masks = [], [], [], []
     for record, residual in zip(measure.records, measure.residuals(model, ()), strict=True):
@@ -78,7 +78,8 @@ def compute_prediction_error(
 
 
 def _compute_channel_errors(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
-    """Yield the errors of the response channels, where responses were compared. y: measured, f: predicted, (n, c)."""
+    """Yield the errors of the first compared signals as those of the response channels; none where fewer were compared,
+    or the prediction is not finite. y: measured, f: predicted, (n, c)."""
     signal = recording.response
     if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
         return

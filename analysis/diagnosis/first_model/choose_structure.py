@@ -17,7 +17,7 @@ from analysis.diagnosis.first_model.model_structures import (
     BalancedRecordings,
     Kind,
     StructureFit,
-    StructureRefused,
+    StructureFitError,
     balance_recordings,
     choose_simplest,
     fit_modal_structure,
@@ -30,10 +30,10 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 REMAINDER_REGRESSORS: dict[str, Callable[[Motion], FloatArray]] = {
-    "the direction of motion, as dry friction does": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
+    "the direction of motion (like dry friction)": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
     "the square of the speed": lambda m: m.velocity * np.abs(m.velocity),
     "the square of the position": lambda m: (m.position - m.position.mean(axis=0)) ** 2,
-    "the cube of the position, as a hardening spring does": lambda m: (m.position - m.position.mean(axis=0)) ** 3,
+    "the cube of the position (like a hardening spring)": lambda m: (m.position - m.position.mean(axis=0)) ** 3,
 }
 """Functions of a motion, (n, d) each, by the words for the remaining error that is correlated with them. The sign of
 the velocity is smoothed over 1 % of its standard deviation: chosen, narrow enough for dry friction."""
@@ -67,7 +67,7 @@ def choose_structure(
     recordings: Sequence[Recording], requested_kind: Kind | None, on_progress: Callable[[float], None]
 ) -> ChosenStructure:
     """Fit the structures and choose one. requested_kind: fit this one only; None = choose. on_progress: receives the
-    share done, 0 to 1. Raises StructureRefused where the requested structure, or all structures, cannot be fitted."""
+    share done, 0 to 1. Raises StructureFitError where the requested structure, or all structures, cannot be fitted."""
     try:
         balanced: BalancedRecordings | None = balance_recordings(recordings)
         no_balance_reason = ""
@@ -88,7 +88,7 @@ def choose_structure(
         )
     structure_fits, trials = _fit_structures(balanced, recordings, on_progress)
     if not structure_fits:
-        raise StructureRefused("; ".join(f"{trial.kind}: {trial.refusal}" for trial in trials))
+        raise StructureFitError("; ".join(f"{trial.kind}: {trial.refusal}" for trial in trials))
     if balanced is None:
         fits_by_size = sorted(structure_fits, key=lambda structure_fit: structure_fit.model.coordinates)
         best = (
@@ -126,7 +126,7 @@ def describe_remaining_error(balanced: BalancedRecordings | None, fit: Structure
     }
     cause, explained_share = max(shares_by_cause.items(), key=lambda item: item[1])
     if explained_share < REPORTED_REMAINDER_SHARE:
-        return f"An error of {error_text} remains; it depends on neither speed nor position."
+        return f"An error of {error_text} remains; no tested function of speed or position explains much of it."
     return f"An error of {error_text} remains; {100 * explained_share:.0f} % of its power is explained by {cause}."
 
 
@@ -156,7 +156,7 @@ def _fit_structures(
                 if balanced is None
                 else fit_structure(balanced, structure_kind)
             )
-        except StructureRefused as refusal:
+        except StructureFitError as refusal:
             trials.append(TriedStructure(structure_kind, None, str(refusal)))
             continue
         structure_fits.append(fit)
@@ -176,7 +176,7 @@ def _compare_with_two_modes(
         return _append_trial(choice, TriedStructure("two-mode", None, reason))
     try:
         modal_fit = fit_modal_structure(recordings, "two-mode", on_progress)
-    except StructureRefused as refusal:
+    except StructureFitError as refusal:
         return _append_trial(choice, TriedStructure("two-mode", None, str(refusal)))
     fit_recordings, test_recordings = split_fit_and_test(recordings)
     segment_lines = [

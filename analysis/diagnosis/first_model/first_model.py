@@ -23,4 +23,4 @@ class FirstModel:
     remarks: tuple[str, ...]
     """Sentences for the user: how the model was fitted, and its limits."""
     balances: "tuple[Balance, ...] | None" = None
-    """Force balances from which the model was fitted; None = not computed."""
+    """Force balances of the same recordings; None = not computed."""

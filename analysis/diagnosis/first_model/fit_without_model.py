@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
-from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.recorded_conditions import has_payload
 from analysis.diagnosis.first_model.first_model import FirstModel
@@ -23,7 +23,7 @@ from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 from analysis.diagnosis.first_model.model_structures import (
     FIXED_SHARE,
     Kind,
-    StructureRefused,
+    StructureFitError,
     balance_recordings,
     fit_structure,
 )
@@ -33,7 +33,7 @@ from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from analysis.wording import format_sentence
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError
 from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
@@ -52,8 +52,8 @@ UNTIMED_REMARK = (
 )
 
 FREE_REMARK = (
-    "No model was given. A damper and a spring per axis were fitted first to the force per unit mass that the free "
-    "motion shows; the mass in the file is a lower bound."
+    "No model was given. A damper per axis, and a spring where one can be fitted, were fitted first to the force per "
+    "unit mass that the free motion shows; the mass in the file is a lower bound."
 )
 """Remarks of a diagnosis on its first model, by the method of the fit."""
 
@@ -67,9 +67,9 @@ def fit_first_model(
 ) -> FirstModel:
     """Fit the first model: by force balance where that is possible, else by `fit_first_linear_model`, which takes
     longer. recordings: at least one, as converted by `one_motion_per_force`. excluded_effects: names of effects that
-    the balance must not name. time_left: time limit of the balance. on_progress: called with a text and the
-    completed fraction, 0 to 1, of which the balance counts as the first half. map_: a possibly parallel `map`. Raises
-    NothingToDiagnose where no model can be fitted, or a recording was made with a weight."""
+    the balance must not name. time_left: time limit of the balance. on_progress: called with a text and the completed
+    fraction, 0 to 1, of which the balance counts as the first half. map_: a possibly parallel `map`. Raises
+    NothingToDiagnoseError where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
     on_progress("testing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(excluded_effects), time_left, map_)
@@ -110,7 +110,7 @@ def _fit_structure_by_balance(recordings: Sequence[Recording], kind: Kind) -> Me
     velocity, or where the fit fails."""
     try:
         return fit_structure(balance_recordings(recordings), kind).model
-    except (StructureRefused, NoMotionError):
+    except (StructureFitError, NoMotionError):
         return None
 
 
@@ -119,18 +119,18 @@ def fit_first_linear_model(
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """Fit a linear model to forces (`fit_rigid_model`) or to frequency responses. Returns the model and remarks, as
     sentences. on_progress: called with the completed fraction, 0 to 1. source: description of the recordings, for the
-    remarks. Raises NothingToDiagnose where no model can be fitted, or a recording was made with a weight."""
+    remarks. Raises NothingToDiagnoseError where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
     if should_use_rigid_model(recordings) and (rigid_model := _try_rigid_model(recordings, source)) is not None:
         return rigid_model, (RIGID_REMARK,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {source}")
         if not any(_responds_to_commands(fit.model, recording) for recording in recordings):
-            raise MechanicalFitRefused("the model that fits best hardly responds to the commands")
-    except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+            raise MechanicalFitError("the model that fits best hardly responds to the commands")
+    except (MechanicalFitError, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         if (rigid_model := _try_rigid_model(recordings, source)) is not None:
             return rigid_model, (RIGID_REMARK,)
-        raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
+        raise NothingToDiagnoseError((f"no model was given, and none can be fitted: {refusal}",)) from refusal
     held_out_text = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
     first_remark = (
         f"No model was given. A linear model was fitted to {source} first, with an error of {100 * fit.error:.1f} "
@@ -156,9 +156,9 @@ def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:
-    """Raise NothingToDiagnose where the device carried a weight, whose mass a fitted model would include."""
+    """Raise NothingToDiagnoseError where the device carried a weight, whose mass a fitted model would include."""
     if has_payload(recordings):
-        raise NothingToDiagnose(
+        raise NothingToDiagnoseError(
             (
                 "a recording was made with a weight on the handle, and a model that is fitted to it would include "
                 "the weight; give a calibrated model, or recordings without the weight",

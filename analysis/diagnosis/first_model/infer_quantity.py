@@ -50,8 +50,8 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
         return recordings, ""
     names = conjoin(list(first_recording.response.channels))
     return tuple(_set_quantity(recording, quantity) for recording in recordings), (
-        f"The recording does not state what {names} measures; it was taken for a {quantity}, as its time series "
-        "suggests; if it is another quantity, state that in the map (quantity)."
+        f"The recording does not state what {names} measures; it was taken for a {quantity}, as the commands and "
+        "its time series suggest; if it is another quantity, state that in the map (quantity)."
     )
 
 

@@ -6,9 +6,7 @@ For the forces f of d axes and the motion q along them,
 
 the sum over axes of |e_i|² / |f_i - mean f_i|² is minimised, so that every axis has the same weight. Standard errors
 are sandwich estimates (White, Econometrica 48:817, 1980), clustered by blocks of samples, because residuals within a
-block are correlated.
-Called by `model_structures`.
-"""
+block are correlated. Called by `model_structures`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -210,7 +208,7 @@ def _assemble_matrices(
 def _compute_residual_forces(
     regressions: Sequence[Regression], parametrisation: _Parametrisation, parameters: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """Compute the residual forces (`JointFit.remainders`)."""
+    """Compute the residual forces (`JointFit.residual_forces`)."""
     regression_weights = [
         axis_map @ parameters / regressions[0].scale[parametrisation.columns] for axis_map in parametrisation.axis_maps
     ]

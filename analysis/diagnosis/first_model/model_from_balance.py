@@ -89,7 +89,7 @@ def compute_law_power_share(balances: Sequence[Balance], band_hz: float) -> floa
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
-        law_indices = [law_index.law_index for law_index in balance.named if law_index.law_index >= 0]
+        law_indices = [judged_law.law_index for judged_law in balance.named if judged_law.law_index >= 0]
         weights, weight_index = (
             regression.fit_weights(regression.select_columns(law_indices)),
             regression.base_column_count,
@@ -125,8 +125,8 @@ def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion]
 def _fit_matrix_rows(
     balance: Balance, law_indices: Sequence[int], driven_channels: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit one row of the mass, damping and stiffness matrix each, (commands,), to one balance with these laws. laws:
-    indices of the laws; driven_channels: channels of the driven motions. A stiffness row that the balance does not
+    """Fit one row of the mass, damping and stiffness matrix each, (commands,), to one balance with these laws.
+    law_indices: of the laws; driven_channels: channels of the driven motions. A stiffness row that the balance does not
     contain is zero. A law of the command (negative index) adds no columns."""
     regression = balance.search.regression
     weights = regression.fit_weights(regression.select_columns(law_indices))[: regression.matrix_column_count]

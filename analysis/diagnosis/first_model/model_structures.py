@@ -20,7 +20,7 @@ from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, buil
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
 from analysis.wording import format_sentence
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError, MechanicalFitSettings
 from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.effect_vocabulary import find_matrix_unit
 from equalizer.plant.linear_simulation import compute_driven_axes
@@ -48,7 +48,7 @@ MEASURED_FORCE, SIMULATED_MOTION = "force along the measured motion", "free simu
 """Signals that held-out errors refer to, for `StructureFit.error_signal`."""
 
 
-class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
+class StructureFitError(ValueError):
     """The structure cannot be fitted to the recordings; the text says why."""
 
 
@@ -123,7 +123,7 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
 
 
 def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
-    """Fit a structure by the force balance. Raises StructureRefused where the recordings cannot determine it, or the
+    """Fit a structure by the force balance. Raises StructureFitError where the recordings cannot determine it, or the
     fitted mass or damping is negative."""
     _require_suitable(balanced, kind)
     parts: tuple[Part, ...] = ("stiffness",) if balanced.untimed else PARTS_OF[kind]
@@ -133,9 +133,9 @@ def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
         fit = fit_jointly(balanced.regressions, parts)
         model = _build_model(balanced, fit, kind)
     except np.linalg.LinAlgError as problem:
-        raise StructureRefused("the motion does not determine its parameters separately") from problem
+        raise StructureFitError("the motion does not determine its parameters separately") from problem
     except MechanicalModelError as problem:
-        raise StructureRefused(f"its parameters do not form a possible mechanism: {problem}") from problem
+        raise StructureFitError(f"its parameters do not form a possible mechanism: {problem}") from problem
     names = balanced.recording.command.channels
     return StructureFit(
         kind,
@@ -152,18 +152,18 @@ def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
 def fit_modal_structure(
     recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]
 ) -> StructureFit:
-    """Fit "mass-spring" or "two-mode" to spectra, for measured accelerations and for modes. Raises StructureRefused for
-    other structures, where the fit fails, and where a mode does not lower the held-out error."""
+    """Fit "mass-spring" or "two-mode" to spectra, for measured accelerations and for modes. Raises StructureFitError
+    for other structures, where the fit fails, and where a mode does not lower the held-out error."""
     if kind not in ("mass-spring", "two-mode"):
-        raise StructureRefused("it needs a measured position or velocity along every command")
+        raise StructureFitError("it needs a measured position or velocity along every command")
     axis_count = len(recordings[0].command.channels)
     settings = MechanicalFitSettings(most_modes=axis_count if kind == "two-mode" else 0)
     try:
         fit = fit_mechanical_model(recordings, settings, on_progress, NAME_TEMPLATE.format(kind))
-    except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as problem:
-        raise StructureRefused(str(problem)) from problem
+    except (MechanicalFitError, MechanicalModelError, np.linalg.LinAlgError) as problem:
+        raise StructureFitError(str(problem)) from problem
     if kind == "two-mode" and fit.model.coordinates == axis_count:
-        raise StructureRefused("a mode on an axis does not lower the error on held-out lines")
+        raise StructureFitError("a mode on an axis does not lower the error on held-out lines")
     held_out_errors = tuple(error.fit if error.held_out is None else error.held_out for error in fit.errors)
     remarks = tuple(format_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
@@ -198,22 +198,22 @@ def choose_simplest(fits: Sequence[StructureFit]) -> StructureFit:
 
 
 def _require_suitable(balanced: BalancedRecordings, kind: Kind) -> None:
-    """Raise StructureRefused where the force balance of these recordings cannot determine the structure."""
+    """Raise StructureFitError where the force balance of these recordings cannot determine the structure."""
     if balanced.untimed and kind != "massless":
-        raise StructureRefused("no time is known, hence no speeds or accelerations: only massless can be fitted")
+        raise StructureFitError("no time is known, hence no speeds or accelerations: only massless can be fitted")
     if kind == "two-mode":
-        raise StructureRefused("it is fitted to spectra")
+        raise StructureFitError("it is fitted to spectra")
     if balanced.free and kind == "massless":
-        raise StructureRefused("a body in free motion has a mass")
+        raise StructureFitError("a body in free motion has a mass")
     if balanced.turns and kind != "motor":
-        raise StructureRefused("the shaft makes whole turns, so no spring holds it: only motor can be fitted")
+        raise StructureFitError("the shaft makes whole turns, so no spring holds it: only motor can be fitted")
     if kind == "gravity" and not balanced.rotational:
-        raise StructureRefused("along a line the weight is a constant force, not a spring: use gravity for pendulums")
+        raise StructureFitError("along a line, weight is a constant force, not a spring: gravity is for pendulums")
 
 
 def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
-    """Build the mechanical model of the fitted matrices, with a tolerance widened from their standard errors. Raises
-    MechanicalModelError where a mass or damping is negative."""
+    """Build the mechanical model of the fitted matrices, with a tolerance widened from their standard errors; damping
+    that would supply energy is reduced to its diagonal. Raises MechanicalModelError for a negative mass or damping."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
     if kind == "massless" or balanced.free:
         mass = np.diag(_find_least_mass(balanced.regressions[0].motions)) * (FIXED_SHARE if balanced.untimed else 1.0)

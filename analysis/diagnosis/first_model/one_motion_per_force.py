@@ -125,8 +125,8 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
     return tuple(
         replace(recording, response=recording.response.select_channels(kept_channels)) for recording in recordings
     ), (
-        f"Of the forces along one motion the strongest, {conjoin([response.channels[k] for k in kept_channels])}, was "
-        f"balanced; for {conjoin(dropped_names)}, import the recording with that force as its only response."
+        f"Of the measured forces the strongest, {conjoin([response.channels[k] for k in kept_channels])}, alone "
+        f"entered the balance; for {conjoin(dropped_names)}, import the recording with that force as its only response."
     )
 
 

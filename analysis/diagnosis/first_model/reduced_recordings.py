@@ -32,8 +32,9 @@ def is_reduction_needed(balances: Sequence[Balance]) -> bool:
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
-    """Reduce the commands of recordings. The driven motions become the response; position and excitation are removed.
-    recordings: those of the balances, in the same order."""
+    """Reduce the commands of recordings. The driven motions become the response, positions in place of measured
+    accelerations (with a band-limited hold); position and excitation are removed. recordings: those of the balances, in
+    the same order."""
     reduced_recordings, first_part = [], 0
     for recording in recordings:
         parts = find_parts(recording)
@@ -73,7 +74,7 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     """Compute (n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness.
     The named laws are part of the regression, but not of this force."""
     regression, motion_count = balance.search.regression, len(motion.channels)
-    linear_laws = [judged_law.law_index for judged_law in balance.laws if judged_law.law.linear]
+    linear_laws = [judged_law.law_index for judged_law in balance.laws if judged_law.law.is_linear]
     weights = regression.fit_weights(
         regression.select_columns([*linear_laws, *(judged_law.law_index for judged_law in balance.named)])
     )
@@ -82,7 +83,7 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     motion_columns = [motion.acceleration, motion.velocity, motion.position][
         : regression.matrix_column_count // motion_count
     ]
-    columns = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
+    columns = np.hstack([*motion_columns, *(law.make_columns(motion, law.numbers) for law in balance.linear_laws)])
     # The first `matrix_column_count` columns are accelerations, velocities and positions, each group with one column
     # per motion: the column number modulo the number of motions is the motion's channel. Linear laws follow.
     has_undriven_motions = motion_count > motion.force.shape[1]

@@ -54,9 +54,9 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
 
 
 def _is_unsigned_speed(recording: Recording) -> bool:
-    """Whether the only response, a speed or position without NaN, is never below -`UNSIGNED_NEGATIVE_SHARE` of its rms
-    and is below `REVERSAL_SPEED_SHARE` of its rms in at least 5 % of the samples, though each sign of the only command
-    has more than `LEAST_SIGN_SHARE` of its power."""
+    """Whether no position was recorded and the only response, a speed or position without NaN, is never below
+    -`UNSIGNED_NEGATIVE_SHARE` of its rms and is below `REVERSAL_SPEED_SHARE` of its rms in at least 5 % of the samples,
+    though each sign of the only command has more than `LEAST_SIGN_SHARE` of its power."""
     response, command = recording.response, recording.command
     if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
         return False

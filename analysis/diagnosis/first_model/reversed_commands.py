@@ -55,8 +55,8 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
         for recording in recordings
     )
     return reversed_recordings, (
-        f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would deliver work instead of "
-        "absorbing it. The sign was reversed; a saved model has this sign in its input matrix. If the device really "
+        f"{conjoin(names)} {verb} opposite in sign to the motion: as recorded, the device would deliver work instead "
+        "of absorbing it. The sign was reversed; a saved model has this sign in its input matrix. If the device really "
         "is a source of work, give a model with the recorded sign."
     )
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import is_quasi_static
-from analysis.diagnosis.data.recorded_conditions import as_recorded
+from analysis.diagnosis.data.recorded_conditions import adapt_to_recorded_commands
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
@@ -33,7 +33,7 @@ from analysis.diagnosis.search.identifiability import compute_final_errors, comp
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
-from equalizer.effects.placing import shorten_axis_name, to_model_effects
+from equalizer.effects.placing import convert_to_model_effects, shorten_axis_name
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, find_runs
@@ -92,10 +92,12 @@ def _build_models(result: SearchResult, recording: Recording) -> tuple[Mechanica
     fitted, labels = explanation.after.fitted, make_labels(recording, tuning.model)
     effects = (
         *tuning.model.effects,
-        *to_model_effects(fitted.hypothesis.list_placed_effects(), labels.inputs, labels.outputs),
+        *convert_to_model_effects(fitted.hypothesis.list_placed_effects(), labels.inputs, labels.outputs),
     )
     completed = replace(tuning.tune(fitted.deviations), effects=effects)
-    return as_recorded(completed, recording), as_recorded(tuning.tune(explanation.retuned.fitted.deviations), recording)
+    return adapt_to_recorded_commands(completed, recording), adapt_to_recorded_commands(
+        tuning.tune(explanation.retuned.fitted.deviations), recording
+    )
 
 
 def _describe_held_out_rest(measure: ErrorMeasure) -> str:

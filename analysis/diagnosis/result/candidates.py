@@ -71,7 +71,7 @@ def add_balances_with_given_model(
         for law in (*balance.laws, *balance.further_laws)
     ]
     balance_candidates = [
-        _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.linear else law, axis, channels)
+        _make_candidate(replace(law, objection=LINEAR_DYNAMICS) if law.law.is_linear else law, axis, channels)
         for axis, law in sorted(judged_laws, key=lambda entry: (_rank_law(entry[1]), -entry[1].gain))
         if law.share >= LAW_CEILING_SHARE and law.gain >= FURTHER_LAW_GAIN
     ]
@@ -164,7 +164,7 @@ def _list_covered_names(effect: NamedEffect) -> tuple[str, ...]:
 def _rank_law(judged_law: "JudgedLaw") -> int:
     """Rank a candidate, 0 first. 0: physically possible parameters and a significant gain; 1: other laws; 2: linear
     dynamics of a higher order; 3: laws that explain almost nothing (`LAW_CEILING_SHARE`)."""
-    if judged_law.law.linear:
+    if judged_law.law.is_linear:
         return 2
     if judged_law.share < LAW_CEILING_SHARE:
         return 3

@@ -34,8 +34,8 @@ COMPARED_WITH_CLEAN = (
 )
 """Remark on the method of a comparison; the placeholder is `gain_factor` of `add_contrast`."""
 NOT_COMPARED = (
-    "The recordings could not be compared with the clean ones: too little was recorded without gaps, one recording "
-    "contains hardly any motion, or the fits failed. The results here use the model alone."
+    "The recordings could not be compared with the clean ones: too little was recorded without gaps, one set "
+    "contains far less motion than the other, or the fits failed. The results here use the model alone."
 )
 """Remark where no comparison was possible."""
 SHOWN_DIRECTLY = "The sensor's signal itself shows this fault, and the clean recordings do not; no model was used."

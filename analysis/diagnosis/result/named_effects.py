@@ -27,7 +27,7 @@ from analysis.diagnosis.settings import (
     NO_CANDIDATE_STEEPNESS,
     PROBABILITY_SCALE,
 )
-from equalizer.effects.discovered_law import Channels, derive_law_units, with_law_values
+from equalizer.effects.discovered_law import Channels, derive_law_units, set_law_values
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.placing import find_place, shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -199,7 +199,7 @@ def _find_units(effect: Effect, values: Values, labels: Labels) -> dict[str, str
     """Find the unit of each parameter in the model's unit system: by the dimensions of a discovered law, else from the
     vocabulary."""
     if effect.law is not None:
-        law = with_law_values(effect.law, values)
+        law = set_law_values(effect.law, values)
         units = derive_law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
         return dict(zip(values, units, strict=True))
     return {
@@ -214,7 +214,7 @@ def extract_law(hypothesis: Hypothesis, claim_index: int, axis: str | None) -> F
     law = hypothesis.claims[claim_index].effect.law
     if law is None:
         return None
-    fitted_law = with_law_values(law, _list_group_values(hypothesis, claim_index, hypothesis.point)[0])
+    fitted_law = set_law_values(law, _list_group_values(hypothesis, claim_index, hypothesis.point)[0])
     return make_found_law(replace(fitted_law, axis=axis or fitted_law.axis))
 
 

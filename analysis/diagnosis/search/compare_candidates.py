@@ -6,7 +6,8 @@ sensitivity (Jacobian) to the model's own parameters takes one simulation for ea
 fit to fit, and recomputed only where a parameter has moved far; only fits near the best are refined. With forces that
 depend on the motion, a sensitivity that was computed without these forces, or on one period, leads to a point short of
 the minimum: refined fits are then continued with the sensitivity of all parameters on all samples (`_polish`). Called
-by the steps of the search (`next_effect`, `explain`, `revise_selection`) and by `confirm_laws`.
+by the steps of the search (`next_effect`, `explain`, `revise_selection`, `identifiability`), by `confirm_laws`,
+`discovery` and `reference.search_with_reference`.
 """
 
 from collections.abc import Sequence

@@ -147,7 +147,7 @@ class SearchContext:
         full_measure = self.full_measure.with_records(tuple(records))
         return replace(self, measure=full_measure.shorten(), full_measure=full_measure, has_opened_samples=True)
 
-    def with_choosing_samples_fitted(self) -> "SearchContext":
+    def join_fit_and_choose(self) -> "SearchContext":
         """Return a copy of the context that also fits to the samples to choose by, for laws that a force balance has
         already selected."""
         measure, full_measure = (

@@ -1,7 +1,8 @@
 """The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it.
 
 Errors are rms errors over rms noise (`FitScore`). The limits are in `settings`, section "The verdict". Called by
-`search`, `revise_selection` and `search_by_simulation`, and by `confirm` and `discovery` for the laws that they add.
+`search`, `revise_selection`, `search_by_simulation` and `named_effects`, and by `confirm` and `discovery` for the laws
+that they add.
 """
 
 from collections.abc import Sequence

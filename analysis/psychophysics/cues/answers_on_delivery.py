@@ -40,7 +40,7 @@ LEAST_RESIDUAL_SD_DB = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class AnswersOnDelivery:
+class AnswerRegression:
     """Result of the regression on one cue at one frequency, over all participants."""
 
     frequency_hz: float
@@ -64,7 +64,7 @@ class AnswersOnDelivery:
         return self.lower is not None and self.upper is not None and self.upper - self.lower < CUE_ONLY_SLOPE
 
 
-def regress_answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
+def regress_answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswerRegression, ...]:
     """Compute a regression for each measured cue; all but that on the intensity include the residual of the
     intensity."""
     intensity_db = trials.values_db.get(Cue.INTENSITY)
@@ -76,13 +76,13 @@ def regress_answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDeliv
 
 def _regress_answers_on_cue(
     trials: DeliveredTrials, cue: Cue, values_db: FloatArray, intensity_db: FloatArray | None
-) -> AnswersOnDelivery:
+) -> AnswerRegression:
     """Regress the answers on one cue. values_db: (n,), values of the cue. intensity_db: (n,), intensity as a further
     regressor; None = it is the cue itself, or was not measured."""
     residual_db, has_residual = _compute_residuals(trials, values_db)
     trial_count = int(has_residual.sum())
     if trial_count == 0:
-        return AnswersOnDelivery(trials.frequency_hz, cue, 0, 0.0, None, None, None, None)
+        return AnswerRegression(trials.frequency_hz, cue, 0, 0.0, None, None, None, None)
     residual_db, person_index, side_sign, answer_sign = (
         residual_db[has_residual],
         trials.person[has_residual],
@@ -105,9 +105,9 @@ def _regress_answers_on_cue(
         )
         slope, standard_error = _fit_logistic_slope(design, answer_sign > 0)
     if slope is None or standard_error is None:
-        return AnswersOnDelivery(trials.frequency_hz, cue, trial_count, residual_sd_db, None, None, None, None)
+        return AnswerRegression(trials.frequency_hz, cue, trial_count, residual_sd_db, None, None, None, None)
     half_width = float(norm.ppf(0.975)) * standard_error
-    return AnswersOnDelivery(
+    return AnswerRegression(
         trials.frequency_hz, cue, trial_count, residual_sd_db, slope / residual_sd_db,
         (slope - half_width) / residual_sd_db, (slope + half_width) / residual_sd_db,
         float(2.0 * norm.sf(abs(slope / standard_error))),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from statistics import NormalDist, fmean, median
 
 from analysis.psychophysics.bias import estimate_response_bias
-from analysis.psychophysics.cues.answers_on_delivery import AnswersOnDelivery, regress_answers_on_delivery
+from analysis.psychophysics.cues.answers_on_delivery import AnswerRegression, regress_answers_on_delivery
 from analysis.psychophysics.cues.cue_sensitivity import (
     INTERNAL_NOISE_DB,
     TYPICAL_NOISE_DB,
@@ -50,7 +50,7 @@ class CueFinding:
     noticed_by: tuple[str, ...]
     """Participants for whom even the end of the difference's interval nearer to 0 gives a d' of 1 or more, with an
     internal noise of `TYPICAL_NOISE_DB`."""
-    answers: AnswersOnDelivery
+    answers: AnswerRegression
     """Regression of the answers on the cue among trials of the same direction."""
     p_holm: float | None
     """p value of `answers` with Holm's correction over all cues and frequencies; None where no test was possible."""
@@ -85,7 +85,7 @@ def compute_cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
 def _make_finding(
     group: DeliveredTrials,
     sensitivities: tuple[CueSensitivity, ...],
-    regression: AnswersOnDelivery,
+    regression: AnswerRegression,
     p_holm: float | None,
 ) -> CueFinding:
     """Make the finding on the cue of `regression`. sensitivities: those of the participants by this cue, at least

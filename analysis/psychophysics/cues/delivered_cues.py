@@ -68,8 +68,8 @@ class CueGap:
 
 
 def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
-    """Select the valid test trials with a measured acceleration and a level above 0, grouped by frequency, ascending;
-    empty without any."""
+    """Select the valid test trials with a measured acceleration and a level, both above 0, grouped by frequency,
+    ascending; empty without any."""
     measured_trials = [
         played_trial
         for played_trial in trials

@@ -30,8 +30,8 @@ not, p^3 = 1/2 (H. Levitt, J. Acoust. Soc. Am. 49 (1971), 467-477)."""
 NEPER_PER_DB = math.log(10.0) / 20.0
 """Natural logarithm of an amplitude ratio of 1 dB."""
 LARGEST_T = 30.0
-"""Largest t that is evaluated: at it no answer of an attentive participant is wrong, as exp(-exp(30)) is 0 in floating
-point."""
+"""Largest t that is evaluated: 1 - F is then at most 1e-13, so that practically no answer of an attentive participant
+is wrong."""
 
 
 class Family(StrEnum):

@@ -159,7 +159,7 @@ def find_lower_bound(
 
 def estimate_direction_limit(
     frequencies_hz: tuple[float, ...],
-    pseudo: FloatArray,
+    pseudo_thresholds_db: FloatArray,
     cap_db: float,
     confidence: float,
     has_answers: NDArray[np.bool_] | None = None,
@@ -172,9 +172,9 @@ def estimate_direction_limit(
     are too wide; the limit is excluded from each of them up to the next frequency with an estimate below the cap."""
     grid_hz = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
     weights = np.array([np.interp(np.log(grid_hz), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
-    interpolated_db = pseudo @ weights
+    interpolated_db = pseudo_thresholds_db @ weights
     median_db = interpolated_db.mean(axis=0)
-    without_answers = np.zeros(pseudo.shape) if has_answers is None else (~has_answers).astype(np.float64)
+    without_answers = np.zeros(pseudo_thresholds_db.shape) if has_answers is None else (~has_answers).astype(np.float64)
     errors = compute_mean_errors(interpolated_db, without_answers @ (weights > 0) == 0)
     half_width = student_t.ppf(0.5 + confidence / 2, errors.df) * errors.error
     crossings = np.flatnonzero((median_db[:-1] < cap_db) & (median_db[1:] >= cap_db))
@@ -213,7 +213,7 @@ _LIMIT_WORDS = (
 
 def _describe_recrossing(median_db: FloatArray, crossing: np.intp, cap_db: float, grid_hz: FloatArray) -> str:
     """Describe in a sentence from where on the median threshold is below the cap again, above the limit; empty where it
-    stays above. crossing: index of the grid's last point before the limit."""
+    stays at or above it. crossing: index of the grid's last point before the limit."""
     below_cap_indices = np.flatnonzero(median_db[crossing + 1 :] < cap_db)
     if not len(below_cap_indices):
         return ""
@@ -223,7 +223,7 @@ def _describe_recrossing(median_db: FloatArray, crossing: np.intp, cap_db: float
 def _explain_no_limit(
     median_db: FloatArray, cap_db: float, crossing_count: int, frequencies_hz: tuple[float, ...]
 ) -> str:
-    """Explain in sentences why there is no single limit."""
+    """Explain in sentences why there is no single limit. crossing_count: number of upward crossings of the cap."""
     if crossing_count > 1:
         reason = f"The median threshold rises through the cap {crossing_count} times."
     elif median_db[0] >= cap_db:

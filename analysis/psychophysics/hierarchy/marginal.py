@@ -128,7 +128,7 @@ class MarginalLikelihood:
     def _maximise_posterior(self, precision: FloatArray, prior_mean: FloatArray, lapse: float) -> Derivatives:
         """Find the modes by Newton's method for all persons at once, from `latent`, which they replace. A step that
         lowers a person's log posterior (by more than rounding, 1e-10) is divided by 3, at most 11 times. Returns the
-        derivatives at the modes. parameters: precision (k + 2, k + 2), prior_mean (k + 2,), lapse rate."""
+        derivatives at the modes. precision: (k + 2, k + 2); prior_mean: (k + 2,); lapse: lapse rate."""
         latent = self.latent.copy()
         current = self.likelihood.evaluate(latent, lapse)
         log_posterior = _compute_log_posterior(current, latent - prior_mean, precision)

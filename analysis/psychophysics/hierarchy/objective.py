@@ -61,7 +61,7 @@ class Objective:
         self._mean_level_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
     def __call__(self, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Value and gradient (size,) at the parameters (size,) of `ParameterLayout`."""
+        """Compute value and gradient (size,) at the parameters (size,) of `ParameterLayout`."""
         value, scores = self.marginal.evaluate(parameters)
         log_prior, prior_gradient = self.evaluate_log_prior(parameters)
         return -float(value.sum()) - log_prior, -scores.sum(axis=0) - prior_gradient

@@ -1,7 +1,7 @@
 """Primary analysis of a study by the hierarchical psychometric model: from all answers to median thresholds, contrasts
 between frequencies, standard deviations between persons, and the direction limit. Called by `study_analysis`.
 
-The cap is the largest force that was played. n: persons, k: frequencies.
+The cap is the largest force that the staircase may play. n: persons, k: frequencies.
 """
 
 from collections.abc import Sequence
@@ -110,7 +110,7 @@ def compute_primary_analysis(
     declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
     """Fit the hierarchical model to all answers; None with fewer than two persons or two frequencies with answers.
-    cap_n: largest force that was played, N. confidence: of all intervals. declared_hz: two frequencies of the declared
+    cap_n: cap, N. confidence: of all intervals. declared_hz: two frequencies of the declared
     contrast, first minus second, or empty."""
     if answers is None or answers.persons < 2:
         return None

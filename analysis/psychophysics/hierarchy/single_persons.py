@@ -30,8 +30,8 @@ from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelih
 from protocols.procedure.staircase import to_db
 
 SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
-"""Standard deviations of the priors of a slope's logarithm and of a criterion (d'): twice the differences among the
-simulated people of `hapteq power`. Chosen."""
+"""Standard deviations of the priors of a slope's logarithm and of a criterion (d'): 1.6 and 2 times those
+among the simulated people of `hapteq power` (`power.simulated_study.Crowd`). Chosen."""
 LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
 """Quantiles of the lapse rate's prior over which a run's likelihood is averaged: the medians of three equally probable
 parts."""
@@ -62,7 +62,7 @@ def fit_single_persons(
     answers: Answers, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
 ) -> SinglePersons:
     """Fit the most probable thresholds, slopes and criteria at the most probable lapse rate, and the likelihood
-    interval of each run. cap_n: highest level that could be played, N."""
+    interval of each run. cap_n: cap, the highest level that could be played, N."""
     answers, cap_db, prior = drop_unanswered_frequencies(answers), to_db(cap_n), Prior()
     objective = Objective(answers, family, prior)
     parameters, layout = objective.start.copy(), objective.layout

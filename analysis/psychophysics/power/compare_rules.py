@@ -1,4 +1,4 @@
-"""Compares adaptive procedures (staircases, Psi) by the error of their threshold estimates, on simulated people.
+"""Compare adaptive procedures (staircases, Psi) by the error of their threshold estimates, on simulated people.
 
 Each person takes one run under every rule, with the same random numbers (trial 7 has the same draw under every rule),
 so that differences between rules are paired. Called by `study.cli.power` (the command `hapteq power`).
@@ -59,7 +59,7 @@ class RuleResult:
     """Highest amplitude played in any run, N."""
 
 
-class ComparedPerson(NamedTuple):
+class SimulatedPerson(NamedTuple):
     """One simulated person at one frequency."""
 
     threshold_db: float
@@ -121,7 +121,7 @@ def simulate_person(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> 
     frequency_sd_db = crowd.frequency_sd_db[0] if isinstance(crowd.frequency_sd_db, tuple) else crowd.frequency_sd_db
     true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, frequency_sd_db) * generator.standard_normal()
     slope = (crowd.slope or STARTING_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * generator.standard_normal())
-    person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * generator.standard_normal())
+    person = SimulatedPerson(float(true_db), slope, crowd.criterion_sd * generator.standard_normal())
     draws = generator.random((MOST_TRIALS, 2))
     # The draws of roving come last, so that all others are the same with roving and without it.
     state, played_n = answer_trials(crowd, rule, person, np.column_stack([draws, generator.random(MOST_TRIALS)]))
@@ -129,7 +129,7 @@ def simulate_person(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> 
 
 
 def answer_trials(
-    crowd: Crowd, rule: StaircaseRule, person: ComparedPerson, draws: FloatArray
+    crowd: Crowd, rule: StaircaseRule, person: SimulatedPerson, draws: FloatArray
 ) -> tuple[StaircaseState, list[float]]:
     """Simulate the trials of a run until it is finished or there are no more draws. Returns the last state, and the
     amplitude (N) that each trial played. draws: (trials, 3) in [0, 1), for the direction, the answer, and the roving of

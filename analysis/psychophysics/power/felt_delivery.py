@@ -25,7 +25,7 @@ class FeltDelivery:
     """Tables of the delivered stimulus by frequency and direction, with masking and adaptation of simulated people."""
 
     tables: tuple[tuple[DeliveryTable, DeliveryTable], ...]
-    """Per frequency of the crowd: of direction 1 and 2."""
+    """Per frequency of the crowd: of direction 1 and 2, the sides +1 and -1 of `DeliveredTrials`."""
     masking: float = 1.0
     """Factor by which harmonics add to the threshold, in squares (masking)."""
     adaptation_db: float = 1.0

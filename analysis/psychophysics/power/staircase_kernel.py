@@ -174,7 +174,7 @@ def compute_equivalent_level_db(person: Participant, level_db: float, is_directi
 
 
 MAX_PRESENTATIONS = 5
-"""Largest number of presentations of a trial, as `looks` of `study.participants.unsure_repeater`."""
+"""Largest number of presentations of a trial, as `max_looks` of `study.participants.unsure_repeater.UnsureRepeater`."""
 
 
 @njit(cache=True)

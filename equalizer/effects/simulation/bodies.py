@@ -102,22 +102,22 @@ def simulate_bodies(
     actuator_force: one row per sample, or per step. counts: number of samples n, and of steps per sample. step_s:
     length of a step.
     """
-    discrete_model, stepping, ports = _prepare_steps(bodies, actuator_force, counts, step_s)
+    discrete_model, stepping, port_ids = _prepare_steps(bodies, actuator_force, counts, step_s)
     stride = len(actuator_force.mean) // counts[0]
-    output_matrix = _assemble_output_matrix(discrete_model, stepping.state_from_modal, ports, with_motion)
+    output_matrix = _assemble_output_matrix(discrete_model, stepping.state_from_modal, port_ids, with_motion)
     motion_rows, port_forces = (
         np.empty((counts[0], output_matrix.shape[1])),
         np.zeros((counts[0], bodies.ports.shape[1] if with_motion else 0)),
     )
-    force_columns, rows_per_sample = len(output_matrix) - actuator_force.end.shape[1], stepping.rows
+    force_columns, rows_per_sample = len(output_matrix) - actuator_force.end.shape[1], stepping.rows_per_sample
     mean_force, end_force = (
         actuator_force.mean.reshape(counts[0] * rows_per_sample, -1),
         actuator_force.end[stride - 1 :: stride],
     )
-    buffer = np.zeros((min(stepping.block, counts[0]) * rows_per_sample, len(output_matrix)))
+    buffer = np.zeros((min(stepping.samples_per_block, counts[0]) * rows_per_sample, len(output_matrix)))
     # Overflow is no error: a fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
-        for first, stop in _iterate_blocks(counts[0], stepping.block, restarts):
+        for first, stop in _iterate_blocks(counts[0], stepping.samples_per_block, restarts):
             if restarts is not None and first in restarts.sample_indices:
                 state = restarts.states[np.searchsorted(restarts.sample_indices, first)]
                 stepping.set_state(extend_state(bodies.structure, state, bodies.ports[:, bodies.axes :]))
@@ -136,7 +136,7 @@ def simulate_bodies(
             )
             np.matmul(input_rows, output_matrix, out=motion_rows[first:stop])
             if with_motion:
-                port_forces[first:stop, list(ports)] = input_rows[:, len(stepping.state_from_modal) : force_columns]
+                port_forces[first:stop, list(port_ids)] = input_rows[:, len(stepping.state_from_modal) : force_columns]
     return motion_rows, port_forces
 
 
@@ -150,10 +150,10 @@ def simulate_states(
     """Simulate, from rest, the positions and velocities (k, 2n) of the structure's coordinates just before the samples
     `sample_indices` (k,). Other arguments as for `simulate_bodies`."""
     _, stepping, _ = _prepare_steps(bodies, actuator_force, counts, step_s)
-    states, rows_per_sample = np.zeros((len(sample_indices), len(stepping.state_from_modal))), stepping.rows
+    states, rows_per_sample = np.zeros((len(sample_indices), len(stepping.state_from_modal))), stepping.rows_per_sample
     mean_force = actuator_force.mean.reshape(counts[0] * rows_per_sample, -1)
     with np.errstate(over="ignore", invalid="ignore"):
-        for first, stop in _iterate_blocks(counts[0], stepping.block, None):
+        for first, stop in _iterate_blocks(counts[0], stepping.samples_per_block, None):
             rows_of_block = np.ascontiguousarray(
                 mean_force[first * rows_per_sample : stop * rows_per_sample] @ stepping.input_matrix
             )
@@ -169,18 +169,18 @@ def simulate_states(
 def _prepare_steps(
     bodies: Bodies, actuator_force: ActuatorForce, counts: tuple[int, int], step_s: float
 ) -> tuple[DiscreteModel, Stepping, tuple[int, ...]]:
-    """Prepare a simulation: matrices of a linear step, stepping function, and ports at which forces act or motion is
-    read."""
+    """Prepare a simulation: matrices of a linear step, stepping function, and indices of the ports at which forces act
+    or motion is read."""
     discrete_model = discretise_model(bodies.structure, step_s, bodies.ports)
-    ports = tuple(sorted({*bodies.force_ports, *range(bodies.axes if bodies.reads_all_axes else 0)}))
+    port_ids = tuple(sorted({*bodies.force_ports, *range(bodies.axes if bodies.reads_all_axes else 0)}))
     steps, stride = (counts[1], len(actuator_force.mean) // counts[0])
-    if not ports:
-        return discrete_model, build_unforced_stepping(discrete_model, steps, stride), ports
+    if not port_ids:
+        return discrete_model, build_unforced_stepping(discrete_model, steps, stride), port_ids
     commands = actuator_force.mean if actuator_force.commanded is None else actuator_force.commanded
     return (
         discrete_model,
-        build_forced_stepping(discrete_model, pack_kernel_forces(bodies, ports), steps, stride, commands),
-        ports,
+        build_forced_stepping(discrete_model, pack_kernel_forces(bodies, port_ids), steps, stride, commands),
+        port_ids,
     )
 
 
@@ -214,7 +214,7 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
 
 
 def _assemble_output_matrix(
-    discrete_model: DiscreteModel, state_from_modal: FloatArray, ports: tuple[int, ...], with_motion: bool
+    discrete_model: DiscreteModel, state_from_modal: FloatArray, port_ids: tuple[int, ...], with_motion: bool
 ) -> FloatArray:
     """Assemble the matrix (s + f + m, rows) from state, forces at the f ports and commands at an instant to the rows
     that `simulate_bodies` returns."""
@@ -238,12 +238,13 @@ def _assemble_output_matrix(
             np.zeros((response_count, command_count)),
         )
     )[first_row:]
-    return np.vstack([(from_state @ state_from_modal).T, from_force.T[list(ports)], from_command.T])
+    return np.vstack([(from_state @ state_from_modal).T, from_force.T[list(port_ids)], from_command.T])
 
 
-def pack_kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
+def pack_kernel_forces(bodies: Bodies, port_ids: tuple[int, ...]) -> Forces:
     """Pack the forces in the form of the compiled kernel: each distinct law once, and for every force the indices of
-    its law and port and the ranges of its parameters and memory. Raises ValueError for more than `MAX_LAWS` distinct
+    its law and port and the ranges of its parameters and memory. port_ids: indices in `Bodies.ports`, among which the
+    kernel counts the ports. Raises ValueError for more than `MAX_LAWS` distinct
     laws."""
     laws: list[object] = []
     force_indices: list[tuple[int, ...]] = []
@@ -254,7 +255,7 @@ def pack_kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
         force_indices.append(
             (
                 laws.index(action.law),
-                ports.index(port),
+                port_ids.index(port),
                 parameter_count,
                 parameter_count + len(parameters),
                 memory_count,
@@ -265,7 +266,7 @@ def pack_kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
     if len(laws) > MAX_LAWS:
         raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {MAX_LAWS}")
     return Forces(
-        ports,
+        port_ids,
         tuple(wrap_law(law) for law in (*laws, *(compute_zero_force,) * (MAX_LAWS - len(laws)))),
         np.array(force_indices, dtype=np.int64).reshape(-1, 6),
         np.concatenate([*bodies.parameters, [0.0]]),

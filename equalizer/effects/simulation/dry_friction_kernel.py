@@ -91,8 +91,8 @@ def compute_friction_force(
     and of the loose joint.
 
     start_z: deflection over z_max at the start of the step; step_motion: see `instant`. Writes the deflection at the
-    end, over z_max, to `memory[0]` and the force (N) at the end to `step_motion[F_END]`.
-
+    end, over z_max, to `memory[0]` and the force (N) at the end to `step_motion[F_END]`; where neither level is above
+    0, only a force of 0.
     """
     level, start_v, v_per_newton = max(forward_level, backward_level), step_motion[V], step_motion[V_PER_N]
     if level <= 0:

@@ -62,7 +62,7 @@ def compute_effect_forces_along_motion(
     force = np.array(unbalanced_force, dtype=np.float64, order="C")
     position, velocity, acceleration = (np.ascontiguousarray(signal) for signal in motion)
     evaluate_laws_along_motion(
-        kernel_forces.laws, kernel_forces.places, kernel_forces.parameters, kernel_forces.memory,
+        kernel_forces.laws, kernel_forces.force_indices, kernel_forces.parameters, kernel_forces.memory,
         (position, velocity, acceleration),
         np.ascontiguousarray(commands, dtype=np.float64) if kernel_forces.reads_all_axes else np.empty((0, 0)),
         motion_per_newton, force, 1 / sample_rate_hz,

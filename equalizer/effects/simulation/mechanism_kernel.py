@@ -109,7 +109,7 @@ def wrap_law(law: Any) -> LawAddress:
 
 @njit(inline="always")
 def _predict_ports(output: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Predict the ports' positions and velocities at the step's end without forces. output: (2 r or more, s)."""
+    """Predict the ports' motion at the step's end without forces, and zero their forces. output: (2 r or more, s)."""
     port_count = ports.shape[1]
     for port in range(port_count):
         x = v = 0.0

@@ -41,7 +41,7 @@ class Forces:
     """Indices of the ports at which the forces act."""
     laws: tuple[object, ...]
     """Addresses of the compiled laws, `MAX_LAWS` of them."""
-    places: Integers
+    force_indices: Integers
     """(number of forces, 6): indices of law and port, ranges of parameters and memory of each force."""
     parameters: FloatArray
     """Parameters of all forces, one after another."""
@@ -57,20 +57,20 @@ class Forces:
 class Stepping:
     """Procedures and matrices to step a structure in blocks of samples; its state is kept between calls of `run`."""
 
-    rows: int
+    rows_per_sample: int
     """Rows per sample of the drive (one column per input) and of the array that `run` takes."""
     input_matrix: FloatArray
     """(inputs, s + r): from a row of the drive to its contributions to the state, and to the accelerations of the r
     ports with forces."""
     state_from_modal: FloatArray
     """(2n, s): from the stepped coordinates to positions and velocities."""
-    block: int
+    samples_per_block: int
     """Samples stepped per call."""
     run: Callable[[FloatArray, int], None]
     """Advances the state by one block; the first block starts from rest, each later one where the previous one ended.
-    Arguments: rows of the block (block * rows, at least s + r), and the index of its first sample. On entry a row holds
-    the contributions of its step; on return, the first row of each sample holds the state and the forces just before
-    the sample."""
+    Arguments: rows of the block (at most samples_per_block * rows_per_sample, s + r or more), and the index of its
+    first sample. On entry a row holds the contributions of its step; on return, the first row of each sample holds the
+    state and the forces just before the sample."""
     set_state: Callable[[FloatArray], None]
     """Sets the state (2n,), positions then velocities, from which the next block starts."""
 
@@ -110,7 +110,7 @@ def build_forced_stepping(
     per_newton[2 * len(port_indices) :] = linear.motion_by_port_force[2 * axis_count + port_indices][:, port_indices]
     law_output = output if forces.reads_acceleration else output[: 2 * len(port_indices)]
     port_output, force_input = law_output @ form.state_from_modal, (form.modal_from_state @ by_force).T
-    step_matrices = (form.step_matrix, _to_c_order(port_output), _to_c_order(force_input), _to_c_order(per_newton.T))
+    step_matrices = (form.step_matrix, _pack_by_row(port_output), _pack_by_row(force_input), _pack_by_row(per_newton.T))
     input_matrix = np.hstack(
         [(form.modal_from_state @ linear.state_by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
     )
@@ -121,13 +121,13 @@ def build_forced_stepping(
         forces.memory.copy(),
     )
 
-    force_history = np.zeros((FORCE_ROWS, len(forces.places)))
+    force_history = np.zeros((FORCE_ROWS, len(forces.force_indices)))
     step_motion = np.zeros(LENGTH + BLOCK_SIZE * len(port_indices) if forces.reads_all_axes else LENGTH)
     scratch = np.zeros(len(state) + len(port_indices)), step_motion, force_history, np.zeros_like(memory)
 
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
-            forces.laws, forces.places, forces.parameters, memory, step_matrices, rows,
+            forces.laws, forces.force_indices, forces.parameters, memory, step_matrices, rows,
             read_commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
             linear.step_s, *scratch,
         )  # fmt: skip
@@ -141,6 +141,6 @@ def build_forced_stepping(
     return Stepping(stride, input_matrix, form.state_from_modal, BLOCK_UNDER_FORCES, run, set_state)
 
 
-def _to_c_order(matrix: FloatArray) -> FloatArray:
-    """Convert a matrix to row-major (C) order, for which the kernel is compiled."""
+def _pack_by_row(matrix: FloatArray) -> FloatArray:
+    """Pack a matrix in row-major (C) order, for which the kernel is compiled."""
     return np.ascontiguousarray(matrix)

@@ -35,7 +35,7 @@ RANK_TOLERANCE = 1e-9
 def attach_oscillator(
     model: MechanicalModel, direction: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
-    """Add an oscillator to the model as its last coordinate; the model is unchanged for a mass of 0 or below.
+    """Attach an oscillator to the model as its last coordinate; the model is unchanged for a mass of 0 or below.
 
     direction: (n,), direction in the model's coordinates along which it is attached. mass (kg), damping (N s/m),
     stiffness (N/m): of the oscillator.
@@ -125,8 +125,9 @@ def find_likely_oscillators(
     """Fit an oscillator for each pair of a damping ratio and a natural frequency (Hz), and list those that explain most
     first.
 
-    Left out are those of negative mass, those that explain no more than `CHANCE_SHARE`, and natural frequencies from
-    the highest line on. axis: index of the axis to which they are attached.
+    Left out are those whose fitted mass is not positive, those that explain no more than `CHANCE_SHARE`, those that
+    corrections of the linear parameters reproduce, and natural frequencies from the highest line on. axis: index of the
+    axis to which they are attached.
     """
     if not len(missing.frequency_hz):
         return []

@@ -110,7 +110,7 @@ def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentS
             f"{_format_segments(single_period_segments)} had one usable period only: it was kept, with its transient."
         )
     if missing_periods:
-        remarks.append(f"{_format_periods(missing_periods)} left out, because samples are missing in it.")
+        remarks.append(f"{_format_periods(missing_periods)} left out because of missing samples.")
     return ExperimentSet(tuple(experiments), tuple(remarks), periodic=True)
 
 

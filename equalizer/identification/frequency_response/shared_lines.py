@@ -35,10 +35,10 @@ class SharedLines:
     response: ComplexArray
     """(lines, outputs, inputs): G, in units of the response per unit of the command."""
     noise_variance: FloatArray
-    """(lines, outputs, inputs): expected |error|² of each entry of `response`."""
+    """(lines, outputs, inputs): expected |error|² of each entry of `response`; NaN where it cannot be estimated."""
     coherence: FloatArray
-    """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN for an output that is
-    always zero."""
+    """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN where the noise is
+    not known, and for an output that is always zero."""
     excitation: ComplexArray
     """(lines, inputs, experiments): mean spectra, times the root of the effective number of samples."""
 
@@ -113,7 +113,8 @@ def _stack_columns(experiments: Sequence[Experiment]) -> _SpectraColumns:
 
 
 def _has_full_rank(columns: _SpectraColumns) -> BoolArray:
-    """(lines,): whether the excitations R and the commands U both have full rank, which is the number of inputs."""
+    """Whether, at each line (lines,), the excitations R and the commands U both have full rank, which is the number of
+    inputs."""
     input_count, experiment_count = columns.command.shape[1:]
     has_full_rank = np.full(len(columns.command), experiment_count >= input_count)
     if experiment_count >= input_count and len(has_full_rank):

@@ -49,14 +49,15 @@ class EstimateSettings:
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
-    is no recording, the recordings differ in rate, channels or units, no segment is a complete broadband experiment, an
-    output is constant, or there are fewer independent experiments than inputs."""
+    is no recording, the recordings differ in rate, channels or units, no segment for the fit yields a whole period or
+    window without missing samples, an output is constant, or there are fewer independent experiments than inputs at
+    every line."""
     settings = settings or EstimateSettings()
     _check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
     if not experiment_set.experiments:
         raise TransferEstimateError(
-            "no segment drives the device with more than single sinusoids for a whole period or window; "
+            "no segment for the fit contains a whole period or window of excitation without missing samples; "
             "record a sweep or a multisine along every axis"
         )
     _refuse_constant_outputs(recordings)
@@ -80,8 +81,8 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
         and experiment_set.periodic
     ):
         remarks.append(
-            "No experiment has two counted periods: errors were estimated from the scatter from line to line, and from "
-            "the noise at rest where that is larger."
+            "No experiment has two counted periods: errors were estimated from the residuals between experiments where "
+            "these are enough, else from the scatter from line to line or, where larger, the noise at rest."
         )
     if any(recording.excitation is None and find_spring_frequency_hz([recording.meta]) for recording in recordings):
         remarks.append(
@@ -105,12 +106,12 @@ def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterat
     for pattern in np.unique(has_line, axis=0):
         shared_lines = all_lines[(has_line == pattern).all(axis=1)]
         chosen_lengths = {length for length, has_lines in zip(lengths, pattern, strict=True) if has_lines}
-        group = [
+        restricted_experiments = [
             _select_lines(experiment, shared_lines // (common_length // experiment.length) - 1)
             for experiment in experiments
             if experiment.length in chosen_lengths
         ]
-        yield shared_lines * (rate_hz / common_length), group
+        yield shared_lines * (rate_hz / common_length), restricted_experiments
 
 
 def _select_lines(experiment: Experiment, line_indices: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:

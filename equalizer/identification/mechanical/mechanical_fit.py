@@ -21,7 +21,7 @@ import numpy as np
 from equalizer.identification.mechanical.mechanical_fit_result import (
     ChannelError,
     MechanicalFit,
-    MechanicalFitRefused,
+    MechanicalFitError,
     MechanicalFitSettings,
     OrderCandidate,
 )
@@ -74,10 +74,12 @@ def choose_structure(
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
     """Choose oscillators on the driven axes if they explain the lines, else modes with free shapes at the sensors if
-    these explain more.
+    these explain more. `settings.joint` requires an elastic joint, and `settings.noncollocated_sensors` one of the two
+    kinds.
 
     groups: lines of the segments to fit. starts: fits of the driven axes alone up to the first of `compute_stage_ends`,
-    from several initial values. on_progress: called with the share done, 0 to 1."""
+    from several initial values. on_progress: called with the share done, 0 to 1.
+    """
     best = choose_simplest(starts)
     if settings.joint:
         return StructureChoice(*grow_across_joint(groups, best, band_hz, settings, on_progress))
@@ -134,7 +136,7 @@ def fit_mechanical_model(
     """Fit a model from the total command to the response.
 
     Response i must be the motion at the point and in the direction of command i; further responses may be at any place.
-    on_progress: called with the share done, 0 to 1. name: of the model. Raises MechanicalFitRefused where the
+    on_progress: called with the share done, 0 to 1. name: of the model. Raises MechanicalFitError where the
     recordings do not determine a model: unsuitable channels, too few driven lines, only noise, or an unstable fit.
     """
     settings = settings or MechanicalFitSettings()
@@ -143,7 +145,7 @@ def fit_mechanical_model(
     fit_lines = [spectra for pair in fit_segments if (spectra := compute_segment_lines(*pair)) is not None]
     segments = select_band(fit_lines, settings.band_hz)
     if sum(len(segment.frequency_hz) for segment in segments) < _MIN_LINES:
-        raise MechanicalFitRefused(
+        raise MechanicalFitError(
             "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
             "record a sweep, noise or a multisine along every axis"
         )
@@ -180,7 +182,7 @@ def _compute_channel_errors(
     band_hz: tuple[float, float],
     channels: tuple[str, ...],
 ) -> tuple[ChannelError, ...]:
-    """Compute the errors per channel, and over all channels as last entry. Raises MechanicalFitRefused where no channel
+    """Compute the errors per channel, and over all channels as last entry. Raises MechanicalFitError where no channel
     is explained (`refuse_noise`)."""
     error, noise = compute_simulation_errors(model, fit_lines, band_hz)
     refuse_noise(error, channels)
@@ -273,7 +275,9 @@ def _list_remarks(
     """List sentences on what was assumed and what the fit shows. has_test: whether segments were kept for the test."""
     structure = final.structure
     collocated = ", ".join(channels[: structure.inputs])
-    remarks = [f"No model was given, so a linear one was fitted; {collocated} taken to move as the commands act."]
+    remarks = [
+        f"No model was given, so a linear one was fitted, with {collocated} assumed to move as the commands act."
+    ]
     if isinstance(structure, ModalStructure):
         remarks.append("The sensors are not where the commands act on the modes: a joint or cable lies between.")
     elif -1.0 in structure.signs:

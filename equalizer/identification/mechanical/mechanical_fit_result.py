@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 
 
-class MechanicalFitRefused(ValueError):  # noqa: N818 - a message for the user, as in the rest of the package
+class MechanicalFitError(ValueError):
     """No mechanical model can be fitted to the recordings. The message states the cause and, if there is one, the
     remedy."""
 

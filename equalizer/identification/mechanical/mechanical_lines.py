@@ -96,8 +96,8 @@ class SegmentLines:
 
 def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
     """Compute the spectra of a segment with their noise; None where its longest run without gaps has fewer than eight
-    samples (chosen), or where it is not excited: the spectrum without the mean is rounding error (at most 1e-9 of the
-    largest sample)."""
+    samples (chosen), where a sample of the excitation is missing, or where it is not excited: the spectrum without the
+    mean is rounding error (at most 1e-9 of the largest sample)."""
     starts, length = _find_whole_periods(recording, segment)
     if not starts or length < 8:
         return None
@@ -107,7 +107,7 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
     excitation = recording.command if recording.excitation is None else recording.excitation
     excitation_norm = np.linalg.norm(_compute_spectra(excitation.samples, starts, length).mean(axis=0), axis=1)
     if not excitation_norm.max() > 1e-9 * max(
-        float(np.abs(excitation.samples[segment.start : segment.stop]).max()), 1e-300
+        float(np.nanmax(np.abs(excitation.samples[segment.start : segment.stop]))), 1e-300
     ):
         return None
     command, response = (spectrum.mean(axis=0) for spectrum in spectra)
@@ -163,7 +163,7 @@ def _select_lines(segment: SegmentLines, chosen_lines: npt.NDArray[np.int64]) ->
 def split_fit_and_test(
     recordings: Sequence[Recording],
 ) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
-    """Split the driven segments into those to fit and those held out for a test. The test are the segments with the
+    """Split the driven segments into those to fit and those held out for a test. Held out are the segments with the
     role "test"; without such, the last of more than 2 m segments (m commands), or the last third of a single segment
     that is not periodic, else none."""
     driven_segments = [

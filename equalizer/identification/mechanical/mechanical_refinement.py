@@ -2,8 +2,7 @@
 
 Minimises the sum over lines of |Y(f) - G(f, unknowns) U(f)|² / expected error power (output error; `LineGroup` holds
 the weighted spectra), with SciPy's bounded trust-region reflective method. Held-out lines measure the error of the
-result. Called by `mechanical_fit`, `mechanical_mode_start` and the selection of the order (`mechanical_order`,
-`modal_order`).
+result. Called by `mechanical_fit` and the selection of the order (`mechanical_order`, `modal_order`).
 """
 
 from collections.abc import Sequence

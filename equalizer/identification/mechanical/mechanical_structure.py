@@ -35,11 +35,11 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
     mass[m:, m:] = model.mass
     mass[m : 2 * m, m : 2 * m] -= DRIVEN_SHARE * bare_mass
     mass[:m, :m] = DRIVEN_SHARE * bare_mass
-    for target, part in ((damping, model.damping), (springs, model.stiffness)):
-        target[:m, :m] = part[:m, :m]
-        target[2 * m :, 2 * m :] = part[m:, m:]
-    for target, part in ((damping, loss_s * stiffness), (springs, stiffness)):
-        target[: 2 * m, : 2 * m] += np.block([[part, -part], [-part, part]])
+    for matrix, part in ((damping, model.damping), (springs, model.stiffness)):
+        matrix[:m, :m] = part[:m, :m]
+        matrix[2 * m :, 2 * m :] = part[m:, m:]
+    for matrix, part in ((damping, loss_s * stiffness), (springs, stiffness)):
+        matrix[: 2 * m, : 2 * m] += np.block([[part, -part], [-part, part]])
     return replace(
         model,
         mass=mass,
@@ -126,20 +126,20 @@ class Structure:
         return self.mass_scale, self.mass_scale * self.speed_scale, self.mass_scale * self.speed_scale**2
 
     def convert_unknowns(self, unknowns: FloatArray, destination: "Structure") -> FloatArray:
-        """Convert the unknowns to a structure with as many modes or more: parts that it adds are 0, others dropped."""
+        """Convert unknowns to a structure with as many modes or more; parts it adds are 0, parts it lacks dropped."""
         converted = np.zeros(destination.parameters)
-        for name, source in self.slices.items():
-            target = destination.slices[name]
+        for name, source_slice in self.slices.items():
+            target_slice = destination.slices[name]
             if name == "modes" and self.modes:
-                old_modes = unknowns[source].reshape(self.modes, -1)
-                new_modes = np.zeros((destination.modes, (target.stop - target.start) // destination.modes))
+                old_modes = unknowns[source_slice].reshape(self.modes, -1)
+                new_modes = np.zeros((destination.modes, (target_slice.stop - target_slice.start) // destination.modes))
                 split = 2 + self.inputs
                 new_modes[: self.modes, :split] = old_modes[:, :split]
                 if old_modes.shape[1] > split:
                     new_modes[: self.modes, new_modes.shape[1] - (old_modes.shape[1] - split) :] = old_modes[:, split:]
-                converted[target] = new_modes.ravel()
-            elif name != "modes" and source.stop - source.start == target.stop - target.start:
-                converted[target] = unknowns[source]
+                converted[target_slice] = new_modes.ravel()
+            elif name != "modes" and source_slice.stop - source_slice.start == target_slice.stop - target_slice.start:
+                converted[target_slice] = unknowns[source_slice]
         return converted
 
     def build_model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:

@@ -109,7 +109,7 @@ def transform_to_driven_axes(model: MechanicalModel) -> MechanicalModel:
     m, n = B.shape[1], model.coordinates
     left_vectors, singular_values, right_vectors = np.linalg.svd(B)
     if singular_values[-1] < _RANK_TOLERANCE * singular_values[0]:
-        raise np.linalg.LinAlgError("an axis that no mode moves")
+        raise np.linalg.LinAlgError("no mode moves one of the driven axes")
     axis_shapes = left_vectors[:, :m] / singular_values @ right_vectors
     internal_modes = left_vectors[:, m:]
     if n > m:  # fixed-interface modes: those with the driven axes held

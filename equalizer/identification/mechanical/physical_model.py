@@ -34,7 +34,7 @@ def make_physical_model(fit: AnyFit, name: str) -> MechanicalModel:
     if isinstance(fit.structure, ModalStructure):
         model = transform_to_driven_axes(model)
     else:
-        model = _to_absolute_coordinates(model, fit.structure.inputs, fit.structure.joint)
+        model = _convert_to_absolute_coordinates(model, fit.structure.inputs, fit.structure.joint)
     return replace(model, tolerance=estimate_tolerance(fit))
 
 
@@ -86,7 +86,7 @@ def _compute_covariance(fit: AnyFit) -> FloatArray:
     return np.asarray(residual_variance * inverse / np.outer(column_norms, column_norms))
 
 
-def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
+def _convert_to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
     """Convert to a model with absolute positions z of the oscillators in place of their relative modal coordinates
     e = |L| (z - hᵀ x), where L is the participation, h = L / |L| the direction, and |L|² the mass of an oscillator.
     Unchanged without oscillators, and where a participation is too small to divide by: |L| below 1e-6 of the root of

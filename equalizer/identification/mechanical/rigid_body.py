@@ -64,7 +64,7 @@ def fit_rigid_body(
     """Fit a rigid body to two recordings of the same device, at a stronger and a weaker level of the excitation, and
     compute the equivalent damping of friction from their difference (limited to 0 to `LARGEST_REMOVED_SHARE` of the
     damping; r - 1 counts as at least 0.001). fit: that of the whole band, whose tolerances are kept where they are
-    wider. settings: of `fit`. Raises MechanicalFitRefused where a recording does not determine a rigid body, ValueError
+    wider. settings: of `fit`. Raises MechanicalFitError where a recording does not determine a rigid body, ValueError
     where one has no segments."""
     low_hz, high_hz = fit.band_hz
     up_to_hz = min(high_hz, low_hz * 2**RIGID_OCTAVES)

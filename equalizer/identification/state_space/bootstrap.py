@@ -60,7 +60,7 @@ def estimate_response_deviation(model: IdentifiedModel, frequency_hz: FloatArray
         raise ValueError("the model contains no samples of its uncertainty; identify it again with draws > 0")
     nominal_response = compute_model_response(model, frequency_hz)
     squared_deviations = [
-        np.abs(compute_model_response(model.with_parameters(parameters), frequency_hz) - nominal_response) ** 2
+        np.abs(compute_model_response(model.replace_parameters(parameters), frequency_hz) - nominal_response) ** 2
         for parameters in model.samples
     ]
     return np.asarray(np.sqrt(np.mean(squared_deviations, axis=0)), dtype=np.float64)

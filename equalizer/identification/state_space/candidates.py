@@ -53,7 +53,7 @@ of a narrow band. Heuristic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
+class StartingModel:
     """Starting model of a search: poles and output shapes, without B and D."""
 
     name: str
@@ -80,25 +80,27 @@ class Candidate:
         return self.outside_gain <= LARGEST_OUTSIDE_GAIN
 
 
-def estimate_subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
+def estimate_subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[StartingModel, ...]:
     """Estimate starting models by frequency-domain subspace identification, one per entry of
     `settings.longer_horizons`. Raises numpy.linalg.LinAlgError where the order has more parameters than the lines
     determine."""
     return tuple(estimate_subspace_start(lines, settings, extra_rows) for extra_rows in settings.longer_horizons)
 
 
-def estimate_subspace_start(lines: WeightedLines, settings: IdentificationSettings, extra_rows: int) -> Start:
+def estimate_subspace_start(lines: WeightedLines, settings: IdentificationSettings, extra_rows: int) -> StartingModel:
     """Estimate a starting model by frequency-domain subspace identification with a warped frequency axis. extra_rows:
     block rows beyond the shortest useful horizon."""
     radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
     horizon = choose_horizon(settings.order, lines.response.shape[1]) + extra_rows
     subspace = estimate_subspace(lines, horizon, settings.centre_hz)
-    return Start(f"warped subspace, horizon {horizon}", extract_poles_and_shapes(subspace, settings.order, radius))
+    return StartingModel(
+        f"warped subspace, horizon {horizon}", extract_poles_and_shapes(subspace, settings.order, radius)
+    )
 
 
 def estimate_record_starts(
     recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
-) -> tuple[Start, ...]:
+) -> tuple[StartingModel, ...]:
     """Estimate starting models by canonical variate analysis of time records, one per horizon that has enough rows and
     samples; none where the band is too wide for decimation by 2 or more."""
     decimation_factor = choose_decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
@@ -112,11 +114,11 @@ def estimate_record_starts(
         observability = estimate_observability(records, m, horizon) if horizon * p > settings.order + p else None
         if observability is not None:
             form = estimate_poles_and_shapes(observability, p, settings.order, decimation_factor, radius)
-            starts.append(Start(f"canonical variates, horizon {horizon}", form))
+            starts.append(StartingModel(f"canonical variates, horizon {horizon}", form))
     return tuple(starts)
 
 
-def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+def refine_start(start: StartingModel, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
     """Complete a starting model by B and D (linear least squares), and refine it as in `refine_candidate`."""
     radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
     return refine_candidate(start.name, complete_form(start.form, lines), lines, settings, radius)

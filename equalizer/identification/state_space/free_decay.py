@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.identification.state_space.identify import Identified
+from equalizer.identification.state_space.identify import IdentificationResult
 from equalizer.identification.state_space.relaxed_poles import is_at_bound
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -29,7 +29,7 @@ class SlowModes:
     """(p, n)"""
 
 
-def extract_slow_modes(identified: Identified, least_magnitude: float) -> SlowModes | None:
+def extract_slow_modes(identified: IdentificationResult, least_magnitude: float) -> SlowModes | None:
     """Extract the 2 x 2 blocks with a pole of magnitude above `least_magnitude`; None where there are none, or where no
     pole was relaxed (`relaxed_poles`). A block with a pole at its bound is left out, because its decay is not known."""
     fitted = identified.chosen.fitted

@@ -28,7 +28,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.state_space.bootstrap import compute_relative_deviation, draw_bootstrap_parameters
 from equalizer.identification.state_space.candidates import (
     Candidate,
-    Start,
+    StartingModel,
     average_about_model,
     choose_best,
     estimate_record_starts,
@@ -38,7 +38,7 @@ from equalizer.identification.state_space.candidates import (
 )
 from equalizer.identification.state_space.misfit import Misfit, compute_misfit, count_unknowns
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED_COST, describe_misfit_causes
-from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
+from equalizer.identification.state_space.refusals import IdentificationError, require_lines
 from equalizer.identification.state_space.relaxed_poles import (
     RelaxedFit,
     SlowPole,
@@ -60,7 +60,7 @@ written."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class Identified(SummaryDisplay):
+class IdentificationResult(SummaryDisplay):
     """An identified model with its goodness of fit; result of `identify`."""
 
     model: IdentifiedModel
@@ -104,7 +104,7 @@ class Identified(SummaryDisplay):
             (
                 *self.model.summary().rows,
                 ("expected error", expected),
-                ("cost per unknown (noise alone: 1)", f"{self.cost:.3g}"),
+                ("cost per degree of freedom (noise alone: 1)", f"{self.cost:.3g}"),
                 *(("remark", remark) for remark in self.remarks),
             ),
         )
@@ -116,12 +116,12 @@ def identify(
     records: tuple[Recording, ...] = (),
     on_progress: Callable[[float], None] | None = None,
     initial: Candidate | None = None,
-) -> Identified:
+) -> IdentificationResult:
     """Fit one model to all estimates together, each line weighted by its noise. The model is always stable.
 
     `records` give further starts in the time domain. `initial`: a model to refine on these lines instead of a search;
     poles that were relaxed for it are bounded again where that costs nothing. `on_progress` takes the share done, 0 to
-    1, of a search; it is not called with `initial`. Raises IdentificationRefused where no model can be fitted to the
+    1, of a search; it is not called with `initial`. Raises IdentificationError where no model can be fitted to the
     data.
     """
     settings = settings or IdentificationSettings()
@@ -152,7 +152,7 @@ def _search(
     records: tuple[Recording, ...],
     report_progress: Callable[[float], None],
 ) -> list[Candidate]:
-    """Refine all starting models. report_progress: takes the share done, 0 to 1. Raises IdentificationRefused as
+    """Refine all starting models. report_progress: takes the share done, 0 to 1. Raises IdentificationError as
     `_make_starts` does."""
     starts = _make_starts(lines, settings, records)
     candidates = []
@@ -166,14 +166,14 @@ def _search(
 
 def _make_starts(
     lines: WeightedLines, settings: IdentificationSettings, records: tuple[Recording, ...]
-) -> tuple[Start, ...]:
-    """Make starting models from the lines and from the time records. Raises IdentificationRefused for an order with
+) -> tuple[StartingModel, ...]:
+    """Make starting models from the lines and from the time records. Raises IdentificationError for an order with
     more parameters than the lines determine."""
     try:
         return (*estimate_subspace_starts(lines, settings), *estimate_record_starts(records, lines, settings))
     except np.linalg.LinAlgError as problem:
         order = settings.order
-        raise IdentificationRefused(
+        raise IdentificationError(
             f"order {order} has more parameters than the {len(lines)} lines in the band can determine; choose a lower "
             f"order, such as {max(order // 4 * 2, 2)}"
         ) from problem
@@ -198,7 +198,7 @@ def _assess_model(
     lines: WeightedLines,
     response: FrequencyResponse,
     settings: IdentificationSettings,
-) -> Identified:
+) -> IdentificationResult:
     """Assess the fitted model: cost, errors in the band, misfit, scatter of the bootstrap draws, and remarks."""
     chosen = relaxed_fit.candidate
     low_hz, high_hz = settings.band_hz
@@ -211,7 +211,7 @@ def _assess_model(
     relaxed_poles = () if settings.longest_decay_s else list_slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
     misfit = compute_misfit(lines, modelled_response, is_in_band, unknowns)
     model = _make_model(chosen, lines, cost, response, settings, relaxed_poles)
-    return Identified(
+    return IdentificationResult(
         model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((relative_error**2).mean())),
@@ -232,11 +232,11 @@ def _assess_model(
 
 
 def _refuse_mismatched_records(records: tuple[Recording, ...], response: FrequencyResponse) -> None:
-    """Raise IdentificationRefused for a record whose sample rate or channels differ from those of the response."""
+    """Raise IdentificationError for a record whose sample rate or channels differ from those of the response."""
     for record in records:
         record_format = (record.sample_rate_hz, record.command.channels, record.response.channels)
         if record_format != (response.sample_rate_hz, response.input_channels, response.output_channels):
-            raise IdentificationRefused(
+            raise IdentificationError(
                 f"a record of {', '.join(record_format[2])} per {', '.join(record_format[1])} at {record_format[0]:g}"
                 f" Hz does not belong to a response of {', '.join(response.output_channels)} per "
                 f"{', '.join(response.input_channels)} at "

@@ -13,7 +13,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.local_polynomial import smooth_response
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.free_decay import extract_slow_modes, subtract_free_decay
-from equalizer.identification.state_space.identify import Identified, identify, write_outside_gain_remark
+from equalizer.identification.state_space.identify import IdentificationResult, identify, write_outside_gain_remark
 from equalizer.identification.state_space.misfit import compute_estimate_misfit
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED_COST, describe_misfit_causes
 from equalizer.identification.state_space.settings import IdentificationSettings
@@ -29,21 +29,21 @@ MAX_ROUNDS = 8
 SETTLED_DECAY_CHANGE = 1e-4
 """Relative change of the slowest decay between rounds below which no further round is made. Chosen."""
 SMOOTHED_REMARK = (
-    "The lines differ from the model by more than their noise: the fit was made to a local average over neighbouring "
-    "lines (--no-smooth fits the lines themselves)."
+    "The model was fitted to local averages over neighbouring lines, as is done by default where the lines differ from "
+    "a model by more than their noise (--no-smooth fits the lines themselves)."
 )
 """Remark of a model that was fitted to local averages."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class IdentifiedRecordings:
+class RecordingsIdentification:
     """Result of `identify_recordings`: frequency response of the recordings, and the state-space model fitted to it."""
 
     estimate: FrequencyResponse
     """Frequency response of the recordings, free decays of slow poles subtracted."""
     fitted: FrequencyResponse
     """The frequency response that the model was fitted to: the estimate, or its local averages."""
-    identified: Identified
+    identified: IdentificationResult
 
 
 def identify_recordings(
@@ -51,12 +51,12 @@ def identify_recordings(
     settings: IdentificationSettings | None = None,
     smooth: bool | None = None,
     on_progress: Callable[[float], None] | None = None,
-) -> IdentifiedRecordings:
+) -> RecordingsIdentification:
     """Identify a state-space model of the recorded device, and state how well it fits.
 
     smooth: whether to fit local averages over neighbouring lines, taken about the model where a pole was relaxed,
     because they would blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes
-    the share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does, and IdentificationRefused as
+    the share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does, and IdentificationError as
     `identify` does.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
@@ -77,8 +77,9 @@ def _fit_estimate(
     settings: IdentificationSettings,
     smooth: bool | None,
     report_progress: Callable[[float], None],
-) -> IdentifiedRecordings:
-    """Fit the lines of the estimate, then, depending on `smooth`, local averages of them. report_progress: takes the
+) -> RecordingsIdentification:
+    """Fit the lines of the estimate, then, depending on `smooth`, local averages of them; the averages alone where
+    `smooth` is true and the bound of the decay is fixed, because no pole is then relaxed. report_progress: takes the
     share done."""
     if smooth and settings.longest_decay_s is not None:
         return _fit_smoothed(estimate, recordings, settings, None, report_progress)
@@ -86,13 +87,13 @@ def _fit_estimate(
     estimate, identified = _remove_transients(estimate, identified, recordings, settings)
     if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED_COST):
         report_progress(1.0)
-        return IdentifiedRecordings(estimate, estimate, identified)
+        return RecordingsIdentification(estimate, estimate, identified)
     return _fit_smoothed(estimate, recordings, settings, identified, lambda share: report_progress(0.5 + share / 2))
 
 
 def _add_misfit_causes(
-    result: IdentifiedRecordings, settings: IdentificationSettings, has_repeats: bool
-) -> IdentifiedRecordings:
+    result: RecordingsIdentification, settings: IdentificationSettings, has_repeats: bool
+) -> RecordingsIdentification:
     """Add the causes of the misfit, judged on the lines themselves: residuals of local averages are always smooth,
     because neighbours share their lines."""
     identified, is_averaged = result.identified, result.fitted is not result.estimate
@@ -117,10 +118,10 @@ def _has_repeats(recordings: Sequence[Recording]) -> bool:
 
 def _remove_transients(
     estimate: FrequencyResponse,
-    identified: Identified,
+    identified: IdentificationResult,
     recordings: Sequence[Recording],
     settings: IdentificationSettings,
-) -> tuple[FrequencyResponse, Identified]:
+) -> tuple[FrequencyResponse, IdentificationResult]:
     """Subtract the free decay of slow poles from the recordings, and identify again, until the slowest decay changes by
     less than `SETTLED_DECAY_CHANGE`, or `MAX_ROUNDS` are done."""
     radius, settings_without_draws = (
@@ -141,9 +142,9 @@ def _fit_smoothed(
     estimate: FrequencyResponse,
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
-    unsmoothed: Identified | None,
+    unsmoothed: IdentificationResult | None,
     report_progress: Callable[[float], None],
-) -> IdentifiedRecordings:
+) -> RecordingsIdentification:
     """Fit local averages of the lines. unsmoothed: the fit of the lines themselves, whose chosen model is refined where
     a pole was relaxed; None, or no relaxed pole: a new search. report_progress: takes the share done."""
     has_relaxed_pole = unsmoothed is not None and bool(unsmoothed.relaxed)
@@ -158,4 +159,4 @@ def _fit_smoothed(
     report_progress(1.0)
     # For the same reason the cost of the bound cannot be tested on averaged lines.
     is_bound_binding = unsmoothed is not None and unsmoothed.is_bound_binding
-    return IdentifiedRecordings(estimate, fitted, replace(identified, is_bound_binding=is_bound_binding))
+    return RecordingsIdentification(estimate, fitted, replace(identified, is_bound_binding=is_bound_binding))

@@ -35,8 +35,8 @@ class Misfit:
     noise."""
     smooth: float | None
     """Correlation between neighbouring lines of the residual in excess of the noise: near 1 for a linear response that
-    the model lacks, near 0 for lines that scatter; None where the residual is noise, or where the noise was estimated
-    from the scatter of the lines (set by `identify_recordings`)."""
+    the model lacks, near 0 for lines that scatter; None for a single line, where the residual is noise, or where
+    the noise was estimated from the scatter of the lines (set by `identify_recordings`)."""
 
 
 NORMAL_QUANTILE_95 = 1.645

@@ -89,15 +89,19 @@ def describe_test_error_causes(
     if validation.noise is None or validation.error <= HELD_OUT_RATIO * expected_error or cost > UNEXPLAINED_COST:
         return tuple(remarks)
     fit_amplitude, test_amplitude = (_find_largest_amplitude(recordings, of_test=is_test) for is_test in (False, True))
-    if min(fit_amplitude, test_amplitude) > 0 and max(fit_amplitude, test_amplitude) > LEVEL_RATIO * min(fit_amplitude, test_amplitude):
+    if min(fit_amplitude, test_amplitude) > 0 and max(fit_amplitude, test_amplitude) > LEVEL_RATIO * min(
+        fit_amplitude, test_amplitude
+    ):
         remarks.append(
             "The error on the test is larger than that of the fit, and the test was played at another level (up to "
-            f"{test_amplitude:.3g} N, the fit {fit_amplitude:.3g} N): the response may depend on the amplitude, as with friction."
+            f"{test_amplitude:.3g}, the fit {fit_amplitude:.3g}, in the unit of the command): the response may depend "
+            "on the amplitude, as with friction."
         )
     else:
         remarks.append(
-            "The error on the test is larger than the fit explains, at the same level: the device differed between "
-            "the two, or its response depends on the kind of signal; these recordings do not show which."
+            "The error on the test is larger than the fit explains, and no stated difference of levels accounts for "
+            "it: the device differed between the two, or its response depends on the kind of signal; these recordings "
+            "do not show which."
         )
     return tuple(remarks)
 

@@ -62,13 +62,13 @@ def compare_orders(
     on_progress: Callable[[float], None] | None = None,
 ) -> OrderReport:
     """Fit every order to every second line and test it on the others. orders: even numbers of states (default chosen).
-    on_progress: called with the share done, 0 to 1. Raises IdentificationRefused as `require_lines` does, for example
+    on_progress: called with the share done, 0 to 1. Raises IdentificationError as `require_lines` does, for example
     where there are too few lines for the highest order."""
     settings = settings or IdentificationSettings()
     report_progress = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     top_settings = replace(settings, order=max(orders))
-    fitted, held_out = (
+    fit_set, held_out_set = (
         require_lines([estimate.select_lines(_mask_lines(estimate, parity)) for estimate in responses], top_settings)
         for parity in (0, 1)
     )
@@ -77,12 +77,12 @@ def compare_orders(
     for index, order in enumerate(sorted(orders)):
         report_progress(index / len(orders))
         trial = replace(settings, order=order)
-        best = choose_best([refine_start(start, fitted, trial) for start in estimate_subspace_starts(fitted, trial)])
-        modelled_response = best.fitted.compute_response(held_out.z)
-        costs = (np.abs(held_out.weight * (modelled_response - held_out.response)) ** 2).mean(axis=(1, 2))
+        best = choose_best([refine_start(start, fit_set, trial) for start in estimate_subspace_starts(fit_set, trial)])
+        modelled_response = best.fitted.compute_response(held_out_set.z)
+        costs = (np.abs(held_out_set.weight * (modelled_response - held_out_set.response)) ** 2).mean(axis=(1, 2))
         line_costs.append(costs)
-        error = float(np.sqrt((held_out.compute_relative_error(modelled_response) ** 2).mean()))
-        p, m = held_out.response.shape[1:]
+        error = float(np.sqrt((held_out_set.compute_relative_error(modelled_response) ** 2).mean()))
+        p, m = held_out_set.response.shape[1:]
         rows.append(
             OrderRow(order, float(costs.mean()), error, count_products(order, p, m), count_dense_products(order, p, m))
         )
@@ -94,7 +94,7 @@ def compare_orders(
         singular_values,
         int((singular_values > VISIBLE_RATIO).sum()),
         tuple(rows),
-        _compute_relative_noise(held_out),
+        _compute_relative_noise(held_out_set),
         rows[_suggest_order(line_costs)].order,
     )
 

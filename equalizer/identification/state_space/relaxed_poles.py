@@ -186,7 +186,8 @@ def _tighten_poles(
 
 
 def _lowers_cost(tightened: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:
-    """Whether a pole is still relaxed, and the cost fell by more than noise alone explains."""
+    """Whether poles are still relaxed, but not those of all blocks, and the cost fell by more than noise alone
+    explains."""
     entry_count = lines.response.size
     decrease = entry_count * (chosen.cost - tightened.cost)
     return bool(np.any(tightened.radius > np.min(tightened.radius))) and _exceeds_noise(

@@ -49,9 +49,9 @@ class IdentificationSettings:
         if self.order < 2 or self.order % 2:
             raise ValueError(f"order is {self.order}; it must be even and at least 2, because poles come in pairs")
         if self.longest_decay_s is not None and not 0 < self.longest_decay_s < float("inf"):
-            raise ValueError(f"longest_decay_s is {self.longest_decay_s:g}; it must be above 0")
+            raise ValueError(f"longest_decay_s is {self.longest_decay_s:g}; it must be above 0 and finite")
         if not self.longer_horizons or min(self.longer_horizons) < 0:
-            raise ValueError(f"longer_horizons is {self.longer_horizons}; at least one number that is not negative")
+            raise ValueError(f"longer_horizons is {self.longer_horizons}; give at least one number, none negative")
         if self.margin < 0 or self.draws < 0:
             raise ValueError(f"margin is {self.margin:g} and draws {self.draws}; neither may be negative")
 

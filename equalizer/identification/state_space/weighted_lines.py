@@ -120,12 +120,12 @@ def compute_bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> Float
     return np.array([lines.frequency_hz[bin_lines].mean() for bin_lines in bins])
 
 
-def group_lines(lines: WeightedLines, min_lines: int, octave_share: float) -> tuple[slice, ...]:
-    """Group neighbouring lines into consecutive slices: each of all lines less than `octave_share` octaves above its
-    first line, and of at least `min_lines` lines, the last slice excepted."""
+def group_lines(lines: WeightedLines, min_lines: int, width_octaves: float) -> tuple[slice, ...]:
+    """Group neighbouring lines into consecutive slices: each of all lines less than `width_octaves` above its first
+    line, and of at least `min_lines` lines, the last slice excepted."""
     edges, frequency_hz = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]
-        octave_end = int(np.searchsorted(frequency_hz, frequency_hz[start] * 2**octave_share))
+        octave_end = int(np.searchsorted(frequency_hz, frequency_hz[start] * 2**width_octaves))
         edges.append(min(max(start + min_lines, octave_end), len(lines)))
     return tuple(slice(start, stop) for start, stop in pairwise(edges))

@@ -31,7 +31,7 @@ class ResponseSource(Protocol):
     """Frequency response of a device, defined at any frequency."""
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, p, m): complex response, m/s² per N, at frequencies (lines,), Hz."""
+        """Compute the complex response (lines, p, m), m/s² per N, at frequencies (lines,), Hz."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class ModelledResponse:
     model: IdentifiedModel
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, p, m): response of the model, m/s² per N, at frequencies (lines,), Hz."""
+        """Compute the response of the model, (lines, p, m), m/s² per N, at frequencies (lines,), Hz."""
         return compute_model_response(self.model, frequency_hz)
 
 
@@ -56,7 +56,7 @@ class MeasuredResponse:
     """(lines, p, m), m/s² per N."""
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, p, m): interpolated response, m/s² per N, at frequencies (lines,), Hz."""
+        """Interpolate the response, (lines, p, m), m/s² per N, at frequencies (lines,), Hz."""
         flat_response = self.response.reshape(len(self.frequency_hz), -1)
         interpolated_channels = []
         for channel_response in flat_response.T:

@@ -111,7 +111,9 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
     rows = banded_forces.find_reference_rows(len(reference))
     if not np.linalg.norm(banded_forces.bands.middle[rows]) > LEAKAGE_SHARE * np.linalg.norm(reference.samples):
         low_hz, high_hz = models.narrow.band_hz
-        raise TrackingError(f"nothing is wanted between {low_hz:g} and {high_hz:g} Hz, the narrower model's band")
+        raise TrackingError(
+            f"the reference has no content from {low_hz:g} to {high_hz:g} Hz, the narrower model's band"
+        )
     problem = make_tracking_problem(models.narrow, TrackingWeights(settings.weight))
     outer_forces = (banded_forces.by_band[0] + banded_forces.by_band[2])[rows]
     middle_reference = extract_band(models.narrow, in_band_reference - simulate_from_rest(problem, outer_forces))
@@ -160,10 +162,10 @@ def fit_rigid_part(model: IdentifiedModel) -> RigidModel:
 def compute_level_error(
     reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]
 ) -> float | None:
-    """Relative error of the level (root of the power of all axes together) by sixths of an octave, for a band in which
-    people perceive the level of a vibration but not its direction: |L_delivered - L_reference| / |L_reference|, with L
-    (bins,) from the DFT, zero-padded to twice the length. reference, delivered: (n, axes). None where the reference has
-    at most `LEAKAGE_SHARE` of its level in the band."""
+    """Compute the relative error of the level (root of the power of all axes together) by sixths of an octave, for a
+    band in which people perceive the level of a vibration but not its direction: |L_delivered - L_reference| /
+    |L_reference|, with L (bins,) from the DFT, zero-padded to twice the length. reference, delivered: (n, axes). None
+    where the reference has at most `LEAKAGE_SHARE` of its level in the band."""
     length = 2 * len(reference)
     lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
     bin_count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
@@ -195,7 +197,7 @@ def _predict_bands(
     reference: FloatArray,
     forces: FloatArray,
 ) -> BandPredictions:
-    """Predicted errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
+    """Predict the errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
     one. reference: (n, axes), without frequencies above the wide band."""
     edges, rows, middle_band_hz = (
         equalizer.split.edges,

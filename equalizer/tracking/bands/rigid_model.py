@@ -33,8 +33,8 @@ class RigidModel:
             raise ValueError(f"mass, damping and stiffness must be square matrices of one shape, not {sorted(shapes)}")
 
     def compute_force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Inverse response (lines, m, m), N per m/s², with the delay compensated. frequency_hz: (lines,), above
-        zero."""
+        """Compute the inverse response (lines, m, m), N per m/s², with the delay compensated. frequency_hz: (lines,),
+        above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
         force_per_acceleration = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
         return np.asarray(force_per_acceleration * np.exp(s * self.delay_s))

@@ -79,7 +79,7 @@ def compensate(
     an axis that the model does not have.
     """
     if forces.shape != reference.shape:
-        raise ValueError(f"forces of shape {forces.shape} do not match the wanted accelerations, {reference.shape}")
+        raise ValueError(f"forces of shape {forces.shape} do not match the reference accelerations, {reference.shape}")
     if identified_with_n is not None and not identified_with_n > 0:
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz

@@ -25,7 +25,7 @@ Chosen, to limit computing time."""
 
 
 def _smooth_sign(velocity: FloatArray, slip_mps: float) -> FloatArray:
-    """tanh(v / slip_mps) in place of sign(v), because a discontinuous force cannot be played."""
+    """Compute tanh(v / slip_mps) in place of sign(v), because a discontinuous force cannot be played."""
     return np.asarray(np.tanh(velocity / slip_mps))
 
 

@@ -37,9 +37,11 @@ _TESTED_RANGES = tuple(10.0**decade for decade in range(-6, 5))
 """Ranges ± of commands, in the command's unit, within which a map is tested for monotonicity."""
 EVALUATION_RATE_HZ = 1000.0
 """Sample rate (Hz) at which a law without memory is evaluated; the result does not depend on it."""
-DEPENDS_ON_COMMAND = "it depends on the command, which its compensation would change, or on the time"
+NOT_OF_MOTION_ALONE = (
+    "it depends on a command, which its compensation would change, on the time or on a measured condition"
+)
 HAS_MEMORY = "it has memory of earlier commands, so no map of the present command inverts it"
-SEVERAL_SIGNALS = "it depends on several commands or on the time"
+NOT_OF_OWN_COMMAND_ALONE = "it is not a map of the command of its own axis alone"
 NOT_INVERTIBLE = "the force does not rise with the command, so the map has no inverse"
 SENSOR_ERROR = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
 """Reasons why a law is not compensated, as clauses after "because"."""
@@ -52,11 +54,11 @@ def explain_law_not_compensated(law: Law, axis_letters: tuple[str, ...]) -> str:
     if law.acts_on == "response":
         return SENSOR_ERROR
     if law.acts_on == "force":
-        return "" if set(law.variables) <= motion_signals else DEPENDS_ON_COMMAND
+        return "" if set(law.variables) <= motion_signals else NOT_OF_MOTION_ALONE
     if any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree)):
         return HAS_MEMORY
     if len(law.variables) != 1 or law.variables[0] not in (f"f{law.axis[-1:]}", law.axis):
-        return SEVERAL_SIGNALS
+        return NOT_OF_OWN_COMMAND_ALONE
     tables = (_tabulate(law, command_range)[1] for command_range in _TESTED_RANGES)
     return "" if any(_is_rising(forces) and (np.diff(forces) > 0).any() for forces in tables) else NOT_INVERTIBLE
 
@@ -86,7 +88,8 @@ def make_single_axis_law(law: Law, axis_letters: tuple[str, ...], axis: int) -> 
     def compute_opposing_force(
         parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip_mps: float
     ) -> FloatArray:
-        """Force (N,) against the law for a sinusoidal position x (N,) and velocity v (N,), over two cycles."""
+        """Compute the force (N,) against the law for a sinusoidal position x (N,) and velocity v (N,), over two
+        cycles."""
         # For a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
         omega_rad_s = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
         zero_motion = np.zeros((len(x), len(axis_letters)))
@@ -100,7 +103,7 @@ def make_single_axis_law(law: Law, axis_letters: tuple[str, ...], axis: int) -> 
 
 
 def compute_linear_share(law: Law, amplitude: float) -> float:
-    """Describing function N(A) of a command map g for the command A sin(p): the gain of the fundamental,
+    """Compute the describing function N(A) of a command map g for the command A sin(p): the gain of the fundamental,
 
         N(A) = 1 / (pi A) integral over 0 to 2 pi of g(A sin p) sin p dp
 
@@ -153,8 +156,8 @@ def _tabulate_to(law: Law, intended_forces: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _tabulate(law: Law, command_range: float) -> tuple[FloatArray, FloatArray]:
-    """(TABLE_SIZE,) each: commands from -command_range to command_range, and the forces into which the map turns
-    them."""
+    """Tabulate commands from -command_range to command_range, and the forces into which the map turns them,
+    (TABLE_SIZE,) each."""
     commands = np.linspace(-command_range, command_range, TABLE_SIZE)
     return commands, evaluate(law, {law.variables[0]: commands}, EVALUATION_RATE_HZ)
 
@@ -165,14 +168,14 @@ def _is_rising(forces: FloatArray) -> bool:
 
 
 def _smooth_signs(law: Law, slip_mps: float) -> Law:
-    """The law with sign(v) replaced by tanh(v / slip_mps) for each velocity v, as in `known_forces`; unchanged where
+    """Replace sign(v) in the law by tanh(v / slip_mps) for each velocity v, as in `known_forces`; unchanged where
     slip_mps is 0."""
     tree = _smooth_node(law.tree, slip_mps)
     return Law(format_formula(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
 
 
 def _smooth_node(node: Node, slip_mps: float) -> Node:
-    """The expression tree with the replacements of `_smooth_signs`."""
+    """Make the replacements of `_smooth_signs` in an expression tree."""
     match node:
         case Apply("sign", (Variable(name) as velocity,)) if name.startswith("v") and slip_mps > 0:
             return Apply("tanh", (Apply("/", (velocity, Number(slip_mps))),))

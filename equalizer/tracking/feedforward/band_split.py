@@ -115,14 +115,14 @@ class LinearPhaseSplit:
         return Bands(low_band, delayed_reference - low_band - high_band, high_band, self.latency_samples)
 
     def compute_response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 3): frequency responses of low, middle and high with the latency removed, which are real up to
-        rounding. frequency_hz: (lines,)."""
+        """Compute the frequency responses of low, middle and high, (lines, 3), with the latency removed: they are real
+        up to rounding. frequency_hz: (lines,)."""
         delay_removal = np.exp(2j * np.pi * np.asarray(frequency_hz) * self.latency_samples / self.sample_rate_hz)
         band_gains = [freqz(taps, worN=frequency_hz, fs=self.sample_rate_hz)[1] for taps in self.filters]
         return np.asarray(np.stack(band_gains, axis=1) * delay_removal[:, None])
 
     def _design_low_pass(self, edge_hz: float) -> FloatArray:
-        """(taps,): impulse response of a low-pass by the window method, with a gain of 1/2 at edge_hz (Hz)."""
+        """Design a low-pass by the window method, with a gain of 1/2 at edge_hz (Hz): impulse response (taps,)."""
         window = ("kaiser", kaiser_beta(STOPBAND_DB))
         taps = firwin(2 * self.latency_samples + 1, edge_hz, window=window, fs=self.sample_rate_hz)
         return np.asarray(taps)
@@ -173,7 +173,7 @@ class CausalSplit:
         return Bands(low_band, below_high_edge - low_band, high_band, 0)
 
     def compute_response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 3): complex gains of low, middle and high; their sum is 1. frequency_hz: (lines,)."""
+        """Compute the complex gains of low, middle and high, (lines, 3); their sum is 1. frequency_hz: (lines,)."""
         zeros = np.zeros(len(frequency_hz), complex)
         high_gain = self._compute_gain_above(self.edges.high_hz, frequency_hz) if self.edges.high_hz else zeros
         low_gain = (
@@ -184,8 +184,8 @@ class CausalSplit:
         return np.asarray(np.stack([low_gain, 1 - low_gain - high_gain, high_gain], axis=1))
 
     def compute_phase_deg(self, frequency_hz: FloatArray) -> FloatArray:
-        """(lines, 3): phase of each band relative to the input in degrees; positive is a lead. frequency_hz:
-        (lines,)."""
+        """Compute the phase of each band relative to the input, (lines, 3), in degrees; positive is a lead.
+        frequency_hz: (lines,)."""
         return np.asarray(np.degrees(np.angle(self.compute_response(frequency_hz))))
 
     @property
@@ -209,7 +209,7 @@ class CausalSplit:
         return band_above
 
     def _compute_gain_above(self, edge_hz: float, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines,): complex gain of `_filter_above`. frequency_hz: (lines,)."""
+        """Compute the complex gain (lines,) of `_filter_above`. frequency_hz: (lines,)."""
         q = freqz(*self.design_one_pole(edge_hz), worN=frequency_hz, fs=self.sample_rate_hz)[1]
         powers = range((self.order + 1) // 2, self.order + 1)
         return np.asarray(
@@ -217,8 +217,8 @@ class CausalSplit:
         )
 
     def design_one_pole(self, edge_hz: float) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator, each (2,), of the first-order low-pass q = 1 / (1 + s / w) by the bilinear
-        transform, with the frequency axis corrected so that its corner is at edge_hz (Hz). Also called by
+        """Design the first-order low-pass q = 1 / (1 + s / w) by the bilinear transform, with the frequency axis
+        corrected so that its corner is at edge_hz (Hz): numerator and denominator, (2,) each. Also called by
         `study.workflows.equalizer.controller.c_source`, which writes the filters as C."""
         warped_corner = np.tan(np.pi * edge_hz / self.sample_rate_hz)
         return np.array([warped_corner, warped_corner]) / (1 + warped_corner), np.array(

@@ -36,9 +36,9 @@ class Inverse:
 def compute_baseline_inverses(
     model: IdentifiedModel, measured_response: FrequencyResponse, frequency_hz: FloatArray
 ) -> tuple[Inverse, ...]:
-    """All baseline inverses from the model and the measured response of one place; the last is that of the identified
-    model. frequency_hz: (lines,), above zero. Raises ValueError where the reliable lines of the measured response do
-    not cover them."""
+    """Compute all baseline inverses from the model and the measured response of one place; the last is that of the
+    identified model. frequency_hz: (lines,), above zero. Raises ValueError where the reliable lines of the measured
+    response do not cover them."""
     return (
         make_identity_inverse(model, frequency_hz),
         make_static_gain_inverse(model, frequency_hz),
@@ -50,13 +50,14 @@ def compute_baseline_inverses(
 
 
 def make_identity_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """No equalization: the reference acceleration in m/s² is commanded as a force in N, axis by axis. Cost 0."""
+    """Make the inverse without equalization: the reference acceleration in m/s² is commanded as a force in N, axis by
+    axis. Cost 0."""
     return Inverse("nothing", _repeat_over_lines(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
 
 
 def make_static_gain_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """A common gain (N per m/s²) for all axes: the inverse of the geometric mean, over lines and axes, of the magnitude
-    of the direct responses (diagonal elements). Cost: one multiplication per axis."""
+    """Make a common gain (N per m/s²) for all axes: the inverse of the geometric mean, over lines and axes, of the
+    magnitude of the direct responses (diagonal elements). Cost: one multiplication per axis."""
     direct_gains = np.abs(np.einsum("lii->li", compute_model_response(model, frequency_hz)))
     static_gain = float(np.exp(-np.log(direct_gains).mean()))
     return Inverse(
@@ -65,17 +66,17 @@ def make_static_gain_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -
 
 
 def make_acceleration_matching_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """Acceleration matching (Kuchenbecker et al. 2006, IEEE Trans. Vis. Comput. Graph. 12:219): the direct response of
-    each axis (diagonal element) is inverted, and coupling between axes is neglected. Cost: a transfer function of the
-    model's order per axis. For as many forces as accelerations."""
+    """Make the inverse of acceleration matching (Kuchenbecker et al. 2006, IEEE Trans. Vis. Comput. Graph. 12:219): the
+    direct response of each axis (diagonal element) is inverted, and coupling between axes is neglected. Cost: a
+    transfer function of the model's order per axis. For as many forces as accelerations."""
     direct_response = np.einsum("lii->li", compute_model_response(model, frequency_hz))
     inverse = np.einsum("li,ij->lij", 1 / direct_response, np.eye(direct_response.shape[1]))
     return Inverse("acceleration matching", inverse, direct_response.shape[1] * (2 * model.order + 1))
 
 
 def fit_rigid_body_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
-    """Rigid-body inverse dynamics, force = M a + B v + K x, with matrices (m, p) fitted by least squares so that the
-    model's response to these forces is the reference acceleration at the given lines. Velocity and position are the
+    """Fit rigid-body inverse dynamics, force = M a + B v + K x, with matrices (m, p) fitted by least squares so that
+    the model's response to these forces is the reference acceleration at the given lines. Velocity and position are the
     accelerations divided by i w and -w²."""
     G = compute_model_response(model, frequency_hz)
     line_count, p, m = G.shape
@@ -100,9 +101,9 @@ def fit_rigid_body_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> 
 def invert_measured_response(
     measured_response: FrequencyResponse, frequency_hz: FloatArray, weight: float = FORCE_WEIGHT
 ) -> Inverse:
-    """Regularised inverse of the measured response, interpolated linearly between its reliable lines. weight: of
-    |force|², (m/s² per N)². Cost: FIR filters whose length in seconds is the inverse of the smallest line spacing.
-    Raises ValueError for frequencies outside the reliable lines, or without any."""
+    """Compute the regularised inverse of the measured response, interpolated linearly between its reliable lines.
+    weight: of |force|², (m/s² per N)². Cost: FIR filters whose length in seconds is the inverse of the smallest line
+    spacing. Raises ValueError for frequencies outside the reliable lines, or for fewer than two such lines."""
     reliable_response = measured_response.select_lines(measured_response.reliable)
     lowest_hz, highest_hz = (
         (reliable_response.frequency_hz[0], reliable_response.frequency_hz[-1])
@@ -112,7 +113,7 @@ def invert_measured_response(
     if not len(reliable_response) or frequency_hz.min() < lowest_hz or frequency_hz.max() > highest_hz:
         raise ValueError(
             f"the measured response has reliable lines from {lowest_hz:g} to {highest_hz:g} Hz, "
-            f"but {frequency_hz.min():g} to {frequency_hz.max():g} Hz is wanted"
+            f"but {frequency_hz.min():g} to {frequency_hz.max():g} Hz is required"
         )
     p, m = reliable_response.response.shape[1:]
     entries = [
@@ -125,13 +126,13 @@ def invert_measured_response(
 
 
 def make_identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = FORCE_WEIGHT) -> Inverse:
-    """Regularised inverse of the identified model. weight: of |force|², (m/s² per N)². Cost: state update and stored
-    gains, with a full state matrix; less in modal form."""
+    """Make the regularised inverse of the identified model. weight: of |force|², (m/s² per N)². Cost: state update and
+    stored gains, with a full state matrix; less in modal form."""
     m, p = model.D.shape[1], model.D.shape[0]
     multiply_adds = model.order**2 + 2 * model.order * m + m * p
     return Inverse("identified model", compute_regularised_inverse(model, frequency_hz, weight), multiply_adds)
 
 
 def _repeat_over_lines(matrix: FloatArray, frequency_hz: FloatArray) -> ComplexArray:
-    """(lines, m, p): the same matrix at every line."""
+    """Repeat the same matrix (m, p) at every line: (lines, m, p)."""
     return np.broadcast_to(matrix.astype(complex), (len(frequency_hz), *matrix.shape)).copy()

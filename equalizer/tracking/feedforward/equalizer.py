@@ -24,13 +24,14 @@ class Equalizer(Protocol):
         ...
 
     def compute_loop_commands(self, reference: Signal) -> Signal:
-        """One loop (samples, channels) of the command for one loop (samples, channels) of the reference signal. Both
-        loops are a whole number of periods long and are repeated."""
+        """Compute one loop (N, channels) of the command for one loop (N, channels) of the reference signal. Both loops
+        are a whole number of periods long and are repeated."""
         ...
 
     def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> Signal | None:
-        """The command (ticks, channels) from rest into the loop, while the reference signal (one loop) is multiplied by
-        `envelope` (ticks,), which rises from 0 to 1. None: the loop's command times the envelope is to be used."""
+        """Compute the command (ticks, channels) from rest into the loop, while the reference signal (one loop) is
+        multiplied by `envelope` (ticks,), which rises from 0 to 1. None: the loop's command times the envelope is to be
+        used."""
         ...
 
 
@@ -41,7 +42,7 @@ class IdentityEqualizer:
     reference_quantity = "force"
 
     def compute_loop_commands(self, reference: Signal) -> Signal:
-        """The reference force itself. Raises ValueError for another quantity than force."""
+        """Return the reference force itself. Raises ValueError for another quantity than force."""
         if reference.quantity != "force":
             raise ValueError(f"without an equalizer only a force can be played, not {reference.quantity}; give a model")
         return reference

@@ -77,12 +77,12 @@ class Feedforward(SummaryDisplay):
         """Summarise length, predicted error, share that is not played, and largest force of a single axis."""
         largest_component_n = float(np.abs(self.forces.samples).max(initial=0.0))
         return Summary(
-            "Forces for wanted accelerations",
+            "Forces for a reference acceleration",
             (
                 ("length", f"{len(self.reference)} samples at {self.forces.sample_rate_hz:g} Hz"),
                 ("predicted error in the band", f"{100 * self.error:.3g} %"),
                 ("outside the band, not played", f"{100 * self.out_of_band_share:.3g} %"),
-                ("highest force", f"{largest_component_n:.3g} N"),
+                ("largest force of an axis", f"{largest_component_n:.3g} N"),
             ),
         )
 
@@ -104,7 +104,7 @@ def compute_feedforward_forces(
     if not np.linalg.norm(in_band_reference) > LEAKAGE_SHARE * np.linalg.norm(reference.samples):
         low_hz, high_hz = model.band_hz
         raise TrackingError(
-            f"nothing is wanted between {low_hz:g} and {high_hz:g} Hz, the model's band; "
+            f"the reference has no content from {low_hz:g} to {high_hz:g} Hz, the model's band; "
             "give a trajectory within it, or a model of its band"
         )
     forces, loss = solve_causally(tracking_problem, in_band_reference, settings)

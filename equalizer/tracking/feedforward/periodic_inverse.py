@@ -77,8 +77,8 @@ def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
     if outside_hz:
         listed_hz = ", ".join(f"{line_hz:g}" for line_hz in outside_hz[:5]) + (" ..." if len(outside_hz) > 5 else "")
         raise OutsideBandError(
-            f"the model was made for {low_hz:g} to {high_hz:g} Hz, but {listed_hz} Hz is wanted; identify a model of a "
-            "wider band (hapteq identify --band)"
+            f"the model was made for {low_hz:g} to {high_hz:g} Hz, but the signal has content at {listed_hz} Hz; "
+            "identify a model of a wider band (hapteq identify --band)"
         )
 
 
@@ -88,11 +88,16 @@ def check_reference(model: IdentifiedModel, reference: Signal) -> None:
     if reference.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
             f"the model runs at {model.sample_rate_hz:g} Hz, not at {reference.sample_rate_hz:g} Hz; "
-            "resample what is wanted"
+            "resample the reference"
         )
     output_count = model.C.shape[0]
     if reference.samples.shape[1] != output_count:
-        raise ValueError(f"the model has {output_count} outputs, but {reference.samples.shape[1]} are wanted")
+        raise ValueError(
+            f"the model has {output_count} outputs, but the reference has {reference.samples.shape[1]} channels"
+        )
     units = set(reference.units)
     if units != set([model.output_unit] if isinstance(model.output_unit, str) else model.output_unit):
-        raise ValueError(f"the model answers in {model.output_unit}, but {', '.join(sorted(units))} is wanted")
+        raise ValueError(
+            f"the model answers in {model.output_unit}, but the reference is in {', '.join(sorted(units))}; both must "
+            "agree"
+        )

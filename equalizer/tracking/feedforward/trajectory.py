@@ -139,8 +139,8 @@ def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
 
 
 def _find_rate_hz(time_s: FloatArray) -> float:
-    """Sample rate (Hz) of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises TableError
-    for times that do not increase and for steps that are not constant within `STEP_TOLERANCE`."""
+    """Find the sample rate (Hz) of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises
+    TableError for times that do not increase and for steps that are not constant within `STEP_TOLERANCE`."""
     steps_s = np.diff(time_s)
     mean_step_s = float(time_s[-1] - time_s[0]) / len(steps_s)
     if mean_step_s <= 0 or (steps_s <= 0).any():

@@ -42,12 +42,12 @@ class Verdict(Enum):
 
     CONTINUE = "play the forces and measure"
     AT_FLOOR = "the residual cannot be distinguished from the measured noise"
-    DIVERGING = "each correction made it worse; the best forces so far are kept"
+    DIVERGING = "the residual grew to more than twice the smallest; the best forces so far are kept"
     BEST_KEPT = "further corrections gain nothing; the best forces so far are kept"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Repetition:
+class IterationSettings:
     """Settings of an iteration, the same for all repeats."""
 
     reference: FloatArray
@@ -71,7 +71,7 @@ class Repetition:
     after the motion static friction may hold the handle, and no reasonable force moves it exactly."""
 
     def compute_residual(self, error: FloatArray) -> float:
-        """Root mean square of the error (N, p) over the judged rows and all channels, in the unit of `reference`."""
+        """Compute the rms of the error (N, p) over the judged rows and all channels, in the unit of `reference`."""
         start, stop = self.judged_rows or (0, len(error))
         return rms(error[start:stop])
 
@@ -81,7 +81,7 @@ class Repetition:
         return self.compute_residual(self.extract_band(self.reference))
 
     def extract_band(self, samples: FloatArray) -> FloatArray:
-        """Part of samples (N, channels) within the band; samples begin and end at rest, or are noise."""
+        """Extract the part of samples (N, channels) within the band; samples begin and end at rest, or are noise."""
         return filter_to_band(samples, self.sample_rate_hz, self.band_hz)
 
     @property
@@ -92,8 +92,9 @@ class Repetition:
         return float(2 * (high_hz - low_hz) * (stop - start) * self.reference.shape[1] / self.sample_rate_hz)
 
     def find_allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
-        """Largest factor on the correction, up to 1, with which forces plus correction obey cap and slew limit. Both
-        (N, m) in N. The slew limit includes the steps from zero to the first row and from the last row to zero."""
+        """Find the largest factor on the correction, up to 1, with which forces plus correction obey cap and slew
+        limit. Both (N, m) in N. The slew limit includes the steps from zero to the first row and from the last row to
+        zero."""
         share = 1.0 if self.cap_n is None else find_largest_share(forces, correction, self.cap_n)
         if self.slew_n_per_s is None:
             return share
@@ -115,18 +116,18 @@ class Repetition:
 class IterationState:
     """State of iterative learning control between two plays: made by `start_iteration`, advanced by `update_forces`."""
 
-    repetition: Repetition
+    settings: IterationSettings
     forces: FloatArray
     """(N, m): forces (N) to play next; the best forces once the verdict is not CONTINUE."""
     verdict: Verdict
     best_forces: FloatArray
     """(N, m): forces (N) with the smallest residual so far."""
     best_residual: float
-    """Residual of the best forces, rms, in the unit of `Repetition.reference`; infinite before the first."""
+    """Residual of the best forces, rms, in the unit of `IterationSettings.reference`; infinite before the first."""
     best_error: FloatArray
     """(N, p): error signal in the band after the best forces, noise included; zeros before the first."""
     noise_floor: float | None
-    """As `Repetition.noise_floor`; None until it is known."""
+    """As `IterationSettings.noise_floor`; None until it is known."""
     residuals: tuple[float, ...] = ()
     """Residual of each play, rms of reference minus measured motion in the band, noise included. Two plays that are
     averaged count as one."""
@@ -141,8 +142,8 @@ class IterationState:
 
     @property
     def errors(self) -> tuple[float, ...]:
-        """Residuals relative to the rms of the reference motion in the band (`Repetition.level`)."""
-        return tuple(residual / self.repetition.level for residual in self.residuals)
+        """Residuals relative to the rms of the reference motion in the band (`IterationSettings.level`)."""
+        return tuple(residual / self.settings.level for residual in self.residuals)
 
     @property
     def remark(self) -> str:
@@ -152,32 +153,30 @@ class IterationState:
             return ""
         return (
             f"{sum(scale < 1 for scale in self.scales)} of {len(self.scales)} corrections were scaled down, one to "
-            f"{lowest_scale:.0%}, to keep {self.repetition.limits}"
+            f"{lowest_scale:.0%}, to keep {self.settings.limits}"
         )
 
 
-def start_iteration(repetition: Repetition, initial_forces: FloatArray | None = None) -> IterationState:
+def start_iteration(settings: IterationSettings, initial_forces: FloatArray | None = None) -> IterationState:
     """Make the state before the first play. initial_forces: (N, m), N; None = the model's inverse of the reference
     motion. Raises ValueError where the initial forces exceed the cap, or the reference motion has no part in the
     band."""
-    if repetition.level == 0:
-        low_hz, high_hz = repetition.band_hz
+    if settings.level == 0:
+        low_hz, high_hz = settings.band_hz
         raise ValueError(
-            f"the wanted trajectory has no content in the band of {low_hz:g} to {high_hz:g} Hz; "
+            f"the reference trajectory has no content in the band of {low_hz:g} to {high_hz:g} Hz; "
             "give a trajectory within it"
         )
     forces = (
-        repetition.invert(repetition.reference)
-        if initial_forces is None
-        else np.asarray(initial_forces, dtype=np.float64)
+        settings.invert(settings.reference) if initial_forces is None else np.asarray(initial_forces, dtype=np.float64)
     )
     peak_n = float(np.linalg.norm(forces, axis=1).max())
-    if repetition.cap_n is not None and peak_n > repetition.cap_n:
+    if settings.cap_n is not None and peak_n > settings.cap_n:
         raise ValueError(
-            f"the first forces reach {peak_n:.4g} N, but the cap is {repetition.cap_n:g} N; scale the trajectory"
+            f"the first forces reach {peak_n:.4g} N, but the cap is {settings.cap_n:g} N; scale the trajectory"
         )
-    no_error = np.zeros_like(repetition.reference)
-    return IterationState(repetition, forces, Verdict.CONTINUE, forces, np.inf, no_error, repetition.noise_floor)
+    no_error = np.zeros_like(settings.reference)
+    return IterationState(settings, forces, Verdict.CONTINUE, forces, np.inf, no_error, settings.noise_floor)
 
 
 def update_forces(state: IterationState, measured: FloatArray) -> IterationState:
@@ -185,41 +184,41 @@ def update_forces(state: IterationState, measured: FloatArray) -> IterationState
     response to `state.forces`. Without a known noise floor the first call leaves the forces unchanged, because the same
     forces have to be played twice. Raises ValueError for another shape, for values that are not finite, and where the
     verdict was to stop."""
-    repetition = state.repetition
+    settings = state.settings
     if state.verdict is not Verdict.CONTINUE:
         raise ValueError(f"this iteration is over: {state.verdict.value}")
-    if np.shape(measured) != repetition.reference.shape or not np.isfinite(measured).all():
+    if np.shape(measured) != settings.reference.shape or not np.isfinite(measured).all():
         raise ValueError(
-            f"what was measured has shape {np.shape(measured)} or values that are not finite numbers; it must be "
-            f"{repetition.reference.shape}"
+            f"the measured motion has shape {np.shape(measured)} or values that are not finite numbers; its shape must "
+            f"be {settings.reference.shape}"
         )
     if state.noise_floor is not None:
         return _judge_measurement(state, measured, state.noise_floor, play_count=1)
     if state.first_measured is None:
         return replace(state, first_measured=measured)
-    play_noise = estimate_repeat_noise(np.stack([state.first_measured, measured]), repetition)
+    play_noise = estimate_repeat_noise(np.stack([state.first_measured, measured]), settings)
     mean_measured = (state.first_measured + measured) / 2
     return _judge_measurement(
         replace(state, noise_floor=play_noise, first_measured=None), mean_measured, play_noise, play_count=2
     )
 
 
-def estimate_repeat_noise(measured: FloatArray, repetition: Repetition) -> float:
+def estimate_repeat_noise(measured: FloatArray, settings: IterationSettings) -> float:
     """Estimate the noise of a single play: rms in the band of the deviations from the mean of several plays of the same
     forces (sample standard deviation). measured: (plays, N, p), at least two plays."""
     deviations = measured - measured.mean(axis=0)
-    sum_of_squares = sum(float(np.sum(repetition.extract_band(deviation) ** 2)) for deviation in deviations)
+    sum_of_squares = sum(float(np.sum(settings.extract_band(deviation) ** 2)) for deviation in deviations)
     return float(np.sqrt(sum_of_squares / ((len(measured) - 1) * measured[0].size)))
 
 
-def estimate_rest_noise(rest_record: FloatArray, repetition: Repetition) -> float:
+def estimate_rest_noise(rest_record: FloatArray, settings: IterationSettings) -> float:
     """Estimate the noise of a play: rms in the band of a record (n, p) during which no force was commanded; the mean is
     removed first."""
-    return rms(repetition.extract_band(rest_record - rest_record.mean(axis=0)))
+    return rms(settings.extract_band(rest_record - rest_record.mean(axis=0)))
 
 
 def rms(samples: FloatArray) -> float:
-    """Root mean square over all entries, in their unit."""
+    """Compute the root mean square over all entries, in their unit."""
     return float(np.sqrt(np.mean(samples**2)))
 
 
@@ -228,9 +227,9 @@ def _judge_measurement(
 ) -> IterationState:
     """Decide after a measurement, the mean of `play_count` plays, whether to stop or to correct the forces. play_noise:
     noise floor of a single play, rms in the band."""
-    repetition = state.repetition
-    error = repetition.extract_band(repetition.reference - measured)
-    residual, mean_noise = repetition.compute_residual(error), play_noise / np.sqrt(play_count)
+    settings = state.settings
+    error = settings.extract_band(settings.reference - measured)
+    residual, mean_noise = settings.compute_residual(error), play_noise / np.sqrt(play_count)
     setbacks = state.setbacks + (residual > state.residuals[-1] if state.residuals else 0)
     state = replace(state, residuals=(*state.residuals, residual), setbacks=setbacks)
     is_diverging = residual > DIVERGENCE_RATIO * state.best_residual
@@ -241,31 +240,31 @@ def _judge_measurement(
         base_forces, error_to_correct = state.best_forces, state.best_error
     # Residual and noise power are both measured, each with the relative variance 2 / (degrees of freedom); the ratio
     # of both then has the relative standard deviation sqrt(4 / (degrees of freedom)).
-    noise_limit = mean_noise * np.sqrt(1 + SIGNIFICANCE_SIGMA * np.sqrt(4 / repetition.degrees_of_freedom))
+    noise_limit = mean_noise * np.sqrt(1 + SIGNIFICANCE_SIGMA * np.sqrt(4 / settings.degrees_of_freedom))
     if residual <= noise_limit:
         return _finish(state, Verdict.AT_FLOOR)
     if is_diverging:
         return _finish(state, Verdict.DIVERGING)
-    signal_share = max(0.0, 1 - (mean_noise / repetition.compute_residual(error_to_correct)) ** 2)
-    gain = min(repetition.first_gain / (1 + setbacks), signal_share)
+    signal_share = max(0.0, 1 - (mean_noise / settings.compute_residual(error_to_correct)) ** 2)
+    gain = min(settings.first_gain / (1 + setbacks), signal_share)
     if gain < LOWEST_GAIN:
         return _finish(state, Verdict.BEST_KEPT)
     return _correct_forces(state, base_forces, error_to_correct, gain)
 
 
 def _finish(state: IterationState, verdict: Verdict) -> IterationState:
-    """Final state, with the best forces and the reason to stop."""
+    """End the iteration: returns the state with the best forces and the reason to stop."""
     return replace(state, forces=state.best_forces, verdict=verdict)
 
 
 def _correct_forces(
     state: IterationState, base_forces: FloatArray, error_to_correct: FloatArray, gain: float
 ) -> IterationState:
-    """State with the forces `base_forces` (N, m) corrected for the error `error_to_correct` (N, p); final where cap or
-    slew limit leave less than LOWEST_GAIN of the correction."""
-    repetition = state.repetition
-    correction = gain * fade_ends(repetition.invert(error_to_correct), repetition.sample_rate_hz)
-    scale = repetition.find_allowed_share(base_forces, correction)
+    """Correct the forces `base_forces` (N, m) for the error `error_to_correct` (N, p): returns the next state, final
+    where cap or slew limit leave less than LOWEST_GAIN of the correction."""
+    settings = state.settings
+    correction = gain * fade_ends(settings.invert(error_to_correct), settings.sample_rate_hz)
+    scale = settings.find_allowed_share(base_forces, correction)
     if scale < LOWEST_GAIN:
         return _finish(state, Verdict.BEST_KEPT)
     return replace(

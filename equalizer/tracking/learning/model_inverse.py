@@ -43,7 +43,7 @@ def compensate_spring(
         return invert
 
     def compute_commands(reference: FloatArray) -> FloatArray:
-        """Commands (N, m), N, for reference accelerations (N, p), m/s²."""
+        """Compute the commands (N, m), N, for reference accelerations (N, p), m/s²."""
         motion = integrate_motion(reference, sample_rate_hz, band_hz)
         spring_force = spring.stiffness_n_per_m * motion.position + spring.damping_n_s_per_m * motion.velocity
         return np.asarray(invert(reference) + spring_force)

@@ -58,32 +58,33 @@ class TurningResult:
 
 
 def make_rotatable_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
-    """Transient of a trajectory (N, p), m/s², before rotation. gains: for N rows, with a free end or rest as final
-    state. Raises TrackingError for another shape."""
+    """Make the transient of a trajectory (N, p), m/s², before rotation. gains: for N rows, with a free end or rest as
+    final state. Raises TrackingError for another shape."""
     p = gains.problem.outputs
     return _make_transient(gains, make_axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def make_normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
-    """Transient of a recording (N,), m/s², to be played along a normal (a unit vector per tick). Raises TrackingError
-    for another shape."""
+    """Make the transient of a recording (N,), m/s², to be played along a normal (a unit vector per tick). Raises
+    TrackingError for another shape."""
     p = gains.problem.outputs
     return _make_transient(gains, make_axis_recordings(recording, p), (p,))
 
 
 def make_initial_state(transient: TurningTransient) -> LiveState:
-    """State at the first row, with the model at rest."""
+    """Make the state at the first row, with the model at rest."""
     return LiveState(0, np.zeros(transient.problem.order))
 
 
 def restart(state: LiveState) -> LiveState:
-    """State at the first row of a new transient, from the present state of the model: the free decay of the former
-    transient is compensated."""
+    """Make the state at the first row of a new transient, from the present state of the model: the free decay of the
+    former transient is compensated."""
     return LiveState(0, state.x)
 
 
 def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -> tuple[FloatArray, LiveState]:
-    """Force (m,), N, of this tick, and the next state. After the last row the force is zero. direction: (p, p) or (p,).
+    """Compute the force (m,), N, of this tick, and the next state. After the last row the force is zero. direction: (p,
+    p) or (p,).
 
     Raises TrackingError for another shape of the direction.
     """
@@ -122,6 +123,6 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
 
 
 def _make_transient(gains: StoredGains, references: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
-    """Transient from trajectories (c, N, p), one per element of the direction."""
+    """Make a transient from trajectories (c, N, p), one per element of the direction."""
     g = np.stack([compute_costate_feedforward(gains, reference) for reference in references], axis=2)
     return TurningTransient(gains.problem, gains.gains.K, copy_read_only(g), direction_shape)

@@ -85,19 +85,19 @@ class _CappedProblem:
     cap_n: float
 
     def project(self, forces: FloatArray) -> FloatArray:
-        """(N, m): projection of forces on those allowed under the cap, row by row."""
+        """Project forces (N, m) on those allowed under the cap, row by row."""
         return project_to_cap(forces + self.fixed_forces, self.cap_n) - self.fixed_forces
 
     def compute_cost(self, forces: FloatArray) -> float:
-        """Value of the quadratic cost for forces (N, m) from rest."""
+        """Compute the quadratic cost of forces (N, m) from rest."""
         outputs = _simulate_outputs(self.problem, forces)
         outputs[:, : self.problem.outputs] -= self.reference
         cost = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
         return float(cost)
 
     def compute_lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
-        """Lower bound of the optimal cost, the dual function: cost(u) + λ·u - sum_k (cap |λ_k| - λ_k·f_k), with the
-        fixed forces f. forces: u, which minimises cost(u) + λ·u without a cap; multipliers: λ, (N, m)."""
+        """Compute the lower bound of the optimal cost, the dual function: cost(u) + λ·u - sum_k (cap |λ_k| - λ_k·f_k),
+        with the fixed forces f. forces: u, which minimises cost(u) + λ·u without a cap; multipliers: λ, (N, m)."""
         support = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.fixed_forces).sum()
         return self.compute_cost(forces) + float((multipliers * forces).sum() - support)
 
@@ -168,14 +168,14 @@ def _alternate_directions(
             gains = _compute_penalised_gains(capped_problem.problem, len(capped_problem.reference), penalty)
     raise TrackingError(
         f"after {settings.rounds} rounds the forces under the cap of {capped_problem.cap_n:g} N are only known to be "
-        f"within {gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
+        f"within {gap:.2g} of the best cost; scale the reference down, or allow a larger gap than {settings.gap:g}"
     )
 
 
 def _compute_penalty_factor(primal_residual: FloatArray, dual_residual: FloatArray) -> float:
-    """Factor on the penalty that balances the primal residual u - z and the dual residual, the change of z (Boyd et
-    al., section 3.4.1): the square root of their ratio, limited to 0.2 to 5, and 1 for a ratio between 1/3 and 3. The
-    limits are chosen."""
+    """Compute the factor on the penalty that balances the primal residual u - z and the dual residual, the change of z
+    (Boyd et al., section 3.4.1): the square root of their ratio, limited to 0.2 to 5, and 1 for a ratio between 1/3 and
+    3. The limits are chosen."""
     ratio = float(
         np.linalg.norm(primal_residual) / max(float(np.linalg.norm(dual_residual)), np.finfo(np.float64).tiny)
     )
@@ -183,15 +183,15 @@ def _compute_penalty_factor(primal_residual: FloatArray, dual_residual: FloatArr
 
 
 def _choose_initial_penalty(problem: TrackingProblem) -> float:
-    """Initial penalty: geometric mean of the smallest force weight and the cost's curvature in the force of one tick,
-    with lower limits of 1e-6 and 1 (chosen), so that it is above zero."""
+    """Choose the initial penalty: geometric mean of the smallest force weight and the cost's curvature in the force of
+    one tick, with lower limits of 1e-6 and 1 (chosen), so that it is above zero."""
     curvature = problem.stage_cost[problem.order :, problem.order :]
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
 
 def _compute_penalised_gains(problem: TrackingProblem, samples: int, penalty: float) -> StoredGains:
-    """Gains of the problem with the additional cost penalty |u - w|²: the forces are further tracked outputs, and w is
-    their reference."""
+    """Compute the gains of the problem with the additional cost penalty |u - w|²: the forces are further tracked
+    outputs, and w is their reference."""
     p, m = problem.outputs, problem.inputs
     C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)
     D = np.insert(problem.D, [p] * m, np.eye(m), axis=0)
@@ -200,7 +200,7 @@ def _compute_penalised_gains(problem: TrackingProblem, samples: int, penalty: fl
 
 
 def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, q): response of all q outputs, the p tracked outputs first, to forces (N, m) from rest."""
+    """Simulate all q outputs, (N, q), the p tracked outputs first, under forces (N, m) from rest."""
     outputs, forces_out = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
     all_outputs_step = replace(problem, outputs=problem.C.shape[0]).step
     no_gain = np.zeros((len(forces), problem.inputs, problem.order))
@@ -211,12 +211,12 @@ def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArra
 def _make_result(
     capped_problem: _CappedProblem, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
 ) -> CappedForces:
-    """Result for `forces` (N, m), with the loss against the forces `unconstrained` (N, m). gap, rounds: as in
+    """Make the result for `forces` (N, m), with the loss against the forces `unconstrained` (N, m). gap, rounds: as in
     `TrackingLoss`."""
     p, reference_norm = capped_problem.problem.outputs, float(np.linalg.norm(capped_problem.reference)) or 1.0
 
     def compute_error(tested_forces: FloatArray) -> float:
-        """Relative rms tracking error of forces (N, m); the absolute norm for a reference of zeros."""
+        """Compute the relative rms tracking error of forces (N, m); the absolute norm for a reference of zeros."""
         return (
             float(
                 np.linalg.norm(

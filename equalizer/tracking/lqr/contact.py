@@ -24,7 +24,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CausalStart:
+class ContactSolutions:
     """Stored solutions of a transient for every contact normal. Made by `prepare_causal_start`."""
 
     basis: RotationBasis
@@ -37,12 +37,12 @@ class CausalStart:
     """(p, p): S for forces that may begin before the contact."""
 
     def compute_error(self, normal: FloatArray) -> float:
-        """Relative error of the predicted acceleration in the model's band. normal: (p,), scaled to unit length here.
-        Raises TrackingError for another shape, for zero and for values that are not finite."""
+        """Compute the relative error of the predicted acceleration in the model's band. normal: (p,), scaled to unit
+        length here. Raises TrackingError for another shape, for zero and for values that are not finite."""
         return _compute_relative_error(self.deviation, normal)
 
     def compute_early_error(self, normal: FloatArray) -> float:
-        """Relative error if forces were allowed to begin before the contact. Argument and exceptions as for
+        """Compute the relative error if forces were allowed to begin before the contact. Argument and exceptions as for
         `compute_error`."""
         return _compute_relative_error(self.early_deviation, normal)
 
@@ -54,7 +54,7 @@ class CausalStart:
 
 def prepare_causal_start(
     problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None
-) -> CausalStart:
+) -> ContactSolutions:
     """Prepare a recording (N,), the acceleration (m/s²) along the normal from the contact on, at the problem's sample
     rate. padding: `after_s` is the time after the recording in which the device comes to rest; `before_s` is used only
     for `early_deviation`. None = 0.3 s each.
@@ -68,7 +68,7 @@ def prepare_causal_start(
     gains = compute_stored_gains(problem, len(padded_recording))
     basis = compute_normal_basis(gains, padded_recording)
     deviation = _compute_deviation(problem, basis, padded_recording)
-    return CausalStart(
+    return ContactSolutions(
         basis,
         make_normal_transient(gains, padded_recording),
         deviation,
@@ -77,8 +77,8 @@ def prepare_causal_start(
 
 
 def _compute_early_deviation(problem: TrackingProblem, recording: FloatArray, padding: Padding) -> FloatArray:
-    """(p, p): S with zeros before the transient, during which forces may begin. recording: (N,), with its rows of rest
-    after the transient."""
+    """Compute S, (p, p), with zeros before the transient, during which forces may begin. recording: (N,), with its rows
+    of rest after the transient."""
     rows_before, _ = padding.count_rows(problem.sample_rate_hz)
     padded_recording = np.pad(recording, (rows_before, 0))
     return _compute_deviation(
@@ -89,13 +89,13 @@ def _compute_early_deviation(problem: TrackingProblem, recording: FloatArray, pa
 
 
 def _compute_deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:
-    """(p, p): S of the module docstring. recording: (N,), with its padding. Raises TrackingError where it has no
-    content in the band."""
+    """Compute S of the module docstring, (p, p). recording: (N,), with its padding. Raises TrackingError where it has
+    no content in the band."""
     p, rate_hz, band_hz = problem.outputs, problem.sample_rate_hz, problem.band_hz
     recording_norm = float(np.linalg.norm(compute_band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
     if not recording_norm > 0:
         raise TrackingError(
-            f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
+            f"the recording has no content from {band_hz[0]:g} to {band_hz[1]:g} Hz, the model's band; "
             "give a transient with content there"
         )
     references = make_axis_recordings(recording, p)
@@ -107,7 +107,7 @@ def _compute_deviation(problem: TrackingProblem, basis: RotationBasis, recording
 
 
 def _compute_relative_error(deviation: FloatArray, normal: FloatArray) -> float:
-    """sqrt(n' S n) for the normal scaled to unit length; a value below zero by rounding counts as zero. Raises
+    """Compute sqrt(n' S n) for the normal scaled to unit length; a value below zero by rounding counts as zero. Raises
     TrackingError for another shape, for zero and for values that are not finite."""
     normal_vector = np.asarray(normal, dtype=np.float64)
     normal_length = float(np.linalg.norm(normal_vector))

@@ -63,9 +63,9 @@ class TrackResult:
 def compute_stored_gains(
     problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None
 ) -> StoredGains:
-    """Gains of `samples` steps by the Riccati recursion, in the compiled kernel unless rounding errors forbid it.
-    terminal_weight: P_N, (n, n), weight of x_N - x_f; None = free final state. Raises TrackingError for less than one
-    sample, an invalid terminal weight, and a force without effect on the cost."""
+    """Compute the gains of `samples` steps by the Riccati recursion, in the compiled kernel unless rounding errors
+    forbid it. terminal_weight: P_N, (n, n), weight of x_N - x_f; None = free final state. Raises TrackingError for less
+    than one sample, an invalid terminal weight, and a force without effect on the cost."""
     if samples < 1:
         raise TrackingError(f"a horizon has {samples} samples; it needs one or more")
     n, m = problem.order, problem.inputs
@@ -92,7 +92,7 @@ def track(
 def compute_costate_feedforward(
     gains: StoredGains, reference: FloatArray, final_state: FloatArray | None = None
 ) -> FloatArray:
-    """(N, m), N: g of u = g - K x, the feedforward from the remaining trajectory. Linear in `reference` and
+    """Compute g of u = g - K x, (N, m), N: the feedforward from the remaining trajectory. Linear in `reference` and
     `final_state`. Raises TrackingError as `track`. Also called by `changing_direction`."""
     problem = gains.problem
     r = require_trajectory(problem, reference)
@@ -107,9 +107,9 @@ def compute_costate_feedforward(
 
 
 def compute_periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(n,): state at the first row of forces (T, m), N, that repeat with period T, in the steady state. A fade-in that
-    ends in this state continues into the periodic forces without a transient (`feedforward.model_equalizer`). Raises
-    TrackingError for an unstable model."""
+    """Compute the state (n,) at the first row of forces (T, m), N, that repeat with period T, in the steady state. A
+    fade-in that ends in this state continues into the periodic forces without a transient
+    (`feedforward.model_equalizer`). Raises TrackingError for an unstable model."""
     _require_stable(problem, "repeated forces lead to no periodic state")
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):
@@ -119,10 +119,10 @@ def compute_periodic_state(problem: TrackingProblem, forces: FloatArray) -> Floa
 
 
 def compute_free_decay_weight(problem: TrackingProblem) -> FloatArray:
-    """(n, n): terminal weight P_N that includes the free decay after the end, the observability Gramian of A and Q½ C.
-    A final state that differs by d from the intended state causes, with the intended forces from then on (zero after a
-    transient, periodic after a fade-in), output errors with the cost d' P_N d. Raises TrackingError for an unstable
-    model."""
+    """Compute the terminal weight P_N, (n, n), that includes the free decay after the end, the observability Gramian of
+    A and Q½ C. A final state that differs by d from the intended state causes, with the intended forces from then on
+    (zero after a transient, periodic after a fade-in), output errors with the cost d' P_N d. Raises TrackingError for
+    an unstable model."""
     _require_stable(problem, "the motion after the end does not decay")
     return np.asarray(solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C))
 

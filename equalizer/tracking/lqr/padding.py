@@ -97,7 +97,7 @@ def compute_band_error(
     )
     if not np.abs(reference_spectrum).max(initial=0.0) > 0:
         raise TrackingError(
-            f"nothing is wanted between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
+            f"the reference has no content from {band_hz[0]:g} to {band_hz[1]:g} Hz, the model's band; "
             "give a trajectory within it, or a model of its band"
         )
     return float(np.linalg.norm(error_spectrum) / np.linalg.norm(reference_spectrum))

@@ -85,8 +85,8 @@ def track_stream(tracker: PreviewTracker, reference: FloatArray, x0: FloatArray 
 
 
 def compute_preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
-    """Loss of a limited preview, from exact frequency responses over the model's band, without a simulation. Raises
-    what `make_preview_tracker` raises."""
+    """Compute the loss of a limited preview, from exact frequency responses over the model's band, without a
+    simulation. Raises what `make_preview_tracker` raises."""
     tracker = make_preview_tracker(problem, preview_samples)
     low_hz, high_hz = problem.band_hz
     lines_hz = np.linspace(low_hz, high_hz, max(2, round((high_hz - low_hz) / LINE_SPACING_HZ) + 1))
@@ -107,8 +107,8 @@ def _close_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, Fl
 
 
 def _compute_closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
-    """(lines, p, m): response of the tracked outputs to forces that are added to -K x. z: (lines,), points of the unit
-    circle."""
+    """Compute the response (lines, p, m) of the tracked outputs to forces that are added to -K x. z: (lines,), points
+    of the unit circle."""
     n, p = problem.order, problem.outputs
     closed_loop = problem.A - problem.B @ K
     state = np.linalg.solve(
@@ -118,8 +118,8 @@ def _compute_closed_response(problem: TrackingProblem, K: FloatArray, z: Complex
 
 
 def _compute_full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
-    """(lines, m, p): frequency response of the feedforward with unlimited preview; the sum over all future samples is a
-    geometric series. z: (lines,), points of the unit circle."""
+    """Compute the frequency response (lines, m, p) of the feedforward with unlimited preview; the sum over all future
+    samples is a geometric series. z: (lines,), points of the unit circle."""
     gains = compute_stationary_gains(problem)
     closed_loop, costate_factor = _close_loop(problem, gains.K[0])
     advance = z[:, np.newaxis, np.newaxis]

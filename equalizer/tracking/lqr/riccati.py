@@ -64,8 +64,8 @@ class Gains:
 
 
 def compute_backward_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> Gains:
-    """Gains for `samples` steps by the square-root recursion. terminal_weight: P_N, (n, n), weight of x_N - x_f; None =
-    free final state.
+    """Compute the gains of `samples` steps by the square-root recursion. terminal_weight: P_N, (n, n), weight of x_N -
+    x_f; None = free final state.
 
     Raises TrackingError where a force, or a combination of forces, has no effect on the cost, and for an invalid
     terminal weight.
@@ -92,8 +92,9 @@ def compute_backward_gains(problem: TrackingProblem, samples: int, terminal_weig
 
 
 def compute_stationary_gains(problem: TrackingProblem) -> Gains:
-    """Gains of the infinite horizon as a single step (N = 1), by the discrete algebraic Riccati equation. Raises
-    TrackingError where it has no stabilising solution, or a further step of the recursion changes the solution."""
+    """Compute the gains of the infinite horizon as a single step (N = 1), by the discrete algebraic Riccati equation.
+    Raises TrackingError where it has no stabilising solution, or a further step of the recursion changes the
+    solution."""
     A, B, C, D, Q, R = problem.A, problem.B, problem.C, problem.D, problem.Q, problem.R
     try:
         P = solve_discrete_are(A, B, C.T @ Q @ C, R + D.T @ Q @ D, s=C.T @ Q @ D)

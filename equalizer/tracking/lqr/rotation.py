@@ -32,11 +32,11 @@ class RotationBasis:
     """(p, p) for rotations, (p,) for normals."""
 
     def compute_forces(self, direction: FloatArray) -> FloatArray:
-        """(N, m), N: forces for a direction. Raises TrackingError for another shape of the direction."""
+        """Compute the forces (N, m), N, for a direction. Raises TrackingError for another shape of the direction."""
         return self._combine(self.stored_forces, direction, self.inputs)
 
     def predict_response(self, direction: FloatArray) -> FloatArray:
-        """(N, p), m/s²: the model's response to the forces of a direction. Raises TrackingError for another shape."""
+        """Predict the response (N, p), m/s², to the forces of a direction. Raises TrackingError for another shape."""
         return self._combine(self.stored_responses, direction, self.direction_shape[0])
 
     def _combine(self, stored_solutions: FloatArray, direction: FloatArray, column_count: int) -> FloatArray:
@@ -50,28 +50,28 @@ class RotationBasis:
 
 
 def compute_rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
-    """Basis of p * p solutions for every rotation of a trajectory. trajectory: (N, p), m/s², before rotation; N as of
-    the gains. Raises TrackingError for another shape."""
+    """Compute the basis of p * p solutions for every rotation of a trajectory. trajectory: (N, p), m/s², before
+    rotation; N as of the gains. Raises TrackingError for another shape."""
     p = gains.problem.outputs
     return _solve_basis(gains, make_axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def compute_normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
-    """Basis of p solutions for every normal. recording: (N,), m/s², to be played along a normal; N as of the gains.
-    Raises TrackingError for another shape."""
+    """Compute the basis of p solutions for every normal. recording: (N,), m/s², to be played along a normal; N as of
+    the gains. Raises TrackingError for another shape."""
     p = gains.problem.outputs
     return _solve_basis(gains, make_axis_recordings(recording, p), (p,))
 
 
 def make_axis_trajectories(trajectory: FloatArray) -> FloatArray:
-    """(p * p, N, p): entry i p + j is component j of the trajectory (N, p), along axis i."""
+    """Make trajectories (p * p, N, p): entry i p + j is component j of the trajectory (N, p), along axis i."""
     p = trajectory.shape[1]
     return np.array([np.outer(samples, axis) for axis in np.eye(p) for samples in trajectory.T])
 
 
 def make_axis_recordings(recording: FloatArray, outputs: int) -> FloatArray:
-    """(p, N, p): entry i is the recording along axis i; outputs: p. Raises TrackingError for a recording that is not
-    (N,)."""
+    """Make trajectories (p, N, p): entry i is the recording along axis i; outputs: p. Raises TrackingError for a
+    recording that is not (N,)."""
     samples = np.asarray(recording, dtype=np.float64)
     if samples.ndim != 1 or not samples.size:
         raise TrackingError(f"a recording along one direction has shape {samples.shape}; it must be (N,), N >= 1")
@@ -79,7 +79,7 @@ def make_axis_recordings(recording: FloatArray, outputs: int) -> FloatArray:
 
 
 def _solve_basis(gains: StoredGains, references: FloatArray, direction_shape: tuple[int, ...]) -> RotationBasis:
-    """Basis from the solutions for trajectories (directions, N, p)."""
+    """Make a basis from the solutions for trajectories (directions, N, p)."""
     solutions = [track(gains, reference) for reference in references]
     forces = np.array([solution.forces.ravel() for solution in solutions])
     responses = np.array([solution.predicted.ravel() for solution in solutions])

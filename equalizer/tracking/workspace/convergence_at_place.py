@@ -37,7 +37,7 @@ def predict_convergence_at(
     for model in used_models:
         if model.samples is not None:
             devices += [
-                compute_model_response(model.with_parameters(parameters), lines_hz) for parameters in model.samples
+                compute_model_response(model.replace_parameters(parameters), lines_hz) for parameters in model.samples
             ]
     if not devices:
         return None

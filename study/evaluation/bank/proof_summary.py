@@ -20,9 +20,9 @@ from study.evaluation.bank.prove import BlindTest
 
 
 def format_blind_test(result: BlindTest) -> Iterator[str]:
-    """Format the summary as lines for the terminal: every miss, failed controls, each share with its 95 % confidence
-    interval (names padded to 52 characters), the expected calibration error of the probabilities, remarks, and the seal
-    of the labels (SHA-256)."""
+    """Format the summary as lines for the terminal: number of misses and each miss, number of controls that held and
+    each other one, each figure with its 95 % confidence interval (names padded to 52 characters), the expected
+    calibration error of the probabilities, remarks, the seal of the labels (SHA-256), and the folder."""
     score = result.score
     yield f"{len(score.misses)} misses in {len(result.outcomes)} cases"
     for miss in score.misses:
@@ -86,7 +86,7 @@ def count_unanswered_cases(result: BlindTest) -> int:
 
 
 def summarise_blind_test(result: BlindTest) -> dict[str, Any]:
-    """Summarise the blind test as JSON values; each share with its value, 95 % confidence interval and number of
+    """Summarise the blind test as JSON values; each figure with its value, 95 % confidence interval and number of
     cases."""
     return {
         "folder": str(result.folder.path),

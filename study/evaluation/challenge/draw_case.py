@@ -20,7 +20,7 @@ from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectC
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
-from study.evaluation.challenge.nominal_models import convert_to_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import draw_calibration, make_model, retune
 from study.evaluation.challenge.nuisance_effects import add_nuisance_effects
 from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read_sensor
 
@@ -109,12 +109,12 @@ def draw_case(
     else:
         nominal, tolerance = retune(bench, response, plan, settings.axes)
     device_name = name or f"bench {seed}"
-    model = convert_to_model(device_name, nominal, tolerance, settings.axes)
+    model = make_model(device_name, nominal, tolerance, settings.axes)
     recording = make_recording(device_name, plan, response, position, settings)
 
     def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:  # `RecordAgain`
         drive = make_further_plan(command, kind, settings)
-        heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
+        heavier = replace(device, bench=replace(device.bench, mass=device.bench.mass + added_kg * np.eye(3)))
         readings = read_sensor(
             device.sensor, *simulate_motion(heavier, drive.command), RATE_HZ, np.random.default_rng([seed, noise_seed])
         )

@@ -103,10 +103,8 @@ def shift_diagonals(bench: Bench, changes: FloatArray) -> Bench:
     )
 
 
-def convert_to_model(
-    name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...] = (0, 1, 2)
-) -> MechanicalModel:
-    """Convert a bench to the mechanical model for the file, with matrices of `SIGNIFICANT_DIGITS` significant digits,
+def make_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...] = (0, 1, 2)) -> MechanicalModel:
+    """Make the mechanical model of a bench for the file, with matrices of `SIGNIFICANT_DIGITS` significant digits,
     driven and measured at these axes, with the limits of the sensor and the tolerance."""
     mass, damping, stiffness = (_round_significant(matrix) for matrix in bench.assemble_matrices())
     selection = np.eye(len(AXES), len(mass))[list(axes)]

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_model_of
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
@@ -155,7 +155,7 @@ def _import_case(
             _allows_force_balance(real_recording),
             accept_short=True,
         )
-    except NothingToDiagnose as refusal:
+    except NothingToDiagnoseError as refusal:
         raise make_not_diagnosable_error(refusal.problems) from refusal
     references = () if real_recording.reference is None else (import_real_recording(real_recording.reference),)
     kept_signals = keep_common_signals((*prepared.recordings, *references))
@@ -189,7 +189,7 @@ def _choose_model(
         return fit_first_model(diagnosis_input, (), bounds, lambda step, share: on_progress(step, 0.1 * share))
     try:
         require_model_of(given_model, (recording,))
-    except NothingToDiagnose as refusal:
+    except NothingToDiagnoseError as refusal:
         raise make_not_diagnosable_error(refusal.problems) from refusal
     return FirstModel(given_model, ())
 

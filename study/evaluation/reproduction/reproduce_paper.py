@@ -44,7 +44,7 @@ class ReproducedModel:
 
     model: IdentifiedModel
     """Model that includes the spring, so that playback under the same spring needs no separate compensation."""
-    tested: HeldOutValidation | None
+    held_out_test: HeldOutValidation | None
     """Test on the held-out part of the recording; None where there is none."""
 
     def convert_to_used_model(self, name: str) -> UsedModel:
@@ -216,8 +216,8 @@ def _collect_results(
         equalized_playback=play_equalized(plan, models, steps.make_callback("playing")),
         baselines=play_baselines(plan, models, frequency_response, steps.make_callback("baselines")),
         models=tuple(reproduced.convert_to_used_model(name) for name, reproduced in identified_models.items()),
-        held_out_test=identified_models[CENTRE_NAME].tested,
-        frictionless_test=identified_models[FRICTIONLESS_NAME].tested,
+        held_out_test=identified_models[CENTRE_NAME].held_out_test,
+        frictionless_test=identified_models[FRICTIONLESS_NAME].held_out_test,
         remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),
         sources=tuple(recording.path for recording in recordings.values()),
         protocol_hash=collected_trials.protocol_hash,

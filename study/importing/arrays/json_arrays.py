@@ -1,4 +1,5 @@
-"""Read arrays from JSON files; called by `study.importing.arrays.read_arrays`.
+"""Read arrays from JSON files. Called by `study.importing.arrays.read_arrays`; `study.cli.show` uses
+`is_hapteq_document`.
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
 record per line; https://jsonlines.org). Arrays inside an object have its name as prefix (`run1/u`), unless it is the

@@ -110,7 +110,7 @@ FUNCTIONS: dict[str, Function] = {
     ),
     "onset": Function(
         "onset(x, by)",
-        "index of the first sample that differs from the mean of the first ten by more",
+        "index of the first sample that differs from the mean of the first ten by more than `by`",
         2,
         2,
         _find_onset,

@@ -81,20 +81,20 @@ def compute_due_trial(
         label = draw.direction
         direction = draw_detection_direction(opening_event.seed, run.index, place.trial, draw_index)
     phase, level_db = run.phase, place.staircase.level_db
-    force_n = compute_level_n(rule, place.staircase)
+    level_n = compute_level_n(rule, place.staircase)
     if run.practice:
-        force_n = draw_practice_level_n(protocol.practice, opening_event.seed, run.index, place.trial, draw_index)
-        level_db = to_db(force_n)
+        level_n = draw_practice_level_n(protocol.practice, opening_event.seed, run.index, place.trial, draw_index)
+        level_db = to_db(level_n)
     elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opening_event.seed, run.index, place.trial):
-        phase, force_n, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
+        phase, level_n, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
     nominal_n = None
     if protocol.stimulus.rove_db and phase in _ROVED_PHASES and not run.practice:
-        nominal_n = force_n
+        nominal_n = level_n
         drawn_n = rove_level_n(
-            force_n, protocol.stimulus.rove_db, opening_event.seed, run.index, place.trial, draw_index
+            level_n, protocol.stimulus.rove_db, opening_event.seed, run.index, place.trial, draw_index
         )
-        force_n = min(drawn_n, protocol.safety.stimulus_cap_n)
-        level_db = to_db(force_n)
+        level_n = min(drawn_n, protocol.safety.stimulus_cap_n)
+        level_db = to_db(level_n)
     return PresentTrial(
         run=run.index,
         trial=place.trial,
@@ -102,12 +102,12 @@ def compute_due_trial(
         phase=phase,
         frequency_hz=run.frequency_hz,
         level_db=level_db,
-        level_n=force_n,
+        level_n=level_n,
         label=label,
         direction=direction,
         angle_deg=compute_direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
-        wanted_mps2=convert_level_to_acceleration(opening_event.equalized, force_n, run.frequency_hz),
+        wanted_mps2=convert_level_to_acceleration(opening_event.equalized, level_n, run.frequency_hz),
         nominal_n=nominal_n,
     )
 

@@ -2,7 +2,7 @@
 
 `state.begin_session` makes the state from the first event, `apply_event` applies each further one. The state contains
 only what follows from the log, so that a session can be resumed after a crash. An event that cannot follow the previous
-ones raises LogContradiction. The events of a trial are applied by `fold_trial`. Called by
+ones raises LogContradictionError. The events of a trial are applied by `fold_trial`. Called by
 `study.workflows`, in `trial.sitting` and `session.resume_session` for new events and in `results.fold_session` for
 stored logs, and by `study.session.watching.followed_session` for the log of a running session.
 """
@@ -34,7 +34,7 @@ from study.session.facts.events import (
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import set_dose_elsewhere
 from study.session.state.fold_trial import answer_trial, measure_trial, present_trial, spoil_trial
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, apply_break, begin_probe, end_probe
 from study.session.state.rules import is_place_assigned_later
 from study.session.state.sitting_state import (
@@ -52,12 +52,12 @@ from study.session.state.state import SessionState, assign_place
 
 
 def apply_event(state: SessionState, event: Event) -> SessionState:
-    """Apply one event; returns the next state. Raises LogContradiction where the event cannot follow the previous
+    """Apply one event; returns the next state. Raises LogContradictionError where the event cannot follow the previous
     ones."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
-        raise LogContradiction(f"{event.event} after the session was closed")
+        raise LogContradictionError(f"{event.event} after the session was closed")
     if state.is_finally_ineligible and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
-        raise LogContradiction(f"{event.event} of a person who does not take part")
+        raise LogContradictionError(f"{event.event} of a person who does not take part")
     state = replace(state, sitting=_advance_time(state.sitting, event))
     match event:
         case TrialPresented():
@@ -78,8 +78,8 @@ def _advance_time(sitting: SittingState, event: Event) -> SittingState:
 
 
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
-    """Apply an event that is not part of a trial. Raises LogContradiction for a second opening, and where the function
-    for the event raises it."""
+    """Apply an event that is not part of a trial. Raises LogContradictionError for a second opening, and where the
+    function for the event raises it."""
     match event:
         case RestTaken():
             return _apply_rest(state, event)
@@ -97,15 +97,15 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case SessionClosed():
             return _apply_close(state, event)
         case SessionOpened():
-            raise LogContradiction("a session cannot be opened twice")
+            raise LogContradictionError("a session cannot be opened twice")
         case _:  # notes, interruptions, onset pulses and masking noise change nothing
             return state
 
 
 def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
-    """Apply a rest: no rest is due afterwards. Raises LogContradiction where none was due."""
+    """Apply a rest: no rest is due afterwards. Raises LogContradictionError where none was due."""
     if state.rest_due_s <= 0:
-        raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
+        raise LogContradictionError(f"a rest before trial {event.trial} of run {event.run}, where none was due")
     rested_state = _set_probing(state, apply_break(state.sitting.probing, event, state.protocol.probes))
     return replace(rested_state, rest_due_s=0.0)
 
@@ -116,10 +116,10 @@ def _set_probing(state: SessionState, probing: ProbeState) -> SessionState:
 
 
 def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
-    """Apply the beginning or the measurement of a probe, with its vibration dose. Raises LogContradiction within a
+    """Apply the beginning or the measurement of a probe, with its vibration dose. Raises LogContradictionError within a
     trial, in which the hand must feel the trial's stimulus only."""
     if state.presented is not None:
-        raise LogContradiction(f"{event.event} while a trial is open")
+        raise LogContradictionError(f"{event.event} while a trial is open")
     probing = state.sitting.probing
     if isinstance(event, ProbePlayed):
         moved_sitting = start_motion(state.sitting) if event.kind == "hand" else state.sitting
@@ -136,30 +136,30 @@ def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> Ses
 
 
 def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
-    """Apply the participant's place in the counterbalanced order. Raises LogContradiction where none was due."""
+    """Apply the participant's place in the counterbalanced order. Raises LogContradictionError where none was due."""
     if state.trials or state.sitting.place_assigned or not is_place_assigned_later(state.opened):
-        raise LogContradiction("a place in the order was taken where none was due")
+        raise LogContradictionError("a place in the order was taken where none was due")
     return assign_place(state, event.participant_number)
 
 
 def _apply_close(state: SessionState, event: SessionClosed) -> SessionState:
-    """Close the session: completed, or because the person does not take part. Raises LogContradiction where the state
-    does not allow this outcome."""
+    """Close the session: completed, or because the person does not take part. Raises LogContradictionError where the
+    state does not allow this outcome."""
     if event.outcome != "completed":
         if not state.is_finally_ineligible or event.outcome != state.sitting.ineligibility:
-            raise LogContradiction(f"the session was closed as {event.outcome}, which no form says")
+            raise LogContradictionError(f"the session was closed as {event.outcome}, which no form says")
         return replace(state, closed=True)
     if not state.finished or state.presented is not None:
-        raise LogContradiction("the session was closed before its last run was finished")
+        raise LogContradictionError("the session was closed before its last run was finished")
     return replace(state, closed=True)
 
 
 def _apply_preparation(
     state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed | DemoFinished
 ) -> SessionState:
-    """Apply a form, device check or demonstration. Raises LogContradiction while a trial is open."""
+    """Apply a form, device check or demonstration. Raises LogContradictionError while a trial is open."""
     if state.presented is not None:
-        raise LogContradiction(f"{event.event} while a trial is open")
+        raise LogContradictionError(f"{event.event} while a trial is open")
     match event:
         case FormFilled():
             return replace(state, sitting=apply_form(state.sitting, event))

@@ -2,7 +2,7 @@
 
 A trial is open from its presentation until it is measured or void. A measured trial moves the staircase and the place
 in the run; a void one is due again with the next attempt number. Each adds its vibration to the dose. An event that
-does not fit the state raises LogContradiction.
+does not fit the state raises LogContradictionError.
 """
 
 import math
@@ -22,7 +22,7 @@ from study.session.facts.events import (
 from study.session.facts.log_time import compute_wall_clock_s
 from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import is_computer_busy
-from study.session.state.presentation_check import LogContradiction, check_presentation, describe_place
+from study.session.state.presentation_check import LogContradictionError, check_presentation, describe_place
 from study.session.state.sitting_state import (
     add_exposure,
     estimate_amplitude_mps2,
@@ -38,12 +38,12 @@ from study.session.state.state import (
 
 
 def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
-    """Open this trial. Raises LogContradiction where another trial is open, no run is left, or the trial differs from
-    the presentation that is due."""
+    """Open this trial. Raises LogContradictionError where another trial is open, no run is left, or the trial differs
+    from the presentation that is due."""
     if state.presented is not None:
-        raise LogContradiction(f"{describe_place(event)} presented while another trial is open")
+        raise LogContradictionError(f"{describe_place(event)} presented while another trial is open")
     if state.finished:
-        raise LogContradiction(f"{describe_place(event)} presented after the last run")
+        raise LogContradictionError(f"{describe_place(event)} presented after the last run")
     check_presentation(event, find_due_presentation(state))
     repeat_cause = state.trials[-1].void_cause if state.attempt else None
     row = _make_trial_row(state.opened, event, is_felt_by_person(state.opened), repeat_cause)
@@ -83,11 +83,11 @@ def _make_trial_row(
 
 
 def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
-    """Set the answer of the open trial; the staircase moves when the trial is measured. Raises LogContradiction where
-    the trial is not open or has an answer."""
+    """Set the answer of the open trial; the staircase moves when the trial is measured. Raises LogContradictionError
+    where the trial is not open or has an answer."""
     presented = _require_open_trial(state, event)
     if state.answered is not None:
-        raise LogContradiction(f"{describe_place(event)} answered twice")
+        raise LogContradictionError(f"{describe_place(event)} answered twice")
     row = replace(
         state.trials[-1],
         answer=event.answer,
@@ -99,11 +99,11 @@ def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
 
 
 def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
-    """Close the answered trial: staircase, dose, and the next trial, rest or run. Raises LogContradiction where the
-    trial is not open or has no answer."""
+    """Close the answered trial: staircase, dose, and the next trial, rest or run. Raises LogContradictionError where
+    the trial is not open or has no answer."""
     presented = _require_open_trial(state, event)
     if state.answered is None:
-        raise LogContradiction(f"{describe_place(event)} measured before it was answered")
+        raise LogContradictionError(f"{describe_place(event)} measured before it was answered")
     stepped_state = _step_staircase(state, presented, correct=state.answered.answer == presented.direction)
     row = replace(
         _set_sensor_facts(state.trials[-1], event.sensor),
@@ -134,11 +134,13 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
 
 
 def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
-    """Close the open trial as void, so that it is due again. Raises LogContradiction where it is not open, or where the
-    participant asked for a repeat and none is left in this run."""
+    """Close the open trial as void, so that it is due again. Raises LogContradictionError where it is not open, or
+    where the participant asked for a repeat and none is left in this run."""
     presented = _require_open_trial(state, event)
     if event.cause is VoidCause.ASKED and count_repeats_left(state) == 0:
-        raise LogContradiction(f"{describe_place(event)} was asked for again, although no repeat of this run remained")
+        raise LogContradictionError(
+            f"{describe_place(event)} was asked for again, although no repeat of this run remained"
+        )
     row = replace(
         _set_sensor_facts(state.trials[-1], event.sensor),
         missed_ticks=event.missed_ticks,
@@ -168,14 +170,14 @@ def _set_sensor_facts(row: Trial, sensor: SensorFacts | None) -> Trial:
 
 
 def _require_open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
-    """Return the presentation to which the event belongs. Raises LogContradiction where that trial is not open."""
+    """Return the presentation to which the event belongs. Raises LogContradictionError where that trial is not open."""
     presented = state.presented
     if presented is None or (presented.run, presented.trial, presented.attempt) != (
         event.run,
         event.trial,
         event.attempt,
     ):
-        raise LogContradiction(f"{event.event} for {describe_place(event)}, which is not open")
+        raise LogContradictionError(f"{event.event} for {describe_place(event)}, which is not open")
     return presented
 
 

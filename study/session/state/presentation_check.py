@@ -1,7 +1,8 @@
 """Check of a logged presentation against the presentation that follows from protocol, rules, seed and position.
 
 The state of a session is computed from its log. A log that was written under other rules, or altered, is refused here;
-otherwise it would give a wrong state. Called by `fold_trial`; other modules of this package raise `LogContradiction`.
+otherwise it would give a wrong state. Called by `fold_trial`; other modules of this package raise
+`LogContradictionError`.
 """
 
 import math
@@ -10,16 +11,16 @@ from study.session.facts.events import AnswerGiven, TrialMeasured, TrialPresente
 from study.session.state.due_trial import PresentTrial
 
 
-class LogContradiction(ValueError):  # noqa: N818 - no suffix: the log is contradictory, not the program
+class LogContradictionError(ValueError):
     """A logged event cannot follow the previous events, or its values differ from those that the rules give."""
 
 
 def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
-    """Raise LogContradiction unless the logged presentation agrees with `expected`: position in the session, phase,
-    frequency, level in N and dB, nominal level, direction, angle, polarity, target acceleration."""
+    """Raise LogContradictionError unless the logged presentation agrees with `expected`: position in the session,
+    phase, frequency, level in N and dB, nominal level, direction, angle, polarity, target acceleration."""
     due_place = (expected.run, expected.trial, expected.attempt)
     if (event.run, event.trial, event.attempt) != due_place:
-        raise LogContradiction(
+        raise LogContradictionError(
             f"{describe_place(event)} presented where run {due_place[0]}, trial {due_place[1]}, "
             f"attempt {due_place[2]} was due"
         )
@@ -40,7 +41,7 @@ def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
         if not _is_equal(logged_value, expected_value)
     ]
     if contradictions:
-        raise LogContradiction(
+        raise LogContradictionError(
             f"{describe_place(event)} was presented with {', '.join(contradictions)}: "
             "this session was begun with different rules"
         )

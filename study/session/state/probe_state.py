@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.session.facts.sitting_events import PauseTaken, ProbeMeasured, ProbePlayed, RestTaken
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 
 if TYPE_CHECKING:
     from protocols.definition.probes import ProbeSettings
@@ -80,16 +80,17 @@ def find_due_reference(state: ProbeState, settings: ProbeSettings) -> Reference 
 def begin_probe(state: ProbeState, event: ProbePlayed, settings: ProbeSettings) -> ProbeState:
     """Return the state after the event that a probe or a reference begins to play.
 
-    Raises LogContradiction where the protocol has no probes, the force is above its cap, or the number is not the next.
+    Raises LogContradictionError where the protocol has no probes, the force is above its cap, or the number is not the
+    next.
     """
     is_hand_probe = event.kind == "hand"
     highest_n = settings.reference_n if event.kind == "reference" else settings.probe_cap_n
     if not settings.is_enabled:
-        raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol has no probes")
+        raise LogContradictionError(f"a probe of {event.level_n:g} N, but the protocol has no probes")
     if event.level_n > highest_n:
-        raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol allows {highest_n:g} N at most")
+        raise LogContradictionError(f"a probe of {event.level_n:g} N, but the protocol allows {highest_n:g} N at most")
     if event.number != state.probe_count:
-        raise LogContradiction(f"probe {event.number}, but probe {state.probe_count} is the next")
+        raise LogContradictionError(f"probe {event.number}, but probe {state.probe_count} is the next")
     return replace(
         state,
         probe_count=state.probe_count + 1,
@@ -102,10 +103,10 @@ def begin_probe(state: ProbeState, event: ProbePlayed, settings: ProbeSettings) 
 
 def end_probe(state: ProbeState, event: ProbeMeasured) -> ProbeState:
     """Return the state after the measurement of a probe, or after a reference that the experimenter declined (it has
-    the next number and no recording). Raises LogContradiction where this probe is not playing."""
+    the next number and no recording). Raises LogContradictionError where this probe is not playing."""
     is_declined = event.number == state.probe_count and event.recording is None
     if not is_declined and (state.open is None or state.open.number != event.number):
-        raise LogContradiction(f"a measurement of probe {event.number}, which is not playing")
+        raise LogContradictionError(f"a measurement of probe {event.number}, which is not playing")
     updated_state = replace(state, open=None, is_reference_done=state.is_reference_done or is_declined)
     if state.open is None or state.open.kind != "hand":
         return updated_state

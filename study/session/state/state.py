@@ -18,7 +18,7 @@ from study.session.facts.events import AnswerGiven, SessionOpened, TrialPresente
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import set_dose_elsewhere
 from study.session.state.due_trial import Place, PresentTrial, compute_due_trial
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.rules import is_place_assigned_later, is_refusal_final, is_same_stimulus_repeated
 from study.session.state.sitting_state import SittingState
 
@@ -76,8 +76,8 @@ class SessionState:
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:
-    """Compute the state after the opening event of the log. Raises LogContradiction where an equalized session has no
-    scale of levels for a frequency of the protocol."""
+    """Compute the state after the opening event of the log. Raises LogContradictionError where an equalized session has
+    no scale of levels for a frequency of the protocol."""
     _check_scales(opened, protocol)
     state = SessionState(
         opened=opened,
@@ -100,7 +100,7 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
 
 
 def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
-    """Raise LogContradiction unless an equalized session has a scale of levels for every frequency."""
+    """Raise LogContradictionError unless an equalized session has a scale of levels for every frequency."""
     if opened.equalized is None:
         return
     scaled_hz = {scale.frequency_hz for scale in opened.equalized.levels}
@@ -108,7 +108,7 @@ def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
         f"{frequency_hz:g} Hz" for frequency_hz in protocol.all_frequencies_hz if frequency_hz not in scaled_hz
     ]
     if unscaled_frequencies:
-        raise LogContradiction(f"the session has no scale of levels for {', '.join(unscaled_frequencies)}")
+        raise LogContradictionError(f"the session has no scale of levels for {', '.join(unscaled_frequencies)}")
 
 
 def assign_place(state: SessionState, participant_number: int) -> SessionState:

@@ -112,8 +112,8 @@ def click_continue(entry: FormEntry) -> FormEntry:
 
 
 def paste_text(entry: FormEntry, text: str) -> FormEntry:
-    """Insert pasted text into a field of text or number, blanks reduced to single spaces and unprintable characters
-    removed; ignored in fields with choices and on Continue."""
+    """Insert pasted text into a field of text or number, blanks reduced to single spaces, unprintable characters
+    removed, and cut at `MAX_TEXT_CHARACTERS` in the field; ignored in fields with choices and on Continue."""
     field = entry.field
     if entry.is_sent or field is None or field.choices:
         return entry

@@ -80,8 +80,8 @@ class FollowedSession:
 
 
 def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSession:
-    """Make the followed session after the opening event of its log. Raises LogContradiction where that event and the
-    protocol disagree (`begin_session`)."""
+    """Make the followed session after the opening event of its log. Raises LogContradictionError where that event and
+    the protocol disagree (`begin_session`)."""
     return FollowedSession(
         state=begin_session(opened, protocol),
         remarks=(),
@@ -95,7 +95,7 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSe
 
 
 def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSession:
-    """Return the followed session after one more event. Raises LogContradiction where the event cannot follow the
+    """Return the followed session after one more event. Raises LogContradictionError where the event cannot follow the
     previous ones."""
     updated_session = replace(watched, state=apply_event(watched.state, event), last_utc=event.utc)
     match event:

@@ -25,18 +25,18 @@ def find_shown_run(state: SessionState) -> int | None:
     return counted_runs[-1] if counted_runs else None
 
 
-def _select_counted_trials(state: SessionState, run: int) -> list[Trial]:
+def _select_counted_trials(state: SessionState, run_index: int) -> list[Trial]:
     """Select the trials of a run that count: answered and not void."""
-    return [trial for trial in state.trials if trial.run == run and trial.is_valid]
+    return [trial for trial in state.trials if trial.run == run_index and trial.is_valid]
 
 
-def collect_staircase_points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
+def collect_staircase_points(state: SessionState, run_index: int | None) -> tuple[StaircasePoint, ...]:
     """Collect the counted trials of a run without catch trials, as points of its staircase; empty for None. The open
     trial is left out even after its answer, because it may still become void."""
-    if run is None:
+    if run_index is None:
         return ()
     closed_trials = [
-        t for t in _select_counted_trials(state, run) if t.phase is not Phase.CATCH and not _is_open(state, t)
+        t for t in _select_counted_trials(state, run_index) if t.phase is not Phase.CATCH and not _is_open(state, t)
     ]
     return tuple(StaircasePoint(t.trial, t.staircase_n, bool(t.correct), t.reversal) for t in closed_trials)
 

@@ -3,7 +3,8 @@
 The view contains no seed, and the direction of a trial only once its answer counts, because an experimenter who knows
 the direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a
 screen adds 1. `make_watch_view` makes the view; screens, text lines and `hapteq watch --json` show it. Levels are
-stimulus amplitudes, stated as force (N). The values are plain, so that the module imports quickly."""
+stimulus amplitudes, stated as force (N). The values are plain, so that the module imports quickly.
+"""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -114,11 +114,11 @@ def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
     return (*islice(shortened_problems, _MAX_LISTED_PROBLEMS), *omission_note)
 
 
-def _format_sentence(problem: str) -> str:
-    """Format a problem as a sentence with capital letter and full stop; a key or name at its beginning keeps its
-    case."""
-    first_letter = problem[:1].upper() if problem.partition(" ")[0] in _CAPITALIZED_WORDS else problem[:1]
-    return first_letter + problem[1:].rstrip(".") + "."
+def _format_sentence(clause: str) -> str:
+    """Format the clause of a problem as a sentence with capital letter and full stop; a key or name at its beginning
+    keeps its case."""
+    first_letter = clause[:1].upper() if clause.partition(" ")[0] in _CAPITALIZED_WORDS else clause[:1]
+    return first_letter + clause[1:].rstrip(".") + "."
 
 
 def _explain_read_failure(path: Path, error: OSError | UnicodeDecodeError) -> str:

@@ -32,11 +32,14 @@ PARTICIPANT_COLUMNS: dict[str, tuple[str, ...]] = {
 """Columns of participants.tsv that BIDS defines, with their permitted values; an empty tuple permits numbers."""
 
 TASK_DESCRIPTION = (
-    "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
-    "which."
+    "Each trial plays a sinusoidal vibration at the hand, along one of two orthogonal directions (a detection trial: "
+    "in one of two intervals); the participant answers which."
 )
 """`TaskDescription` of the tables' JSON."""
-INSTRUCTIONS = "In which of the two directions did the force act? Answer 1 or 2."
+INSTRUCTIONS = (
+    "Along which of the two directions (in a detection trial: in which of the two intervals) did the handle vibrate? "
+    "Answer 1 or 2."
+)
 """`Instructions` of the tables' JSON."""
 README = """# {name}
 

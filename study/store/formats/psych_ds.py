@@ -81,7 +81,7 @@ def write_psych_ds(
         paths.append(folder / ANSWERS_PATH)
         write_text(folder / ANSWERS_PATH, answers.as_csv(), overwrite=False)
     write_text(folder / PROTOCOL_PATH, protocol_text, overwrite=False)
-    description = {
+    dataset_description = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": name,
@@ -93,7 +93,9 @@ def write_psych_ds(
         ],
         FACTS_KEY: dict(facts),
     }
-    write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=2, ensure_ascii=False) + "\n", overwrite=False)
+    write_text(
+        folder / DESCRIPTION_NAME, json.dumps(dataset_description, indent=2, ensure_ascii=False) + "\n", overwrite=False
+    )
     texts = {"README.md": README.format(name=name), "CHANGES.md": "# 1.0.0\n\nAs exported by hapteq.\n"}
     for file_name, text in texts.items():
         write_text(folder / file_name, text, overwrite=False)
@@ -105,10 +107,10 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
     where the description is no JSON object with `FACTS_KEY`, there is no table, or a table is invalid."""
     path = folder / DESCRIPTION_NAME
     try:
-        description = load_json(read_text(path))
+        dataset_description = load_json(read_text(path))
     except ValueError as error:
         raise UnusableFileError(path, KIND, (str(error),)) from error
-    facts = description.get(FACTS_KEY) if isinstance(description, dict) else None
+    facts = dataset_description.get(FACTS_KEY) if isinstance(dataset_description, dict) else None
     files = tuple(sorted((folder / "data").glob("subject-*_data.csv")))
     if not isinstance(facts, dict) or not files:
         problem = (

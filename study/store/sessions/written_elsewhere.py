@@ -23,7 +23,8 @@ LINE_BREAK_REPLACEMENT = "\0"
 
 def note_written_folder(source: Path, folder: Path, even_if_searched: bool = False) -> None:
     """Add the absolute path of `folder` to the list, unless it is listed already or a withdrawal would search it: the
-    data folder, a folder directly in it, or any folder within a session. Errors of writing the list are ignored.
+    data folder, a folder directly in it, or any folder within a session. Errors of writing the list are ignored; a
+    list that cannot be read is replaced.
 
     source: the data folder, or a session folder in it. even_if_searched: add `folder` wherever it is, such as for an
     export, which a withdrawal does not recognise.

@@ -2,7 +2,8 @@
 
 They are: lists and views of sessions and diagnoses, whole sittings, analyses, diagnoses, withdrawals, the calibration
 of the accelerometer, and requests to sessions of other programs. Results and progress are sent to the screen as
-messages of `from_engine`. `study.tui.engine.engine` calls `EngineCommands.perform`."""
+messages of `from_engine`. `study.tui.engine.engine` calls `EngineCommands.perform`.
+"""
 
 import contextlib
 import itertools

@@ -218,11 +218,11 @@ class RemoteDisplay:
         """Whether the screen's last message, usually a heartbeat, is older than `HEARTBEAT_TIMEOUT_S`."""
         return self._link.compute_silence_s() > HEARTBEAT_TIMEOUT_S
 
-    def _close_request(self, request_number: int, reason: Unanswered) -> Unanswered:
-        """Close the request on the screen and return the reason. request_number: 0 where nothing is shown."""
+    def _close_request(self, request_number: int, early_end: Unanswered) -> Unanswered:
+        """Close the request on the screen, and return `early_end`. request_number: 0 where nothing is shown."""
         if request_number:
             self._link.send(CloseRequest(request_number))
-        return reason
+        return early_end
 
 
 def make_silent_screen_reply(engine_delay_s: float, load_per_processor: float | None) -> Unanswered:

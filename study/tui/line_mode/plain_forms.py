@@ -135,8 +135,8 @@ def _format_refusal(field: FormField, line: Line, is_numbered: bool, words: Word
         )
     if not field.choices:
         return words["line_form_needed"]
-    answers = field.choices[0]
+    choices_text = field.choices[0]
     for choice in field.choices[1:]:
-        answers = words.fill("line_form_or", {"first": answers, "second": choice})
-    values = {"typed": quoted_line, "answers": answers, "count": len(field.choices)}
+        choices_text = words.fill("line_form_or", {"first": choices_text, "second": choice})
+    values = {"typed": quoted_line, "answers": choices_text, "count": len(field.choices)}
     return words.fill("line_form_none_numbered" if is_numbered else "line_form_none", values)

@@ -87,8 +87,8 @@ def _confirm_withdrawal(conversation: Conversation) -> bool:
 
 
 def _take_note(is_adverse: bool, conversation: Conversation, store_note: Callable[[NoteAsked], None]) -> None:
-    """Ask for the text of a note, or of an adverse event where `is_adverse`, and store it; an empty line stores
-    nothing."""
+    """Ask for the text of a note, or of an adverse event where `is_adverse`, and store it without control
+    characters; an empty line stores nothing."""
     conversation.prompt(conversation.words["line_happened" if is_adverse else "line_note"])
     text = remove_control_characters(conversation.read_line().text)
     if not text:

@@ -75,7 +75,8 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
 
     @on(Button.Pressed)
     def action_save(self) -> None:
-        """Dismiss with the note; refuse an empty or too long text, and a note without a writer."""
+        """Dismiss with the note, whose blanks and line breaks are reduced to single spaces; refuse an empty or too long
+        text, and a note without a writer."""
         text = " ".join(self.query_one(TextArea).text.split())
         writer_index = self.query_one("#who", ChoiceRow).chosen
         if not text:

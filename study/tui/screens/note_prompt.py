@@ -17,8 +17,8 @@ MAX_NOTE_CHARACTERS = 500
 
 
 class NotePrompt(ModalScreen[str | None]):
-    """Dialog with an input line at the bottom: Enter returns the text, Esc cancels, F8 stops the session. Returns None
-    if the text is empty or the entry was cancelled."""
+    """Dialog with an input line at the bottom: Enter returns the text without surrounding blanks, Esc cancels, F8
+    stops the session. Returns None if the text is empty or the entry was cancelled."""
 
     CSS = """
     NotePrompt { align: center bottom; }

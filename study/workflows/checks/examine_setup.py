@@ -54,7 +54,7 @@ class Examination:
         return (*self.installation, *self.device.findings, *timing_findings)
 
     @property
-    def sensed(self) -> bool:
+    def is_sensor_fine(self) -> bool:
         """Whether every finding about the accelerometer is fine; True also where there is no such finding."""
         return all(finding.fine for finding in self.findings if finding.name in OPTIONAL_FINDINGS)
 
@@ -134,7 +134,7 @@ def _make_settings(device_name: str, timing_s: float) -> DeviceSettings:
 def require_sensor(examination: Examination) -> None:
     """Require a working accelerometer, without which a daily check would record no acceleration. Raises DeviceError
     otherwise."""
-    if not examination.sensed:
+    if not examination.is_sensor_fine:
         raise DeviceError(
             "The daily check did not begin",
             "It compares accelerations, and the accelerometer is not fine (its line above).",
@@ -160,7 +160,7 @@ def accept_examined_device(
         raise DeviceError(
             "The device was not accepted", f"Not fine: {problem_names}.", "Mend that first, as said above."
         )
-    has_sensor = examination.sensed
+    has_sensor = examination.is_sensor_fine
     baseline = record_baseline(device_name, motion_callbacks) if has_sensor else ("", "")
     motion_callbacks.announce(format_limit_test_notice(device_name, get_limit_test_force_n()))
     settings = replace(_make_settings(device_name, 0.0), with_sensor=has_sensor)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_comparable
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_comparable
 from analysis.diagnosis.prepare_recordings import keep_common_signals
 from study.errors import StudyError
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_diagnosable_error, read_input
@@ -49,7 +49,7 @@ def read_clean_reference(
             (diagnosis_input.names[0] if diagnosis_input.names else "the recording", *clean_input.names),
             "one says nothing of the other",
         )
-    except NothingToDiagnose as refusal:
+    except NothingToDiagnoseError as refusal:
         raise make_not_diagnosable_error(refusal.problems, INCOMPARABLE_ADVICE) from refusal
     diagnosed_count = len(diagnosis_input.recordings)
     common_signals = keep_common_signals((*diagnosis_input.recordings, *clean_input.recordings))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_comparable, require_model_of
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_comparable, require_model_of
 from analysis.diagnosis.prepare_recordings import prepare_comparison, prepare_recordings
 from analysis.wording import begin_sentence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -40,7 +40,7 @@ class DiagnosisInput:
     spring_n_per_m: float = 0.0
     """Stiffness of the virtual spring that held the handle, whose force is not part of the commands (sessions only)."""
     constants: tuple[float, ...] = ()
-    """Force constants that were given, in N or N m per unit of the command; see `with_force_constant`."""
+    """Force constants that were given, in N or N m per unit of the command; see `convert_commands_to_forces`."""
 
 
 def read_input(
@@ -48,7 +48,7 @@ def read_input(
 ) -> DiagnosisInput:
     """Read recordings, or the folder of one session. seed: of the choice among a session's trials. for_force_balance:
     convert to one motion per force, as a force balance needs (`one_motion_per_force`). constants: see
-    `with_force_constant`; not used for a session, whose commands are forces. A session with reference probes is
+    `convert_commands_to_forces`; not used for a session, whose commands are forces. A session with reference probes is
     represented by these (`find_references`) instead of its trials. Raises StudyError."""
     session_folders = [source for source in sources if source.is_dir()]
     if session_folders and len(sources) > 1:
@@ -82,10 +82,10 @@ def read_input(
 
 
 def _translate_refusal(operation: Callable[[], Checked]) -> Checked:
-    """Call `operation` and return its result. Raises StudyError where it raises NothingToDiagnose."""
+    """Call `operation` and return its result. Raises StudyError where it raises NothingToDiagnoseError."""
     try:
         return operation()
-    except NothingToDiagnose as refusal:
+    except NothingToDiagnoseError as refusal:
         raise make_not_diagnosable_error(refusal.problems) from refusal
 
 
@@ -96,11 +96,11 @@ def _convert_to_forces(
     unchanged recordings and no remark without constants. Raises WrongUseError for a wrong constant."""
     if not constants:
         return recordings, ()
-    from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
+    from analysis.diagnosis.data.force_constant import ForceConstantError, convert_commands_to_forces
 
     try:
-        converted_recordings = [with_force_constant(recording, constants) for recording in recordings]
-    except NoForceConstant as refusal:
+        converted_recordings = [convert_commands_to_forces(recording, constants) for recording in recordings]
+    except ForceConstantError as refusal:
         raise WrongUseError(
             "The force constant cannot be used", f"{begin_sentence(str(refusal))}.",
             "Leave --force-constant out, or correct it.",
@@ -119,7 +119,7 @@ def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalM
     model = read_mechanical_model(path)
     try:
         require_model_of(model, diagnosis_input.recordings)
-    except NothingToDiagnose as refusal:
+    except NothingToDiagnoseError as refusal:
         raise StudyError(
             "Model and recording do not belong together",
             _join_sentences(refusal.problems),

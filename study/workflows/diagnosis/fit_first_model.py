@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.data.recorded_conditions import as_recorded, has_payload
+from analysis.diagnosis.data.recorded_conditions import adapt_to_recorded_commands, has_payload
 from analysis.diagnosis.first_model.choose_structure import ChosenStructure, choose_structure
-from analysis.diagnosis.first_model.model_structures import KINDS, Kind, ParameterEstimate, StructureRefused
+from analysis.diagnosis.first_model.model_structures import KINDS, Kind, ParameterEstimate, StructureFitError
 from analysis.diagnosis.result.unit_doubt import describe_unknown_units
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import suggest_word
@@ -66,7 +66,7 @@ def fit_and_write_first_model(plan: FirstModelPlan, on_progress: Callable[[float
         )
     try:
         choice = choose_structure(diagnosis_input.recordings, requested_kind, on_progress)
-    except StructureRefused as refusal:
+    except StructureFitError as refusal:
         subject, verb = (
             ("No structure", "can") if requested_kind is None else (f"The structure {requested_kind}", "cannot")
         )
@@ -79,7 +79,8 @@ def fit_and_write_first_model(plan: FirstModelPlan, on_progress: Callable[[float
         "held_out_error": max(choice.fit.held_out),
     }
     write_mechanical_model(
-        plan.out, replace(as_recorded(choice.fit.model, diagnosis_input.recordings[0]), provenance=provenance)
+        plan.out,
+        replace(adapt_to_recorded_commands(choice.fit.model, diagnosis_input.recordings[0]), provenance=provenance),
     )
     on_progress(1.0)
     return FittedFirstModel(

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from analysis.diagnosis.balance.free_laws import list_excluded_laws
-from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fit_without_model
 from analysis.diagnosis.first_model.first_model import FirstModel
@@ -43,7 +43,7 @@ def fit_first_model(
         )
 
     with _translate_refusals():
-        balance_model = guard.run(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnose,))
+        balance_model = guard.run(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnoseError,))
     return balance_model or FirstModel(
         *fit_linear_model(diagnosis_input, lambda share: on_progress("fitting a linear model", share)), ()
     )
@@ -60,8 +60,8 @@ def fit_linear_model(
 
 @contextmanager
 def _translate_refusals() -> Iterator[None]:
-    """Convert `NothingToDiagnose` into a StudyError with the same problems and `MODEL_REMEDY`."""
+    """Convert `NothingToDiagnoseError` into a StudyError with the same problems and `MODEL_REMEDY`."""
     try:
         yield
-    except NothingToDiagnose as refusal:
+    except NothingToDiagnoseError as refusal:
         raise make_not_diagnosable_error(refusal.problems, MODEL_REMEDY) from refusal

@@ -18,7 +18,7 @@ from analysis.wording import capitalise
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFit,
-    MechanicalFitRefused,
+    MechanicalFitError,
     MechanicalFitSettings,
 )
 from equalizer.identification.mechanical.rigid_body import RigidBody, fit_rigid_body, remove_friction_damping
@@ -137,7 +137,7 @@ def _fit_models(
     try:
         fit = fit_mechanical_model([stronger], settings, on_progress, plan.device)
         return fit, fit_rigid_body(fit, stronger, weaker, settings)
-    except MechanicalFitRefused as refusal:
+    except MechanicalFitError as refusal:
         raise StudyError(
             TITLE,
             f"{capitalise(str(refusal))}.",

@@ -17,11 +17,11 @@ from analysis.wording import capitalise, format_sentence
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError
 from equalizer.identification.state_space.held_out_validation import HeldOutValidation, validate_on_test
-from equalizer.identification.state_space.identify import Identified
-from equalizer.identification.state_space.identify_recordings import IdentifiedRecordings, identify_recordings
+from equalizer.identification.state_space.identify import IdentificationResult
+from equalizer.identification.state_space.identify_recordings import RecordingsIdentification, identify_recordings
 from equalizer.identification.state_space.misfit import compute_estimate_misfit
 from equalizer.identification.state_space.misfit_causes import describe_test_error_causes
-from equalizer.identification.state_space.refusals import IdentificationRefused
+from equalizer.identification.state_space.refusals import IdentificationError
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -75,7 +75,7 @@ class IdentifiedDevice:
     estimate: FrequencyResponse
     fitted: FrequencyResponse
     """Frequency response that the model was fitted to: the estimate, or its local averages."""
-    identified: Identified
+    identified: IdentificationResult
     model: IdentifiedModel
     held_out_test: HeldOutValidation | None
     """Validation on held-out segments, processed like the fitted ones; None where no segment was held out."""
@@ -107,7 +107,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         model = _add_provenance(plan, recordings, identification.identified.model, physics)
         held_out_test = validate_on_test(model, recordings)
         model = replace(model, quality=_assess_quality(identification, recordings, held_out_test))
-    except (TransferEstimateError, IdentificationRefused) as refusal:
+    except (TransferEstimateError, IdentificationError) as refusal:
         raise _make_error(str(refusal)) from refusal
     except np.linalg.LinAlgError as error:
         raise _make_error(
@@ -131,7 +131,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
 
 
 def _assess_quality(
-    identification: IdentifiedRecordings, recordings: Sequence[Recording], held_out_test: HeldOutValidation | None
+    identification: RecordingsIdentification, recordings: Sequence[Recording], held_out_test: HeldOutValidation | None
 ) -> ModelQuality:
     """Assess the quality of the model: misfit, scatter and held-out error. The misfit is computed against the estimated
     frequency response, even if the model was fitted to its local averages."""

@@ -18,7 +18,7 @@ from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.baselines import make_static_gain_inverse
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY, TRANSIENT, Trajectory, require_rate
 from equalizer.tracking.learning.model_inverse import compensate_spring
-from equalizer.tracking.lqr.contact import CausalStart, prepare_causal_start
+from equalizer.tracking.lqr.contact import ContactSolutions, prepare_causal_start
 from equalizer.tracking.lqr.limits import ForceLimitError, require_under_cap
 from equalizer.tracking.lqr.padding import Padding, compute_band_error
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
@@ -86,7 +86,7 @@ class ContactPlay:
     band_hz: tuple[float, float]
     reference: FloatArray
     """(N, 3), m/s^2: the part in the model's band, followed by the time to come to rest."""
-    start: CausalStart
+    start: ContactSolutions
     equalized: PlayedTransient
     single_gain: PlayedTransient
     """The recording played as a force along the normal, with a single gain for all frequencies."""

@@ -14,8 +14,8 @@ import numpy as np
 from analysis.wording import capitalise
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.learning.iteration import (
+    IterationSettings,
     IterationState,
-    Repetition,
     Verdict,
     estimate_rest_noise,
     start_iteration,
@@ -121,10 +121,10 @@ def _play_and_correct(
     initial_state = _start_iteration(plan, device)
     rest_forces_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
     rest_acceleration = read_measured_acceleration(play_forces(device, rest_forces_n, lambda _: None))
-    repetition = replace(
-        initial_state.repetition, noise_floor=estimate_rest_noise(rest_acceleration, initial_state.repetition)
+    iteration_settings = replace(
+        initial_state.settings, noise_floor=estimate_rest_noise(rest_acceleration, initial_state.settings)
     )
-    states.append(replace(initial_state, repetition=repetition, noise_floor=repetition.noise_floor))
+    states.append(replace(initial_state, settings=iteration_settings, noise_floor=iteration_settings.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(play_results) <= plan.repeats:
         play_index = len(play_results)
         play_result = play_forces(device, states[-1].forces, lambda share: on_progress(play_index, share))  # noqa: B023
@@ -146,7 +146,7 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
     padded_reference = np.pad(signal.samples, ((0, padding_rows), (0, 0)))
     invert = compensate_spring(plan.inverse(len(padded_reference)), plan.spring, rate_hz, plan.band_hz)
     reference_in_band, limits = filter_to_band(padded_reference, rate_hz, plan.band_hz), plan.settings.limits
-    repetition = Repetition(
+    iteration_settings = IterationSettings(
         reference=reference_in_band,
         invert=invert,
         sample_rate_hz=rate_hz,
@@ -158,11 +158,11 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
     )
     try:
         if plan.first is None:
-            return start_iteration(repetition)
+            return start_iteration(iteration_settings)
         if plan.first.shape != signal.samples.shape:
             raise ValueError(f"forces of shape {plan.first.shape} do not match {len(signal)} rows")
         # After the last row of the table, the model's own forces are played.
-        return start_iteration(repetition, np.vstack([plan.first, invert(reference_in_band)[len(signal) :]]))
+        return start_iteration(iteration_settings, np.vstack([plan.first, invert(reference_in_band)[len(signal) :]]))
     except ValueError as error:
         raise make_not_repeated_error(
             f"{capitalise(str(error))}.", "Make the trajectory smaller, or correct it."

@@ -97,7 +97,7 @@ def _make_force_table(plan: RepeatPlan, state: IterationState) -> Trajectory:
 
 def _compute_relative_noise_floor(state: IterationState) -> float:
     """Divide the noise floor by the rms of the reference in the band; 0 where the noise is not known."""
-    return (state.noise_floor or 0.0) / state.repetition.level
+    return (state.noise_floor or 0.0) / state.settings.level
 
 
 def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:

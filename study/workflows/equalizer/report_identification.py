@@ -19,7 +19,7 @@ from equalizer.identification.frequency_response.frequency_bands import (
 )
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.state_space.order_report import OrderReport, compare_orders
-from equalizer.identification.state_space.refusals import IdentificationRefused
+from equalizer.identification.state_space.refusals import IdentificationError
 from equalizer.identification.state_space.settings import IdentificationSettings
 from study.local_clock import format_local_now
 from study.store.disk.text_file import write_text
@@ -78,7 +78,7 @@ def _compare_lower_orders(device: IdentifiedDevice, on_progress: Callable[[float
     )
     try:
         return compare_orders(device.fitted, settings, orders, on_progress)
-    except IdentificationRefused:  # half of the lines, used for each fit, are too few for the order
+    except IdentificationError:  # half of the lines, used for each fit, are too few for the order
         return None
 
 

@@ -14,7 +14,7 @@ from protocols.document.loading import ProtocolError, load_protocol
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
 from study.session.state.fold import apply_event
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.state import SessionState, begin_session
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
@@ -67,7 +67,7 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
         for event in log_contents.events[1:]:
             line_number += 1
             state = apply_event(state, event)
-    except (LogContradiction, ArithmeticError) as problem:
+    except (LogContradictionError, ArithmeticError) as problem:
         raise StudyError(
             "The session log contradicts the rules",
             f"Line {line_number} of {folder.name}: {problem}.",

@@ -131,8 +131,12 @@ def _play_reference_commands(state: SessionState, sitting: Sitting) -> ActionRes
     sitting.supervisor.start_activity("reference")
     sitting.display.trouble(f"Hands off: the reference plays for {commands.duration_s:.0f} s.")
 
+    played_share = 0.0
+
     def keep_alive(share: float) -> None:
-        """Progress callback: keep the device alive, or end the playback. share: played share, not used."""
+        """Progress callback: note the played share, and keep the device alive, or end the playback."""
+        nonlocal played_share
+        played_share = share
         if not sitting.supervisor.keep_alive():
             raise _EndedEarlyError
 
@@ -140,7 +144,8 @@ def _play_reference_commands(state: SessionState, sitting: Sitting) -> ActionRes
         play_result = sitting.device.play(commands, keep_alive)
     except _EndedEarlyError:
         fault = sitting.device.fault()
-        state = _save_and_log_measurement(state, None, 0.0, "it was cut short", sitting).state
+        played_s = played_share * commands.duration_s
+        state = _save_and_log_measurement(state, None, played_s, "it was cut short", sitting).state
         reply = sitting.supervisor.resolve(
             Unanswered("the reference was cut short", ends_sitting=False, repeat_requested=True)
         )

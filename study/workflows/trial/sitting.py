@@ -91,7 +91,7 @@ class Sitting:
 
 def log_and_apply(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
     """Apply the event to the state, which rejects contradictions, and append it to the log. Returns the new state, from
-    which the caller continues; its events are on disk. Raises LogContradiction."""
+    which the caller continues; its events are on disk. Raises LogContradictionError."""
     event = replace(event, monotonic_s=sitting.clock.now_s())
     updated_state = apply_event(state, event)
     sitting.log.append(event)

@@ -13,7 +13,7 @@ from study.regular_file import MAX_TABLE_BYTES, open_regular
 from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, verify_checksum
 from study.session.facts.log_time import compute_wall_clock_s
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
 from study.session.watching.live_state import LiveState
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
@@ -143,13 +143,13 @@ class Follower:
                 raise _make_unfollowable_error(_INVALID_FIRST_LINE.format(self._folder.name))
             try:
                 self._watched = begin_watching(event, load_logged_protocol(event, self._folder))
-            except LogContradiction:
+            except LogContradictionError:
                 raise _make_unfollowable_error(_INVALID_FIRST_LINE.format(self._folder.name)) from None
             self._chain = chain
             return ""
         try:
             self._watched = apply_followed_event(self._watched, event)
-        except LogContradiction:
+        except LogContradictionError:
             # The text of the exception is not shown: it may reveal the stimulus of the open trial.
             return "it contradicts the rules."
         self._chain = chain

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis import diagnose_values as module
-from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import compute_prediction_error
 from equalizer.effects.catalogue import EFFECTS
@@ -32,19 +32,19 @@ def record_cart(seed: int, scale: float = 1.0, channel: str = "x") -> Recording:
 
 
 def test_a_recording_without_motion_has_no_verdict():
-    with pytest.raises(NothingToDiagnose):
+    with pytest.raises(NothingToDiagnoseError):
         module.diagnose_values(record_cart(1, scale=0.0), MODEL)
 
 
 def test_recordings_that_are_not_alike_are_refused_clean_ones_too():
-    with pytest.raises(NothingToDiagnose):
+    with pytest.raises(NothingToDiagnoseError):
         module.diagnose_values([record_cart(1), record_cart(2, channel="y")], MODEL)
-    with pytest.raises(NothingToDiagnose):
+    with pytest.raises(NothingToDiagnoseError):
         module.diagnose_values(record_cart(1), MODEL, DiagnosisSettings(clean=(record_cart(2, channel="y"),)))
 
 
 def test_the_same_recording_twice_is_refused():
-    with pytest.raises(NothingToDiagnose):
+    with pytest.raises(NothingToDiagnoseError):
         module.diagnose_values([record_cart(1), record_cart(1)], MODEL)
 
 

@@ -38,7 +38,7 @@ def test_a_constant_response_is_wrong_and_a_constant_command_is_reported(make_re
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"), [(1.0, "is response 'a1', sample"), (-2.5, "times -2.5, up to an offset")]
+    ("factor", "words"), [(1.0, "is response 'a1', up to an offset"), (-2.5, "times -2.5, up to an offset")]
 )
 def test_a_copy_of_a_channel_is_found(make_recording, draw_noise, factor, words):
     response = np.column_stack([draw_noise(1), factor * draw_noise(1) + 3.0 * (factor != 1.0)])

@@ -64,7 +64,7 @@ def test_declared_periods_are_taken_and_checked(make_recording):
     wrong = make_recording(command, command, segments=(Segment(0, 4000, "noise", period=480),))
     (check, *_) = check_repeats(wrong, find_repeats(wrong, [(0, 4000)]))
     assert check.level == "wrong"
-    assert "Segment 1 states a period of 480 samples, but its command differs by" in check.finding
+    assert "Segment 1 states a period of 480 samples, but its excitation differs by" in check.finding
 
 
 def test_a_feedback_does_not_hide_that_the_excitation_repeats(make_recording):

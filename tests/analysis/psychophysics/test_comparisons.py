@@ -114,7 +114,7 @@ def test_a_frequency_without_a_value_has_no_interval():
 def test_without_spread_it_says_what_is_missing():
     result = compare_group_means(compute_one_way_anova({"5 Hz": (0.5,), "15 Hz": (0.7,)}))
     assert (result.pairs, result.intervals, result.critical_range) == ((), (), None)
-    assert result.notes == ("Without a spread within groups no pairs can be compared.",)
+    assert result.notes == ("Pairs need values in two groups and a spread within groups.",)
 
 
 def test_a_group_without_a_mean_is_refused():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.detection import (
-    BelowDetection,
+    ThresholdBelowDetection,
     compute_detection_thresholds,
-    find_directions_below_detection,
+    find_thresholds_below_detection,
 )
 from analysis.psychophysics.runs import InconsistentTrialsError
 from analysis.psychophysics.threshold_table import tabulate_thresholds
@@ -89,8 +89,8 @@ def threshold_tables(detection_protocol, direction_n, detection_n, simulate_dete
 
 def test_a_direction_told_before_it_is_felt_is_found(detection_protocol, simulate_detection, simulate):
     direction, detection = threshold_tables(detection_protocol, 0.2, 1.0, simulate_detection, simulate)
-    (below,) = find_directions_below_detection(direction, detection)
-    assert below == BelowDetection("s01", 35.0, direction.values[0][0], detection.values[0][0])
+    (below,) = find_thresholds_below_detection(direction, detection)
+    assert below == ThresholdBelowDetection("s01", 35.0, direction.values[0][0], detection.values[0][0])
 
 
 @pytest.mark.parametrize(("direction_n", "detection_n"), [(1.0, 0.1), (float("inf"), float("inf"))])
@@ -98,7 +98,7 @@ def test_a_direction_felt_later_or_never_is_no_contradiction(
     detection_protocol, simulate_detection, simulate, direction_n, detection_n
 ):
     assert (
-        find_directions_below_detection(
+        find_thresholds_below_detection(
             *threshold_tables(detection_protocol, direction_n, detection_n, simulate_detection, simulate)
         )
         == ()

@@ -23,8 +23,8 @@ def test_what_arrives_as_wanted_is_no_warning():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"delivered_mps2": 1.8}, "5 Hz (60 % of what was wanted, 3 % off the direction)"),
-        ({"off_axis_mps2": 0.9}, "5 Hz (100 % of what was wanted, 30 % off the direction)"),
+        ({"delivered_mps2": 1.8}, "5 Hz (60 % of the target, 3 % off the direction)"),
+        ({"off_axis_mps2": 0.9}, "5 Hz (100 % of the target, 30 % off the direction)"),
     ],
 )
 def test_what_does_not_is_named_with_its_frequency(changes, said):
@@ -45,7 +45,7 @@ def test_numbers_that_are_exchanged_between_people_hide_no_difference_between_th
         ]
     )
     assert found[0].along == pytest.approx((1.3, 0.7))
-    assert "25 Hz (130 % and 70 % of what was wanted" in make_delivery_warning(found)
+    assert "25 Hz (130 % and 70 % of the target" in make_delivery_warning(found)
 
 
 def test_the_median_counts_and_void_trials_do_not():

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
-from equalizer.effects.command_sign import CROSS_AXIS_TILTS, DIRECTION_PAIRS, SIGN_REVERSED, with_reversed_commands
+from equalizer.effects.command_sign import CROSS_AXIS_TILTS, DIRECTION_PAIRS, SIGN_REVERSED, reverse_commands
 from equalizer.effects.discovered_law import Channels
 from equalizer.effects.placing import find_place, place_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -61,7 +61,7 @@ def apart(bench, effect: ModelEffect) -> float:
     """What turning changes in the answer, over what the effect does; and the effect does something."""
     plain = bench.three_axes()
     model = replace(plain, effects=(effect,))
-    turned = with_reversed_commands(model, WAY, INPUTS, OUTPUTS)
+    turned = reverse_commands(model, WAY, INPUTS, OUTPUTS)
     before = simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, Channels(INPUTS, OUTPUTS)))
     after = simulate_mechanism(turned, COMMANDS * WAY, RATE_HZ, place_effects(turned, Channels(INPUTS, OUTPUTS)))
     without = simulate_mechanism(plain, COMMANDS, RATE_HZ)
@@ -111,7 +111,7 @@ def test_every_effect_that_pushes_or_is_pushed_was_turned():
 def test_an_effect_of_all_axes_is_split_where_some_turn(bench):
     effect = ModelEffect("constant_force", None, {"force": 0.3})
     assert apart(bench, effect) < 1e-9
-    turned = with_reversed_commands(replace(bench.three_axes(), effects=(effect,)), WAY, INPUTS, OUTPUTS)
+    turned = reverse_commands(replace(bench.three_axes(), effects=(effect,)), WAY, INPUTS, OUTPUTS)
     assert [(each.axis, each.parameters["force"]) for each in turned.effects] == [("x", 0.3), ("y", -0.3), ("z", 0.3)]
 
 

@@ -6,7 +6,7 @@ import pytest
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.placing import PlacingError, place_effects, shorten_axis_name, to_model_effects
+from equalizer.effects.placing import PlacingError, convert_to_model_effects, place_effects, shorten_axis_name
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import parse_law
 from equalizer.plant.effect_vocabulary import EFFECT_ENTRIES, EFFECTS_BY_NAME
@@ -46,7 +46,7 @@ def test_what_was_fitted_is_written_and_read_back_the_same(bench, effect):
     fitted = type(placed(bench.three_axes(), written("force_gain", "x", False))[0])(
         effect, (1,) if one else (0, 1, 2), values
     )
-    model = replace(bench.three_axes(), effects=to_model_effects((fitted,), INPUTS, OUTPUTS))
+    model = replace(bench.three_axes(), effects=convert_to_model_effects((fitted,), INPUTS, OUTPUTS))
     assert [each.axis for each in model.effects] == (["y"] if one else [None])
     (again,) = place_effects(parse_mechanical_model(format_mechanical_model(model)), Channels(INPUTS, OUTPUTS))
     assert again.effect is effect
@@ -74,7 +74,7 @@ def test_a_letter_that_two_channels_end_with_is_refused(bench):
 def test_an_effect_beyond_the_channels_cannot_be_written(bench):
     (one,) = placed(bench.three_axes(), written("coulomb_friction", "z", False))
     with pytest.raises(PlacingError, match="coulomb_friction is placed at number 3, but there are 2"):
-        to_model_effects((one,), INPUTS[:2], OUTPUTS)
+        convert_to_model_effects((one,), INPUTS[:2], OUTPUTS)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter)
 def test_a_discovered_law_is_written_and_read_back_the_same(bench, text, acts_on):
     law = parse_law(text, acts_on, "y")
     fitted = PlacedEffect(make_law_effect(law), (1,), get_law_values(law))
-    model = replace(bench.three_axes(), effects=to_model_effects((fitted,), INPUTS, OUTPUTS))
+    model = replace(bench.three_axes(), effects=convert_to_model_effects((fitted,), INPUTS, OUTPUTS))
     again = parse_mechanical_model(format_mechanical_model(model))
     assert again.effects == (ModelEffect("discovered_law", "y", {}, law),)
     (placed_again,) = place_effects(again, Channels(INPUTS, OUTPUTS))

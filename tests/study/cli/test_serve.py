@@ -189,7 +189,7 @@ def test_without_the_token_nothing_is_served(server, path):
 
     status, said, refused = in_browser(server, visit)
     assert (status, refused) == (404, 404)
-    assert said == "The study is at the address that hapteq serve said, to its last letter."
+    assert said == "The study is only at the whole address that hapteq serve printed."
 
 
 @pytest.mark.parametrize("path", ["/", "/static/js/textual.js", "/nothing", None])

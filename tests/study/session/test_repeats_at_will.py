@@ -18,7 +18,7 @@ from study.participants.psychometric_curve import WeibullCurve
 from study.session.facts.events import AnswerGiven, TrialMeasured, TrialSpoiled
 from study.session.state.fold import apply_event
 from study.session.state.machine import find_next_action
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.state import begin_session, count_repeats_left
 from study.store.formats.protocol_files import read_study_protocol
 
@@ -152,7 +152,7 @@ def test_the_number_of_repeats_in_a_run_is_limited_by_the_protocol(facts, protoc
     assert count_repeats_left(state) == 0
     action = find_next_action(state)
     state = apply_event(state, facts.presented(action))
-    with pytest.raises(LogContradiction, match="no repeat of this run remained"):
+    with pytest.raises(LogContradictionError, match="no repeat of this run remained"):
         apply_event(state, spoiled(action, VoidCause.ASKED))
     assert count_repeats_left(apply_event(state, spoiled(action, VoidCause.FAULT))) == 0
 

@@ -21,7 +21,7 @@ from equalizer.effects.discovered_law import (
     DERIVATIVE_PREFIXES,
     derive_axis_letters,
     has_memory,
-    with_law_values,
+    set_law_values,
 )
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.starts.evidence import Evidence
@@ -57,7 +57,7 @@ def compute_law_signature(
     depends on a signal other than time, motions and commands. axes: names of the axes."""
     if placed_effect.effect.law is None or placed_effect.effect.law.acts_on == "response":
         return None
-    law = with_law_values(placed_effect.effect.law, placed_effect.values)
+    law = set_law_values(placed_effect.effect.law, placed_effect.values)
     if law.acts_on == "command":
         command = COMMAND_PREFIX + derive_axis_letters(axes)[placed_effect.sites[0]]
         law = replace(law, expression=f"({law.expression}) - {command}", acts_on="force", units=())

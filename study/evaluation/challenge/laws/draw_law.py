@@ -28,7 +28,7 @@ from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_multi
 from study.evaluation.challenge.laws.build_law import LawTruth, build_law
 from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, LAWS_BY_NAME
 from study.evaluation.challenge.mechanism_kernel import Motion
-from study.evaluation.challenge.nominal_models import convert_to_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import draw_calibration, make_model, retune
 from study.evaluation.challenge.nuisance_effects import add_nuisance_effects
 from study.evaluation.challenge.sensor import read_sensor
 
@@ -150,7 +150,7 @@ def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
         nominal, tolerance = draw_calibration(bench, random, settings.axes)
     else:
         nominal, tolerance = retune(bench, response, plan, settings.axes)
-    model = convert_to_model(name, nominal, tolerance, settings.axes)
+    model = make_model(name, nominal, tolerance, settings.axes)
     recording = make_recording(name, plan, response, position, settings)
     motion_pairs = tuple(
         (simulated_motion.acceleration, simulated_motion.position) for simulated_motion in (base_motion, true_motion)

@@ -26,7 +26,7 @@ from study.evaluation.challenge.draw_case import (
     make_truth,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
-from study.evaluation.challenge.nominal_models import convert_to_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import draw_calibration, make_model, retune
 from study.evaluation.challenge.second_engine.mujoco_bench import (
     MujocoBench,
     linearise,
@@ -55,11 +55,9 @@ def draw_mujoco_case(
     base_motion = simulate_motion(baseline, plan.command)
     true_bench, measured, truth = baseline, Device(bench), []
     peak = np.minimum(np.abs(base_motion[0]).max(axis=0), RANGE_MPS2)
-    for effect, effect_strength in zip((EFFECTS[effect_name] for effect_name in effects), strength, strict=True):
+    for effect, level in zip((EFFECTS[effect_name] for effect_name in effects), strength, strict=True):
         axis = settings.axes[int(random.integers(len(settings.axes)))]
-        context = EffectContext(
-            random, effect_strength, bench, axis, np.abs(base_motion[1]).max(axis=0), peak, settings.axes
-        )
+        context = EffectContext(random, level, bench, axis, np.abs(base_motion[1]).max(axis=0), peak, settings.axes)
         values = effect.draw(context)
         if effect.name in SENSOR_EFFECTS:
             measured = effect.build(measured, axis, values)
@@ -76,7 +74,7 @@ def draw_mujoco_case(
         nominal, tolerance = retune(bench, response, plan, settings.axes)
     recording = make_recording(name, plan, response, position, settings)
 
-    def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:  # `RecordAgain`
+    def rerecord(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:  # `RecordAgain`
         repeat_plan = make_further_plan(command, kind, settings)
         loaded_bench = replace(true_bench, mass_kg=true_bench.mass_kg + added_kg)
         measured_motion = simulate_motion(loaded_bench, repeat_plan.command)
@@ -84,9 +82,7 @@ def draw_mujoco_case(
         return replace(make_recording(name, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
 
     detectability = compute_detectability(Device(bench), measured, (base_motion, motion), settings) if effects else 0.0
-    return Case(
-        recording, convert_to_model(name, nominal, tolerance, settings.axes), tuple(truth), record_again, detectability
-    )
+    return Case(recording, make_model(name, nominal, tolerance, settings.axes), tuple(truth), rerecord, detectability)
 
 
 def _add_on_axis(table: FloatArray, axis: int, value: float) -> FloatArray:

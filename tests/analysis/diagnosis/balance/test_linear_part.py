@@ -106,7 +106,7 @@ def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, record_s
 
     assert balance.named[0].law.effect == "coulomb_friction"
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.1)
-    assert not any(law.named for law in balance.laws if law.law.linear)
+    assert not any(law.named for law in balance.laws if law.law.is_linear)
 
 
 def test_what_is_left_of_a_command_drives_one_body(balances_of_both):
@@ -142,6 +142,6 @@ def test_where_only_accelerations_were_measured_a_hardening_spring_is_found(reco
 
     (balance,) = find_balance(record_samples(3 * at(times_s)[:, None], seen[:, None], rate_hz, "acceleration"))
 
-    strongest = next(each for each in balance.laws if not each.law.linear)
+    strongest = next(each for each in balance.laws if not each.law.is_linear)
     assert strongest.law.effect == "hardening_stiffness"
     assert strongest.values["k3"] == pytest.approx(cubic, rel=0.35)

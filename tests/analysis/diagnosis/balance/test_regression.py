@@ -97,7 +97,7 @@ def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):
         regression.cross_validate(anew.select_columns((0,))).sum()
     )
     assert replace_law(regression, 0, PAIR) is None
-    assert replace_law(regression, 0, replace(SCALE, columns=lambda m, n: 0 * m.velocity[:, :1])) is None
+    assert replace_law(regression, 0, replace(SCALE, make_columns=lambda m, n: 0 * m.velocity[:, :1])) is None
 
 
 def test_some_laws_alone_leave_what_they_leave_among_the_others(regression):

@@ -48,6 +48,6 @@ def test_friction_of_a_tenth_of_the_force_is_named(find_friction_balance):
     ],
 )  # fmt: skip
 def test_a_class_of_many_is_named_where_all_of_it_is_dry_friction(effect, alike, named):
-    law = SimpleNamespace(linear=False, effect=effect, formula=None)
+    law = SimpleNamespace(is_linear=False, effect=effect, formula=None)
     why_not = _find_objection(law, {"level": 1.0}, (0.5, 0.4, 0.9, 0.95), alike)
     assert (why_not == "") == named

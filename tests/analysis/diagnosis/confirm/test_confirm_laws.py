@@ -169,7 +169,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
         score_fit=candidate_with_test_error,
         with_test_score=lambda each: each,
     )
-    context.with_choosing_samples_fitted = lambda: context
+    context.join_fit_and_choose = lambda: context
     found = by_balance.search_by_balance(context, (balance,), False)
     assert (found is not None) == is_named
 

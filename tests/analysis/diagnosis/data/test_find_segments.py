@@ -41,7 +41,7 @@ def test_each_part_becomes_a_segment_with_its_period_and_level():
         (0, 2500, "multisine", 500, ""), (2500, 5000, "multisine", 500, ""), (5000, 7500, "multisine", 500, "")
     ]  # fmt: skip
     assert [s.amplitude for s in found.segments] == pytest.approx([0.5 * top, top, 2 * top])
-    assert said.startswith("The command repeats exactly, every 500 samples, 5 times or more in each part")
+    assert said.startswith("The excitation repeats exactly, every 500 samples, 5 times or more in each part")
 
 
 def test_noise_is_then_taken_from_the_repeats():
@@ -105,4 +105,4 @@ def test_a_part_that_does_not_repeat_beside_one_that_does_is_not_taken_for_rest(
     parts = [{"start": 0, "stop": 2500}, {"start": 2500, "stop": 4500}]
     found, said = find_segments(make_recording(command, parts=parts))
     assert [(s.kind, s.period) for s in found.segments] == [("multisine", 500), ("noise", 0)]
-    assert said.startswith("In 1 of 2 parts the command repeats exactly")
+    assert said.startswith("In 1 of 2 parts the excitation repeats exactly")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
+from analysis.diagnosis.data.force_constant import ForceConstantError, convert_commands_to_forces
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -20,7 +20,7 @@ def make_recording(unit: str = "A", moved: str = "rad") -> Recording:
 
 
 def test_amperes_become_newton_metres():
-    found, said = with_force_constant(make_recording(), (0.05,))
+    found, said = convert_commands_to_forces(make_recording(), (0.05,))
     assert (found.command.quantity, found.command.unit) == ("torque", "N m")
     assert np.array_equal(found.command.samples[:, 0], 0.05 * np.arange(8.0))
     assert said == "The commands were multiplied by the torque constant that was stated, 0.05 N m per A."
@@ -28,7 +28,7 @@ def test_amperes_become_newton_metres():
 
 def test_the_part_that_was_decided_goes_with_it():
     given = make_recording()
-    found, _ = with_force_constant(replace(given, excitation=given.command), (0.05,))
+    found, _ = convert_commands_to_forces(replace(given, excitation=given.command), (0.05,))
     assert np.array_equal(found.excitation.samples, found.command.samples)
 
 
@@ -38,5 +38,5 @@ def test_the_part_that_was_decided_goes_with_it():
      ("A", "rad", (0.05, 0.04), "for 1 commands"), ("A", "rad", (0.0,), "other than 0")],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(unit, moved, constants, said):
-    with pytest.raises(NoForceConstant, match=said):
-        with_force_constant(make_recording(unit, moved), constants)
+    with pytest.raises(ForceConstantError, match=said):
+        convert_commands_to_forces(make_recording(unit, moved), constants)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.input_checks import (
-    NothingToDiagnose,
+    NothingToDiagnoseError,
     require_comparable,
     require_different,
     require_model_of,
@@ -43,7 +43,7 @@ def with_samples(given: Recording, side: str, samples) -> Recording:
 
 
 def refusal_text(check, *arguments) -> str:
-    with pytest.raises(NothingToDiagnose) as refused:
+    with pytest.raises(NothingToDiagnoseError) as refused:
         check(*arguments)
     return str(refused.value)
 
@@ -140,8 +140,8 @@ def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_ho
 
 def test_a_rate_too_slow_for_the_model_is_refused():
     said = refusal_text(require_model_of, make_model(stiffness=100.0), [make_recording(rate_hz=0.5)])
-    assert "the model swings at" in said
-    assert "a rate of 0.5 Hz; the recording must state its rate in hertz" in said
+    assert "the model's lowest natural frequency is" in said
+    assert "sample rate of 0.5 Hz; the recording must state its rate in hertz" in said
     require_model_of(make_model(stiffness=0.0), [make_recording(rate_hz=0.5)])
 
 
@@ -158,7 +158,7 @@ def test_a_recording_that_is_all_noise_is_refused():
         (make_model(axes=3), "the model has 3 outputs, but the recording has 1 response channel (ax)"),
         (
             make_model(quantity="velocity"),
-            "the model answers with velocity, but the recording's response is acceleration",
+            "the model's response is velocity, but the recording's is acceleration",
         ),
         (make_model(rotational=True), "the model is rotational (kg m^2, N m, rad), but the recording is translational"),
         (make_model(damping=-1.0), "the model is unstable: without a force its motion grows e-fold in 0.5 s"),

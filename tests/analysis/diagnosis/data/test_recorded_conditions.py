@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError, require_model_of
 from analysis.diagnosis.data.recorded_conditions import add_mass, add_payload, has_payload
 from analysis.diagnosis.errors.choose_measure import make_measure
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -57,10 +57,10 @@ def test_a_recording_that_says_nothing_leaves_the_model_as_it_is(recordings, dia
         ({"added_mass_kg": -0.1}, "added_mass_kg = -0.1, which must be a number from 0 on"),
         ({"added_mass_kg": "30 g"}, "added_mass_kg = '30 g', which must be a number from 0 on"),
         ({"added_mass_kg": True}, "which must be a number from 0 on"),
-        ({"added_inertia_kg_m2": 0.1}, "the model's device moves straight: say added_mass_kg"),
+        ({"added_inertia_kg_m2": 0.1}, "the model's device translates: state added_mass_kg"),
     ],
 )
 def test_a_weight_that_is_none_is_refused(recordings, diagnosed, meta, words):
-    with pytest.raises(NothingToDiagnose, match="added_mass_kg") as refusal:
+    with pytest.raises(NothingToDiagnoseError, match="added_mass_kg") as refusal:
         require_model_of(diagnosed.device(1), [replace(recordings[0], meta=meta)])
     assert words in str(refusal.value)

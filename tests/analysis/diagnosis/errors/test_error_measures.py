@@ -54,7 +54,7 @@ def test_no_friction_is_found_under_a_controller_where_there_is_none() -> None:
 def test_a_plant_that_drifts_freely_is_simulated_in_windows(drifting_recording: Recording) -> None:
     chosen = make_measure([drifting_recording], make_model())
     assert chosen.measure.name == "windows of 1 s"
-    assert "integrates freely" in chosen.remarks[0]
+    assert "free motion does not decay" in chosen.remarks[0]
 
 
 def test_a_window_holds_many_readings_per_number_of_its_state_at_any_rate(drifting_recording: Recording) -> None:

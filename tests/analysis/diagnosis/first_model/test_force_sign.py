@@ -66,7 +66,7 @@ def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, fric
     assert convert_to_driven_motions((recording,)) == ((recording,), ())
     (found,), (said,) = convert_to_driven_motions((reverse_command(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
-    assert said.startswith("u is counted against the motion")
+    assert said.startswith("u is opposite in sign to the motion")
 
 
 @pytest.mark.parametrize("hold", [Hold.BAND_LIMITED, Hold.LINEAR])

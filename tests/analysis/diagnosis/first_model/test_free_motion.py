@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.first_model.free_motion import convert_free_motion, is_undriven_motion
-from analysis.diagnosis.first_model.model_structures import StructureRefused
+from analysis.diagnosis.first_model.model_structures import StructureFitError
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -101,7 +101,7 @@ def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
 @pytest.mark.parametrize(("quantity", "unit"), [("temperature", "K"), ("current", "A")])
 def test_what_is_no_motion_is_not_read_as_a_position(quantity, unit):
     cooled = make_recording(simulate_decay(friction_acceleration, 1.0, 8, 3))
-    with pytest.raises(NothingToDiagnose, match="the command never changes"):
+    with pytest.raises(NothingToDiagnoseError, match="the command never changes"):
         diagnose_values(replace(cooled, response=replace(cooled.response, quantity=quantity, unit=unit)))
 
 
@@ -120,7 +120,7 @@ def test_a_linear_decay_names_nothing(seed):
 def test_a_standing_command_with_accelerations_alone_is_refused_with_a_way_on():
     swing = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 1))
     response = Signal(swing.response.samples, RATE_HZ, "angular acceleration", "rad/s^2", ("alpha",))
-    with pytest.raises(NothingToDiagnose, match="a free motion, measured as positions or speeds"):
+    with pytest.raises(NothingToDiagnoseError, match="a free motion, measured as positions or speeds"):
         diagnose_values(replace(swing, response=response))
 
 
@@ -145,7 +145,7 @@ def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
     assert choice.fit.kind == "mass-spring"
     numbers = {number.name: number.value for number in choice.fit.parameters}
     assert numbers == {"damping angle": pytest.approx(DAMPING, rel=0.1), "stiffness angle": pytest.approx(SPRING, 0.01)}
-    with pytest.raises(StructureRefused, match="has a mass"):
+    with pytest.raises(StructureFitError, match="has a mass"):
         choose_structure(read, "massless", lambda share: None)
 
 

@@ -265,7 +265,7 @@ def test_the_title_of_an_effect_stands_alone():
 
 def test_faults_of_a_whole_sensor_need_no_place():
     turned = NamedEffect("sensor_misalignment", "sensor", None, 1.0, 0.98, {"degrees": Estimate(8.7, "deg")})
-    assert format_effect_title(turned) == "a turned sensor"
+    assert format_effect_title(turned) == "a misaligned sensor"
     assert format_effect_title(replace(turned, effect="sensor_gain", parameters={"gain": Estimate(1.1, "1")})) == (
         "a wrong sensor gain in all channels"
     )

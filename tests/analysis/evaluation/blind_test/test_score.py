@@ -202,7 +202,7 @@ def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
     page = render_blind_test_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
     assert page.index("Misses: 8") < page.index("Figures")
     assert "One remark." in page and "ab" * 32 in page
-    assert "sensor_lag, logger_offset" in page and "nothing would tell" in page and "no name" in page
+    assert "sensor_lag, logger_offset" in page and "no recording would decide" in page and "no name" in page
 
 
 def test_a_bank_of_nothing_has_no_pictures():

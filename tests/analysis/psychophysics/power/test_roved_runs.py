@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family
-from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, list_compared_rules
+from analysis.psychophysics.power.compare_rules import (
+    SimulatedPerson,
+    answer_trials,
+    compare_rules,
+    list_compared_rules,
+)
 from analysis.psychophysics.power.felt_delivery import tabulate_felt_delivery
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _apply_delivery, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, simulate_staircase
@@ -29,7 +34,7 @@ def play_compiled(who, rule, rove_db, seed):
 @pytest.mark.parametrize("rove_db", [0.0, ROVE_DB])
 def test_a_compiled_run_is_the_plain_one_trial_by_trial(family, rove_db):
     crowd = Crowd((HZ,), (0.7,), lapse=0.03, family=family, rove_db=rove_db)
-    person = ComparedPerson(to_db(0.7), 1.7, 0.2)
+    person = SimulatedPerson(to_db(0.7), 1.7, 0.2)
     who = Participant(T_AT_THRESHOLD[family], 1.7 * NEPER_PER_DB, to_db(0.7), 0.03, 0.2, FAMILIES.index(family))
     for seed in SEEDS:
         n, track = play_compiled(who, RULE, rove_db, seed)

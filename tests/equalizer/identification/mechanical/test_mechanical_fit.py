@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError, MechanicalFitSettings
 from equalizer.identification.mechanical.mechanical_response import (
     compute_free_response,
     compute_pole_form,
@@ -231,7 +231,7 @@ def test_modes_that_the_sensor_sees_otherwise_are_fitted_by_shapes_of_their_own(
 def test_pure_noise_is_refused(seed):
     rng = np.random.default_rng(seed)
     source = recording(rng.standard_normal((4000, 1)), rng.standard_normal((4000, 1)))
-    with pytest.raises(MechanicalFitRefused, match="do not predict r0"):
+    with pytest.raises(MechanicalFitError, match="do not predict r0"):
         fit_mechanical_model([source])
 
 
@@ -245,15 +245,15 @@ def test_what_cannot_be_fitted_is_refused_by_name():
         "2 commands and 1 responses": recording(np.tile(commands, 2), response),
     }
     for words, bad in refusals.items():
-        with pytest.raises(MechanicalFitRefused, match=words):
+        with pytest.raises(MechanicalFitError, match=words):
             fit_mechanical_model([bad])
-    with pytest.raises(MechanicalFitRefused, match="no recording"):
+    with pytest.raises(MechanicalFitError, match="no recording"):
         fit_mechanical_model([])
     other = replace(source, hold=Hold.LINEAR)
-    with pytest.raises(MechanicalFitRefused, match="has the hold linear"):
+    with pytest.raises(MechanicalFitError, match="has the hold linear"):
         fit_mechanical_model([source, other])
     force = replace(source, response=replace(source.response, quantity="force", unit="N"))
-    with pytest.raises(MechanicalFitRefused, match="responses are force"):
+    with pytest.raises(MechanicalFitError, match="responses are force"):
         fit_mechanical_model([force])
 
 

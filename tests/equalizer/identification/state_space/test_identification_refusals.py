@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.identification.state_space.identify import identify
-from equalizer.identification.state_space.refusals import IdentificationRefused
+from equalizer.identification.state_space.refusals import IdentificationError
 from equalizer.identification.state_space.settings import IdentificationSettings
 
 SETTINGS = IdentificationSettings(order=6, draws=0, longer_horizons=(0,))
@@ -18,7 +18,7 @@ def good(plants, measuring):
 
 
 def refusal(response, settings=SETTINGS) -> str:
-    with pytest.raises(IdentificationRefused) as refused:
+    with pytest.raises(IdentificationError) as refused:
         identify(response, settings)
     return str(refused.value)
 

@@ -8,7 +8,7 @@ import pytest
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.candidates import choose_best
 from equalizer.identification.state_space.identify import identify
-from equalizer.identification.state_space.refusals import IdentificationRefused
+from equalizer.identification.state_space.refusals import IdentificationError
 from equalizer.identification.state_space.settings import IdentificationSettings
 
 GRID = np.linspace(5, 35, 601)
@@ -107,7 +107,7 @@ def test_time_records_give_a_start_of_their_own(plants, measuring, synthetic, ce
 
 def test_records_of_something_else_are_refused(plants, synthetic, response):
     recording = synthetic.sweeps(plants, 4.5, 37.0, 5.0)
-    with pytest.raises(IdentificationRefused, match="give the records that the response was estimated from"):
+    with pytest.raises(IdentificationError, match="give the records that the response was estimated from"):
         identify(response, QUICK, (recording,))
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form, build_form_from_poles
+from equalizer.identification.state_space.modal_form import ModalForm, build_form_from_poles, compute_modal_form
 
 
 @given(seed=st.integers(0, 10_000), order=st.sampled_from([2, 4, 8]))

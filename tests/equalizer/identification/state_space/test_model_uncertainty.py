@@ -47,7 +47,7 @@ def test_twice_the_noise_is_twice_the_uncertainty(measuring, plant):
 def test_every_draw_is_stable(measuring, plant):
     model = found_at(measuring, plant, 3, order=12)
     for row in model.samples:
-        assert model.with_parameters(row).spectral_radius <= np.exp(-1 / 500) * (1 + 1e-7)
+        assert model.replace_parameters(row).spectral_radius <= np.exp(-1 / 500) * (1 + 1e-7)
 
 
 def test_another_seed_draws_otherwise_and_no_draws_leave_no_samples(measuring, plant):

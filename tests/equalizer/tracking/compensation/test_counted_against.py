@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.effects.command_sign import with_reversed_commands
+from equalizer.effects.command_sign import reverse_commands
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
@@ -28,7 +28,7 @@ EFFECTS = (
 def physics(turned: bool) -> MechanicalModel:
     eye = np.eye(3)
     model = MechanicalModel("device", "acceleration", 0.28 * eye, eye, eye, eye, eye, effects=EFFECTS)
-    return with_reversed_commands(model, WAY, FORCES, ACCELERATIONS) if turned else model
+    return reverse_commands(model, WAY, FORCES, ACCELERATIONS) if turned else model
 
 
 def shaken(seed: int) -> np.ndarray:

@@ -166,7 +166,7 @@ def test_an_axis_that_is_not_there_is_refused(frictionless, wanted):
 
 
 def test_forces_that_do_not_go_axis_by_axis_are_refused(frictionless, wanted):
-    with pytest.raises(ValueError, match="do not match the wanted accelerations"):
+    with pytest.raises(ValueError, match="do not match the reference accelerations"):
         compensate(wanted[:, :2], wanted, frictionless, physics(), None)
     with pytest.raises(ValueError, match="it must be a force above zero"):
         compensate(wanted, wanted, frictionless, physics(), 0.0)

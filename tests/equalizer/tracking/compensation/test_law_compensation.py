@@ -11,11 +11,11 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.law_compensation import (
-    DEPENDS_ON_COMMAND,
     HAS_MEMORY,
     NOT_INVERTIBLE,
+    NOT_OF_MOTION_ALONE,
+    NOT_OF_OWN_COMMAND_ALONE,
     SENSOR_ERROR,
-    SEVERAL_SIGNALS,
 )
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 
@@ -150,9 +150,9 @@ def test_a_map_that_falls_among_the_commands_needed_is_refused():
 @pytest.mark.parametrize(
     ("text", "acts_on", "why"),
     [
-        ("0.1*fy*sin(y/0.01)", "force", DEPENDS_ON_COMMAND),
+        ("0.1*fy*sin(y/0.01)", "force", NOT_OF_MOTION_ALONE),
         ("lag(fy, 0.01)", "command", HAS_MEMORY),
-        ("fy + 0.1*fx", "command", SEVERAL_SIGNALS),
+        ("fy + 0.1*fx", "command", NOT_OF_OWN_COMMAND_ALONE),
         ("-1.0*abs(fy)", "command", NOT_INVERTIBLE),
         ("2.0*ay", "response", SENSOR_ERROR),
         ("0*fy", "command", NOT_INVERTIBLE),

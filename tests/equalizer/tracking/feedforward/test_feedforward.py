@@ -74,5 +74,5 @@ def test_forces_above_the_cap_are_solved_under_it_with_the_loss_stated(model, no
 
 
 def test_a_table_with_nothing_in_the_band_is_refused(model):
-    with pytest.raises(TrackingError, match="nothing is wanted between 5 and 35 Hz"):
+    with pytest.raises(TrackingError, match="the reference has no content from 5 to 35 Hz"):
         compute_feedforward_forces(model, acceleration(np.zeros((500, 3))))

@@ -110,7 +110,7 @@ def test_a_spring_makes_no_difference_far_above_it(model):
 
 
 def test_what_lies_outside_the_band_is_refused_with_what_would_do(model):
-    with pytest.raises(OutsideBandError, match=r"made for 4 to 50 Hz, but 55 Hz is wanted; .*--band"):
+    with pytest.raises(OutsideBandError, match=r"made for 4 to 50 Hz, but the signal has content at 55 Hz; .*--band"):
         compute_periodic_command(model, wanted(55.0))
 
 
@@ -118,7 +118,7 @@ def test_what_lies_outside_the_band_is_refused_with_what_would_do(model):
     ("changes", "said"),
     [
         ({"sample_rate_hz": 500.0}, "runs at 1000 Hz, not at 500 Hz"),
-        ({"unit": "N", "quantity": "force"}, "answers in m/s\\^2, but N is wanted"),
+        ({"unit": "N", "quantity": "force"}, "answers in m/s\\^2, but the reference is in N"),
     ],
 )
 def test_a_signal_of_another_kind_is_refused(model, changes, said):

@@ -8,7 +8,7 @@ from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.learning.convergence import predict_convergence
 from equalizer.tracking.learning.iteration import (
-    Repetition,
+    IterationSettings,
     Verdict,
     estimate_repeat_noise,
     estimate_rest_noise,
@@ -49,8 +49,8 @@ def invert(model, wanted):
 
 
 @pytest.fixture
-def repetition(wanted, invert) -> Repetition:
-    return Repetition(wanted, invert, RATE_HZ, BAND_HZ, noise_floor=None)
+def repetition(wanted, invert) -> IterationSettings:
+    return IterationSettings(wanted, invert, RATE_HZ, BAND_HZ, noise_floor=None)
 
 
 def error(device, forces, wanted) -> float:
@@ -73,11 +73,11 @@ def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, want
     device = rubbing.rubbing(plants.modes_of(), friction_n)
     rest = [estimate_rest_noise(device.measured(np.zeros((1000, 3)), seed=seed + 77), repetition) for seed in SEEDS]
     states = [
-        repeated(device, Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=floor), 10, seed)
+        repeated(device, IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=floor), 10, seed)
         for seed, floor in zip(SEEDS, rest, strict=True)
     ]
     errors = [error(device, state.best_forces, wanted) for state in states]
-    assert error(device, states[0].repetition.invert(wanted), wanted) > first_at_least
+    assert error(device, states[0].settings.invert(wanted), wanted) > first_at_least
     assert np.median(errors) < 0.02
     assert max(errors) < 0.02
 
@@ -92,7 +92,7 @@ def test_a_good_first_shot_is_not_made_worse(rubbing, plants, repetition, wanted
     known = (
         estimate_rest_noise(device.measured(np.zeros((1000, 3)), seed=5), repetition) if floor_from == "rest" else None
     )
-    same = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=known)
+    same = IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=known)
     errors = [error(device, repeated(device, same, 10, seed).best_forces, wanted) for seed in SEEDS]
     assert max(errors) <= 1.05 * first
 
@@ -167,7 +167,7 @@ def test_responses_that_do_not_belong_together_are_refused(plants, model):
 @pytest.mark.slow
 def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetition, wanted):
     device = rubbing.rubbing(plants.modes_of(0.2, 10.0), 0.0)
-    careful = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, first_gain=0.7)
+    careful = IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, first_gain=0.7)
     first = error(device, repetition.invert(wanted), wanted)
     errors = [error(device, repeated(device, careful, 10, seed).best_forces, wanted) for seed in range(3)]
     assert first > 0.2
@@ -176,7 +176,7 @@ def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetitio
 
 def test_a_correction_that_is_always_wrong_ends_as_diverging(plants, repetition, wanted):
     plant = plants.omega_like()
-    wrong = Repetition(wanted, lambda rows: -2 * repetition.invert(rows), RATE_HZ, BAND_HZ, noise_floor=0.01)
+    wrong = IterationSettings(wanted, lambda rows: -2 * repetition.invert(rows), RATE_HZ, BAND_HZ, noise_floor=0.01)
     state = start_iteration(wrong, initial_forces=0.5 * repetition.invert(wanted))
     for play in range(10):
         if state.verdict is not Verdict.CONTINUE:
@@ -189,7 +189,7 @@ def test_a_correction_that_is_always_wrong_ends_as_diverging(plants, repetition,
 def test_corrections_stay_under_the_cap_and_say_so(rubbing, plants, repetition, wanted):
     device = rubbing.rubbing(plants.modes_of(), 0.3)
     peak = float(np.linalg.norm(repetition.invert(wanted), axis=1).max())
-    capped = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap_n=1.02 * peak)
+    capped = IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap_n=1.02 * peak)
     state = repeated(device, capped, 5, seed=1)
     assert np.linalg.norm(state.best_forces, axis=1).max() <= 1.02 * peak * (1 + 1e-9)
     assert "were scaled down" in state.remark
@@ -200,7 +200,7 @@ def test_corrections_stay_below_the_slew_limit_and_say_so(rubbing, plants, repet
     device, first = rubbing.rubbing(plants.modes_of(), 0.3), repetition.invert(wanted)
     slew = 1.1 * steepest(first)
     state = start_iteration(
-        Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew_n_per_s=slew)
+        IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew_n_per_s=slew)
     )
     found = []
     while state.verdict is Verdict.CONTINUE and len(found) < 5:
@@ -213,7 +213,7 @@ def test_corrections_stay_below_the_slew_limit_and_say_so(rubbing, plants, repet
 
 def test_a_correction_that_no_slew_limit_leaves_room_for_ends_with_the_best_forces(plants, repetition, wanted):
     first = repetition.invert(wanted)
-    tight = Repetition(
+    tight = IterationSettings(
         wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=1e-3, slew_n_per_s=0.5 * steepest(first)
     )
     state = update_forces(start_iteration(tight, first), 0.8 * wanted)
@@ -225,7 +225,7 @@ def test_at_the_ends_of_the_record_no_impulse_is_built_up(repetition, wanted):
     """The device answers nothing there, as a handle that sticks."""
     jumps = np.zeros_like(wanted)
     jumps[:5], jumps[-5:] = 20.0, -20.0
-    known = Repetition(wanted, lambda rows: repetition.invert(rows) + jumps, RATE_HZ, BAND_HZ, noise_floor=1e-3)
+    known = IterationSettings(wanted, lambda rows: repetition.invert(rows) + jumps, RATE_HZ, BAND_HZ, noise_floor=1e-3)
     first = repetition.invert(wanted)
     state = start_iteration(known, first)
     for _ in range(4):
@@ -256,12 +256,12 @@ def test_the_share_that_fits_ends_at_the_cap():
 
 def test_first_forces_above_the_cap_are_refused(repetition, wanted):
     with pytest.raises(ValueError, match=r"the first forces reach .* N, but the cap is 0.1 N"):
-        start_iteration(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap_n=0.1))
+        start_iteration(IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap_n=0.1))
 
 
 def test_what_has_nothing_in_the_band_is_refused(repetition, wanted):
     with pytest.raises(ValueError, match="no content in the band of 5 to 35 Hz"):
-        start_iteration(Repetition(0 * wanted, repetition.invert, RATE_HZ, BAND_HZ))
+        start_iteration(IterationSettings(0 * wanted, repetition.invert, RATE_HZ, BAND_HZ))
 
 
 def test_a_measurement_that_does_not_fit_is_refused(repetition, wanted):
@@ -293,7 +293,7 @@ def test_rows_that_are_not_judged_do_not_hold_up_a_verdict(plants, repetition, w
     states = []
     for judged in (None, (0, rows - 100)):
         state = start_iteration(
-            Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, judged_rows=judged)
+            IterationSettings(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, judged_rows=judged)
         )
         states.append(update_forces(state, plant.measured(state.forces, 3) + spoilt))
     assert [state.verdict for state in states] == [Verdict.CONTINUE, Verdict.AT_FLOOR]

@@ -61,7 +61,7 @@ def test_tick_by_tick_is_the_same_start(start):
 
 
 def test_a_recording_without_energy_in_the_band_is_refused(problem):
-    with pytest.raises(TrackingError, match="the recording has nothing between 5 and 35 Hz"):
+    with pytest.raises(TrackingError, match="the recording has no content from 5 to 35 Hz"):
         prepare_causal_start(problem, np.zeros(100))
 
 

@@ -92,7 +92,7 @@ def test_what_never_settles_is_refused(model_of, question):
     numbers = model.parameters.copy()
     numbers[:16] *= 1.1
     with pytest.raises(TrackingError, match="not stable"):
-        question(make_tracking_problem(model.with_parameters(numbers), TrackingWeights()))
+        question(make_tracking_problem(model.replace_parameters(numbers), TrackingWeights()))
 
 
 @pytest.mark.parametrize(

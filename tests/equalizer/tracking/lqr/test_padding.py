@@ -71,7 +71,7 @@ def test_a_light_force_weight_does_not_blow_up_slow_forces(device_model, noise):
 
 
 def test_nothing_wanted_in_the_band_has_no_error_to_state(problem):
-    with pytest.raises(TrackingError, match="nothing is wanted between 5 and 35 Hz"):
+    with pytest.raises(TrackingError, match="the reference has no content from 5 to 35 Hz"):
         track_padded(problem, np.zeros((100, 3)))
 
 

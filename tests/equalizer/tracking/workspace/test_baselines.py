@@ -99,7 +99,7 @@ def test_costs_are_counted(three, measured):
 
 
 def test_a_raw_estimate_says_nothing_beyond_its_lines(measured):
-    with pytest.raises(ValueError, match="reliable lines from 4.5 to 37 Hz, but 30 to 40 Hz is wanted"):
+    with pytest.raises(ValueError, match="reliable lines from 4.5 to 37 Hz, but 30 to 40 Hz is required"):
         invert_measured_response(measured, np.array([30.0, 40.0]))
     nowhere = measured.select_lines(measured.frequency_hz > 100)
     with pytest.raises(ValueError, match="reliable lines"):

@@ -8,7 +8,7 @@ import pytest
 from equalizer.signals.recording_checks import check_recording
 from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, simulate_motion
-from study.evaluation.challenge.draw_case import draw_case
+from study.evaluation.challenge.draw_case import NOISE_STD, draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
 from study.evaluation.challenge.nominal_models import RETUNED_TOLERANCE, draw_calibration, retune, shift_diagonals
 from study.evaluation.challenge.sensor_kernel import filter_first_order
@@ -84,3 +84,12 @@ def test_retuning_finds_the_bench_when_nothing_hides():
     assert tolerance == RETUNED_TOLERANCE
     np.testing.assert_allclose(found.mass, bench.mass, atol=2e-4)
     np.testing.assert_allclose(found.stiffness, bench.stiffness, atol=0.3)
+
+
+@pytest.mark.parametrize("effect", ["viscous_damping", "extra_mode", "hand_impedance", "coulomb_friction"])
+def test_a_further_recording_is_of_the_device_with_its_concealed_effect(effect):
+    case = draw_case(7, (effect,), strength=1.0)
+    again = case.record_again(case.recording.command.samples, "multisine", 0.0, 1)
+    difference = again.response.samples - case.recording.response.samples
+    # Two readings with independent noise; without the effect they would differ by some hundred times the noise.
+    assert difference.std(axis=0) / NOISE_STD[:3] == pytest.approx(np.full(3, 2**0.5), rel=0.05)

@@ -123,7 +123,7 @@ def test_which_way_a_command_is_counted_is_decided_once_for_the_tests_too(tmp_pa
 
     (answer,) = diagnose_folder(RealPlan(whole.parent, tmp_path / "out"), silent).results.answers
 
-    assert any("counted against the motion" in remark for remark in answer.remarks)
+    assert any("opposite in sign to the motion" in remark for remark in answer.remarks)
     (further,) = answer.further
     assert further.retuned < 0.2
     for name in ("improved.toml", "retuned.toml"):

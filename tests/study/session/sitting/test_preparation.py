@@ -21,7 +21,7 @@ from study.session.state.machine import (
     find_next_action,
     find_next_preparation,
 )
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.views.form_views import FormKind, FormReply, find_missing_fields
 from study.session.views.forms import judge_form, make_form
 from tests.study.session.sitting.preparation import UTC, filled, prepared
@@ -77,7 +77,7 @@ def test_the_demonstration_comes_once_before_the_first_trial(begun, full):
 def test_nothing_is_filled_in_or_demonstrated_while_a_trial_is_open(begun, small_protocol, facts):
     state = begun(small_protocol)
     state = apply_event(state, facts.presented(find_next_action(state)))
-    with pytest.raises(LogContradiction, match="while a trial is open"):
+    with pytest.raises(LogContradictionError, match="while a trial is open"):
         apply_event(state, DemoFinished(UTC))
 
 

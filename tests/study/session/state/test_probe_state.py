@@ -5,7 +5,7 @@ import pytest
 
 from protocols.definition.probes import ProbeSettings
 from study.session.facts.sitting_events import ProbePlayed
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, begin_probe
 from study.session.state.vibration_dose import compute_hand_arm_weight
 
@@ -27,5 +27,5 @@ def test_no_frequency_has_a_larger_weight_than_the_one_by_which_probes_count():
     ],
 )
 def test_a_probe_that_the_protocol_does_not_allow_is_refused_with_the_reason(settings, level_n, number, why):
-    with pytest.raises(LogContradiction, match=why):
+    with pytest.raises(LogContradictionError, match=why):
         begin_probe(ProbeState(), ProbePlayed(UTC, number, "hand", level_n), settings)

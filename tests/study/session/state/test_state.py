@@ -19,7 +19,7 @@ from study.session.facts.events import (
 )
 from study.session.state.fold import apply_event
 from study.session.state.machine import Finish, TakeRest, find_next_action
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.state import begin_session
 from tests.session_facts import UTC, answered, measured, one_trial, opened, presented
 
@@ -77,7 +77,7 @@ def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fres
 
 def test_a_level_that_the_rules_do_not_give_is_a_contradiction(fresh):
     wrong = replace(presented(find_next_action(fresh)), level_n=1.1)
-    with pytest.raises(LogContradiction, match=r"level_n 1\.1 where 1\.0 is due: .*different rules"):
+    with pytest.raises(LogContradictionError, match=r"level_n 1\.1 where 1\.0 is due: .*different rules"):
         apply_event(fresh, wrong)
 
 
@@ -92,7 +92,7 @@ def test_no_part_of_a_draw_can_be_changed_in_the_log(fresh, field):
         "frequency_hz": 25.0,
         "phase": Phase.TEST,
     }
-    with pytest.raises(LogContradiction, match=f"presented with {field} "):
+    with pytest.raises(LogContradictionError, match=f"presented with {field} "):
         apply_event(fresh, replace(right, **{field: other[field]}))
 
 
@@ -102,36 +102,36 @@ def test_the_last_bit_of_a_level_may_differ_between_machines(fresh):
 
 
 def test_a_session_cannot_be_closed_before_its_last_run(fresh):
-    with pytest.raises(LogContradiction, match="before its last run was finished"):
+    with pytest.raises(LogContradictionError, match="before its last run was finished"):
         apply_event(fresh, SessionClosed(UTC, "completed"))
 
 
 def test_a_rest_that_was_not_due_is_a_contradiction(fresh):
-    with pytest.raises(LogContradiction, match="none was due"):
+    with pytest.raises(LogContradictionError, match="none was due"):
         apply_event(fresh, RestTaken(UTC, 0, 0, rested_s=5.0))
 
 
 @pytest.mark.parametrize("change", [{"run": 1}, {"trial": 1}, {"attempt": 1}])
 def test_a_trial_out_of_turn_is_a_contradiction(fresh, change):
-    with pytest.raises(LogContradiction, match="was due"):
+    with pytest.raises(LogContradictionError, match="was due"):
         apply_event(fresh, replace(presented(find_next_action(fresh)), **change))
 
 
 def test_an_answer_without_a_trial_is_a_contradiction(fresh):
-    with pytest.raises(LogContradiction, match="which is not open"):
+    with pytest.raises(LogContradictionError, match="which is not open"):
         apply_event(fresh, answered(find_next_action(fresh), correct=True))
 
 
 def test_a_second_answer_to_a_trial_is_a_contradiction(fresh):
     action = find_next_action(fresh)
     state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=True))
-    with pytest.raises(LogContradiction, match="answered twice"):
+    with pytest.raises(LogContradictionError, match="answered twice"):
         apply_event(state, answered(action, correct=False))
 
 
 def test_a_measurement_before_the_answer_is_a_contradiction(fresh):
     action = find_next_action(fresh)
-    with pytest.raises(LogContradiction, match="measured before it was answered"):
+    with pytest.raises(LogContradictionError, match="measured before it was answered"):
         apply_event(apply_event(fresh, presented(action)), measured(action))
 
 
@@ -151,12 +151,12 @@ def test_an_interruption_at_the_very_end_does_not_spoil_a_finished_session(fresh
 
 def test_nothing_else_follows_the_closing(fresh):
     closed = finished_session(fresh)
-    with pytest.raises(LogContradiction, match="after the session was closed"):
+    with pytest.raises(LogContradictionError, match="after the session was closed"):
         apply_event(closed, SessionClosed(UTC, "completed"))
 
 
 def test_a_session_is_opened_once(fresh):
-    with pytest.raises(LogContradiction, match="opened twice"):
+    with pytest.raises(LogContradictionError, match="opened twice"):
         apply_event(fresh, fresh.opened)
 
 

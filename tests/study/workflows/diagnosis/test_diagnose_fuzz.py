@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.first_model import fit_without_model
 from analysis.diagnosis.search.guard import Guard
@@ -102,7 +102,7 @@ def test_where_the_force_balance_crashes_a_model_is_fitted_without_it_and_the_cr
 
 def test_a_refusal_in_the_force_balance_is_no_crash(monkeypatch):
     def refused(*arguments):
-        raise NothingToDiagnose(("the recordings carry no model",))
+        raise NothingToDiagnoseError(("the recordings carry no model",))
 
     monkeypatch.setattr(fit_without_model, "fit_first_model", refused)
     guard = Guard(enabled=True)

@@ -109,7 +109,7 @@ def recording(*laws) -> Recording:
 def test_a_later_diagnosis_names_it_and_writes_it_into_the_model(model_file, tmp_path):
     write_entry(model_file, tmp_path / "drag_of_oil.py")
     kept = (read_entry(tmp_path / "drag_of_oil.py"),)
-    other = LAW.with_numbers([40.0, 1.6])
+    other = LAW.replace_numbers([40.0, 1.6])
     found = diagnose([recording(other)], body(), DiagnosisSettings(kept=kept), map, lambda said, share: None)
     (named,) = found.diagnosis.effects
     assert (named.effect, named.axis) == ("drag_of_oil", "x")

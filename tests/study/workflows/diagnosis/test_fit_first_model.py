@@ -170,7 +170,7 @@ def test_the_file_says_which_way_a_command_is_counted(tmp_path):
 
     model = read_mechanical_model(done.plan.out)
     assert model.input[0, 0] == -1
-    assert any("counted against the motion" in remark for remark in done.remarks)
+    assert any("opposite in sign to the motion" in remark for remark in done.remarks)
     assert compute_prediction_error(against, model, "test").without_gain < 0.02
     assert compute_prediction_error(plain, model, "test").without_gain > 1
 

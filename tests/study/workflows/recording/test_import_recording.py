@@ -221,4 +221,4 @@ def test_tables_whose_command_repeats_get_segments_with_period_and_level(tmp_pat
         (0, 1200, "multisine", 300), (1200, 2400, "multisine", 300)
     ]  # fmt: skip
     assert found[1].amplitude == pytest.approx(3 * found[0].amplitude)
-    assert done.notes[-1].startswith("The command repeats exactly, every 300 samples, 4 times or more in each part")
+    assert done.notes[-1].startswith("The excitation repeats exactly, every 300 samples, 4 times or more in each part")

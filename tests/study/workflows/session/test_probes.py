@@ -18,7 +18,7 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.state.fold import apply_event
-from study.session.state.presentation_check import LogContradiction
+from study.session.state.presentation_check import LogContradictionError
 from study.session.state.probe_state import ProbeState, apply_break
 from study.session.stimulus.probe_stimulus import make_probe_stimulus, make_reference_commands
 from study.session.views.participant_views import PlayingNotice
@@ -196,12 +196,12 @@ def test_a_probe_within_a_trial_or_above_its_cap_is_refused_by_the_log(probed):
     state = replace(probed.whole().state, closed=False)
     number = state.sitting.probing.probe_count
     probe = ProbePlayed("2026-01-01T00:00:00.000+00:00", number, "hand", 0.8)
-    with pytest.raises(LogContradiction, match="allows 1 N"):
+    with pytest.raises(LogContradictionError, match="allows 1 N"):
         apply_event(state, replace(probe, level_n=1.01))
-    with pytest.raises(LogContradiction, match="is the next"):
+    with pytest.raises(LogContradictionError, match="is the next"):
         apply_event(state, replace(probe, number=number + 1))
     within = replace(state, presented=TrialPresented.__new__(TrialPresented))
-    with pytest.raises(LogContradiction, match="while a trial is open"):
+    with pytest.raises(LogContradictionError, match="while a trial is open"):
         apply_event(within, probe)
 
 
@@ -235,9 +235,11 @@ def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_o
 
     def asks_for_a_pause(self):
         if self._activity == "reference":
-            self.pause_requester = "experimenter"
+            calls.append(1)
+            self.pause_requester = "experimenter" if len(calls) > 2 else self.pause_requester
         return glance(self)
 
+    calls: list[int] = []
     simulate = SafeDevice.simulate_hand
     monkeypatch.setattr(SessionSupervisor, "keep_alive", asks_for_a_pause)
     monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on: hands.append(on) or simulate(self, on))
@@ -248,6 +250,7 @@ def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_o
     (cut,) = (e for e in events if isinstance(e, ProbeMeasured) and e.trouble)
     assert cut.trouble == "it was cut short"
     assert cut.recording is None
+    assert 0 < cut.vibrated_s < 1  # what was played until then counts as exposure
 
 
 def test_a_stop_within_a_reference_ends_the_sitting_without_force(probed, monkeypatch):
