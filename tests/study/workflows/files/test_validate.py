@@ -152,7 +152,7 @@ def test_a_diagnosis_is_described(tmp_path):
         ("t.csv", "time_s\rax\n", "table", "Its header, '', is not known"),
         ("t.csv", "time_s,ax,ay,az\n0\r,1,2,3\n", "table of accelerations or forces", "This is not CSV: new-line"),
         ("trials.csv", "subject,session,run\n1\r,2,3\n", "table of trials", "This is not CSV: new-line"),
-        ("notes.md", "# Notes\n", "unknown file", "Nothing here knows this file; known are recordings"),
+        ("notes.md", "# Notes\n", "unknown file", "The kind of this file is not known; known are recordings"),
         ("empty.csv", "\n", "empty file", "It holds nothing; known are"),
         ("a.h5", "garbage", "HDF5 file", "It does not begin as HDF5 files do."),
     ],
