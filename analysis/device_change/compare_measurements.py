@@ -61,8 +61,8 @@ class Change:
     today: float
     """Value today; NaN = not measurable."""
     error: float
-    """Standard error of the difference; for a response, the relative rms difference that noise alone makes, the largest
-    of all bands. NaN where `today` or `accepted` is NaN."""
+    """Standard error of the difference, for noise as if both rms were `today`; for a response, the relative rms
+    difference that noise alone makes, the largest of all bands. NaN where `today` or `accepted` is NaN."""
     limit: float
     """Limit of the difference; for noise, of the ratio."""
     unit: str
@@ -116,7 +116,10 @@ def _require_same_excitation(baseline: Recording, recording: Recording) -> None:
 
 
 def _compare_friction(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
-    """Compare the friction of each axis. A NaN of either recording counts as a change."""
+    """Compare the friction of each axis. A NaN of either recording counts as a change. Raises NotMeasurableError where
+    the axes differ."""
+    if accepted.response.input_channels != today.response.input_channels:
+        raise NotMeasurableError("the channels of the two recordings differ")
     for axis, channel in enumerate(accepted.response.input_channels):
         accepted_n, today_n = float(accepted.friction_n[axis]), float(today.friction_n[axis])
         error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
@@ -144,7 +147,7 @@ def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, li
         ratio = np.linalg.norm(today.response[:, :, axis], axis=1) / np.linalg.norm(
             accepted.response[:, :, axis], axis=1
         )
-        gain = float(np.median(ratio))
+        gain = max(float(np.median(ratio)), np.finfo(float).tiny)  # 0 for a sensor that reads nothing
         # Standard error of a median: sqrt(pi / 2) = 1.2533 times that of a mean; 1.4826 MAD estimates the deviation.
         error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
         changed = _is_significant(np.log(gain), error / gain, np.log1p(limits.relative_step), limits)
@@ -239,7 +242,7 @@ def _find_peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axi
 
 def _compare_noise(accepted: DeviceMeasures, today: DeviceMeasures, limits: ChangeLimits) -> Iterator[Change]:
     """Compare the rms at rest of each response. A ratio above the factor, in either direction, is a change."""
-    # Relative standard error of an rms of independent samples.
+    # Relative standard error of the ratio of two rms values of independent samples.
     relative_error = np.sqrt(0.5 / accepted.noise_samples + 0.5 / today.noise_samples)
     for channel, accepted_rms, today_rms in zip(
         accepted.response.output_channels, accepted.noise, today.noise, strict=True

@@ -19,7 +19,7 @@ from equalizer.signals.signal import FloatArray, Signal, find_runs
 
 STROKES_BELOW_HZ = 1.0
 """Sinusoids below this frequency count as strokes: those of the shipped daily check have 0.5 Hz, and the lowest
-stimulus of a study has 5 Hz."""
+stimulus of the shipped studies has 5 Hz."""
 
 MISSED_LIMIT = 0.02
 """Largest share of missing samples (missed ticks of the control loop) of a signal: the `missed_ticks_limit` of the
@@ -51,7 +51,8 @@ class DeviceMeasures:
 def measure_device(recording: Recording) -> DeviceMeasures:
     """Measure friction, frequency response and noise of a free device. recording: strokes and a broadband excitation
     along every axis, with rests. Raises NotMeasurableError without a position or a rest, for too many missing samples,
-    with fewer than two strokes along an axis, and where no frequency response is reliable."""
+    with fewer than two strokes along an axis, and where the frequency response cannot be estimated or has no reliable
+    line."""
     recording = _interpolate_gaps(recording)
     response = _estimate_response(recording)
     friction_and_error_n = np.array(

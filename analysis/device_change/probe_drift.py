@@ -10,8 +10,7 @@ dM, dC, dK: change of the hand's mass, damping and stiffness; g: relative change
 Friction: its shapes S (force of 1 N along the measured motion) times its change, dFc_k A0_k S_k / (A0_j A_j), and times
 its initial value, because the shape changes with the motion. That value is estimated from the level dependence of the
 first responses. The noise is estimated from the differences between the first probes of a level. Of all causes and
-pairs of causes, those with the best penalised fit are selected. Called by `session_drift`.
-"""
+pairs of causes, those with the best penalised fit are selected. Called by `session_drift`."""
 
 from __future__ import annotations
 
@@ -43,7 +42,6 @@ Z_LIMIT = 4.0
 """Standard errors beyond which a change is significant; chosen by hand, against false alarms."""
 
 CAUSES = {"friction": ("friction",), "grip": ("mass", "damping", "stiffness"), "gain": ("gain",), "delay": ("delay",)}
-PARAMETERS = ("friction", "mass", "damping", "stiffness", "gain", "delay")
 PARAMETER_UNITS = {"friction": "N", "mass": "kg", "damping": "N s/m", "stiffness": "N/m", "gain": "", "delay": "s"}
 LEAST_CHANGE = {"friction": 0.03, "mass": 0.01, "damping": 0.5, "stiffness": 15.0, "gain": 0.03, "delay": 3e-4}
 """Least reported changes, in `PARAMETER_UNITS`: 3 % of a stimulus of 1 N or of the gain, a tenth of a light grip."""
@@ -74,7 +72,7 @@ class Drift:
     initial_value: float | None
     """Initial value of the friction (N); None for other parameters, of which only the change is known."""
     rivals: tuple[str, ...] = ()
-    """Causes that the probes cannot tell from this one."""
+    """Causes that the probes cannot tell from this one; not sought for a delay."""
 
     @property
     def unit(self) -> str:
@@ -94,24 +92,22 @@ def find_drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str]
     newest_probes = [level_probes[-1] for level_probes in probes_by_level.values()]
     compared_probes = [*first_probes, *newest_probes]
     shapes = compute_friction_spectra(tuple(probe.lines for probe in compared_probes), period)
-    probe_levels_n, newest_s = (
-        np.array([probe.level_n for probe in compared_probes]),
-        max(probe.time_s for probe in newest_probes),
-    )
+    newest_s = max(probe.time_s for probe in newest_probes)
+    probe_levels_n = np.array([probe.level_n for probe in compared_probes])
     delay_s = 0.0
     for _ in range(DELAY_ITERATIONS):  # a delay turns phases; its column is that for a small one
         comparison = _compare_probes(compared_probes, shapes, probe_levels_n, delay_s)
         drifts = tuple(_select_causes(comparison, newest_s, tuple(causes)))
         delay_s += sum(drift.change for drift in drifts if drift.parameter == "delay")
-    delay = replace(_make_delay_drift(comparison, newest_s), change=delay_s)
+    delay = replace(_make_delay_drift(comparison, newest_s, tuple(causes)), change=delay_s)
     other_drifts = tuple(drift for drift in drifts if drift.parameter != "delay")
     return (*other_drifts, delay) if abs(delay_s) > max(LEAST_CHANGE["delay"], Z_LIMIT * delay.error) else other_drifts
 
 
-def _make_delay_drift(comparison: _Comparison, time_s: float) -> Drift:
+def _make_delay_drift(comparison: _Comparison, time_s: float, causes: tuple[str, ...]) -> Drift:
     """Make the drift of a delay, with the standard error that the delay has as the only cause; its `change` is 0."""
-    standard_error_s = float(_fit_causes(comparison, ("delay",))[2][0])
-    return Drift("delay", "delay", "", time_s, 0.0, standard_error_s, None)
+    error_s = _fit_causes(comparison, ("delay",))[2][0] * np.sqrt(_compute_inflation(comparison, causes))
+    return Drift("delay", "delay", "", time_s, 0.0, float(error_s), None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +115,7 @@ class _Comparison:
     """Regression of the difference on the causes; both sides are divided by the noise."""
 
     difference: ComplexArray
-    """(equations,): left side of the module's equation less known friction; one per line of each newest probe."""
+    """(equations,): left side of the module's equation less known friction; per driven line and newest probe."""
     columns: dict[tuple[str, int], ComplexArray]
     """(equations,) by parameter and axis: its change per unit of the parameter."""
     friction_n: FloatArray
@@ -217,9 +213,7 @@ def _estimate_first_friction(
 
 def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ...]) -> Iterator[Drift]:
     """Select the set of at most `MAX_CAUSES` causes with the least cost, and yield its significant changes."""
-    equation_count = 2 * len(comparison.difference)
-    # Reduced chi-squared of all causes together, at least 1: it multiplies the variances of all estimates.
-    inflation = max(1.0, _fit_causes(comparison, causes)[0] / max(1, equation_count - len(_list_parameters(causes))))
+    equation_count, inflation = 2 * len(comparison.difference), _compute_inflation(comparison, causes)
     misfits = {
         cause_set: _fit_causes(comparison, cause_set)[0]
         for cause_count in range(MAX_CAUSES + 1)
@@ -253,6 +247,12 @@ def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ..
                 initial_n,
                 _find_rivals(cause, best_causes, misfits),
             )
+
+
+def _compute_inflation(comparison: _Comparison, causes: tuple[str, ...]) -> float:
+    """Compute the factor on the variances of all estimates: reduced chi-squared of all causes together, at least 1."""
+    degrees_of_freedom = max(1, 2 * len(comparison.difference) - len(_list_parameters(causes)))
+    return max(1.0, _fit_causes(comparison, causes)[0] / degrees_of_freedom)
 
 
 def _find_rivals(cause: str, best_causes: tuple[str, ...], misfits: dict[tuple[str, ...], float]) -> tuple[str, ...]:

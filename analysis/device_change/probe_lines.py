@@ -1,6 +1,6 @@
-"""Spectra of a probe (a short multisine, with a hand on the handle): force, acceleration and position at each spectral
-line, and the spectrum of dry friction along the probe's motion. Called by `probe_drift`, which compares the probes of a
-session, by `study.workflows.results.session_drift` and by `study.workflows.trial.play_probe`.
+"""Spectra of a probe (a short multisine, with or without a hand on the handle): force, acceleration and position at
+each spectral line, and the spectrum of dry friction along the probe's motion. Called by `probe_drift`, which compares
+the probes of a session, by `study.workflows.results.session_drift` and by `study.workflows.trial.play_probe`.
 
 Friction follows Dahl's law (P. R. Dahl, "A solid friction model", 1968) at a level of 1 N,
 
@@ -153,7 +153,7 @@ def compute_friction_spectra(probes: tuple[ProbeLines, ...], period_samples: int
 
 def _estimate_position_m(probe: ProbeLines, period_samples: int) -> FloatArray:
     """Estimate the position in m over one period, (period_samples, axes): from the encoders, which are where friction
-    acts; without them, the acceleration integrated twice, above `LOWEST_INTEGRATED_HZ`."""
+    acts; where any of their lines is NaN, the acceleration integrated twice, from `LOWEST_INTEGRATED_HZ` up."""
     frequency_hz = probe.frequency_hz[:, None]
     if np.isfinite(probe.position_m).all():
         position_lines_m = np.where(frequency_hz <= HIGHEST_POSITION_HZ, probe.position_m, 0)

@@ -5,10 +5,11 @@ The method depends on what is given:
 * no model (it was fitted to the recordings): laws are selected by a force balance (regression of the command on the
   motion) and confirmed by simulation; where none is named, effects of the catalogue are searched by simulation;
 * a model: effects are searched by simulation, then judged by held-out gain and by the force balance with that model;
-* clean recordings of the same device: faults are found by comparison with them (`contrast`), and by a search where no
-  fault explains the difference.
+* clean recordings of the same device: faults are found by comparison with them (`contrast`) and, with a given model,
+  by a search where it predicts them well or no fault explains the difference.
 
-Called by `study.workflows.diagnosis.diagnose_recordings` (the command `hapteq diagnose`) and by the blind tests.
+Called by `study.workflows.diagnosis.diagnose_recordings` (the command `hapteq diagnose`), `diagnose_values` and the
+tests of `study.evaluation`.
 """
 
 from collections.abc import Sequence

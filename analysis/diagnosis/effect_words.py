@@ -1,4 +1,5 @@
-"""Plain words for the effects of the vocabulary: nouns, places, units, and how their parameters are printed.
+"""Plain words for the effects of the vocabulary and for laws that it lacks: nouns, places, units, and how their
+parameters are printed.
 
 Called for the sentences, tables and figures of a diagnosis, by `analysis.diagnosis.result`, `analysis.reports`,
 `analysis.figures.diagnosis` and others.
@@ -18,13 +19,13 @@ _VALUE_ALONE = "{}"
 
 @dataclass(frozen=True, slots=True)
 class EffectWords:
-    """Words for an effect of the vocabulary: its noun, and how its parameters are printed."""
+    """Words for an effect of the vocabulary, or for a law that it lacks: noun, and how parameters are printed."""
 
     noun: str
-    """With its article, as in a sentence: "a sensor offset"."""
+    """As in a sentence, with its article if it has one: "a sensor offset"."""
     parameters: Mapping[str, str] = field(default_factory=dict)
-    """Format by parameter, "{}" for its value, in the order of printing; other parameters are not printed. Empty: the
-    main parameter alone is printed."""
+    """Format by parameter, "{}" for its value, in the order of printing; other parameters but "side" are not printed.
+    Empty: the main parameter alone is printed, or the first one of a law outside the vocabulary."""
     shares: tuple[str, ...] = ()
     """Parameters that are printed in per cent."""
 
@@ -246,7 +247,7 @@ def get_parameter_unit(effect: str, parameter: str, system: UnitSystem) -> str:
 
 def format_place(place: Place, axis: str | None, is_single_axis: bool = False) -> str:
     """Describe where an effect acts, in words. axis: its axis or channel; None = all. is_single_axis: the device has
-    one axis, which then needs no name."""
+    one axis, so that None means this one, and the hand needs no axis."""
     if place == "hand":
         return "at the handle" if axis is None or is_single_axis else f"at the handle, along {axis}"
     one_place, all_places = _PLACE_PHRASES[place]

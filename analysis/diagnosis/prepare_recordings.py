@@ -138,7 +138,8 @@ Stretch = tuple[int, int]
 
 def bridge_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
     """Interpolate gaps (NaN) in the commands or cut them out; returns the recordings, and a sentence for each that was
-    changed. A recording of which less than `LEAST_GAPLESS_SHARE` of the known samples would remain is not changed."""
+    changed. A recording of which less than `LEAST_GAPLESS_SHARE` of the known samples would remain is not changed; nor
+    is one without gaps or without known samples."""
     bridged_recordings = [
         _bridge_or_cut_gaps(recording, name) for recording, name in zip(recordings, names, strict=True)
     ]
@@ -205,7 +206,8 @@ def _list_stretches_between_gaps(stretch: Stretch, gaps: Sequence[Stretch]) -> l
 
 
 def _interpolate_gaps(samples: FloatArray) -> FloatArray:
-    """Interpolate NaN in samples (n, m) linearly, channel by channel; unchanged where a channel is all NaN."""
+    """Interpolate NaN in samples (n, m) linearly, channel by channel, constant beyond the ends; a channel of NaN alone
+    is unchanged."""
     interpolated_samples, indices = np.array(samples), np.arange(len(samples))
     for column in interpolated_samples.T:
         is_known = np.isfinite(column)

@@ -121,7 +121,8 @@ class _ImpactSearch:
 
     def explain_before_third_effect(self, result: SearchResult) -> SearchResult:
         """Return the result with play, where the drive repeats, the mismatch is unexplained, and play explains all of
-        it; else the result unchanged. A third effect would take much time and could not predict a chaotic waveform."""
+        it; else the result unchanged, also with hum below the mains frequency. A third effect would take much time and
+        could not predict a chaotic waveform."""
         is_repeated = any(floor.method == "repeats" for floor in self._fitting.chosen.floors)
         is_unexplained = not result.judgement.named and judge(result.found).verdict == "unexplained"
         if not is_repeated or not is_unexplained or has_low_hum(result.found) or not self._settings.time_left():
@@ -134,8 +135,9 @@ class _ImpactSearch:
         )
 
     def explain_at_end(self, result: SearchResult) -> SearchResult:
-        """Return the result with play, where the search leaves a mismatch that play explains; else the result
-        unchanged, also where a discovered law is named, a sensor fault is certain, or no time is left."""
+        """Return the result with play, where the search leaves a mismatch that play explains; the result with a remark
+        where the time ended before this was known; else the result unchanged, also where a discovered law is named, a
+        sensor fault is certain, or no time is left."""
         has_mismatch = result.judgement.verdict in ("unexplained", "partly_explained") and not has_discovered_law(
             result
         )
@@ -194,8 +196,8 @@ def _search(
     progress: Progress,
     impact_search: _ImpactSearch,
 ) -> SearchOutcome:
-    """Search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
-    the model was fitted to the recordings, repeated with a wider bound where needed."""
+    """Search without clean recordings; unless the model was fitted to the recordings, also for laws outside the
+    catalogue where `settings` asks for them, and again with a wider bound where needed."""
     further_searches = FurtherSearches(before_thirds=impact_search.explain_before_third_effect)
     if settings.discovery and not settings.fitted:
         # Imported here, because only a diagnosis that searches for laws needs their grammar.
@@ -235,8 +237,8 @@ def _skip_law_search_with_hum(
 
 def _select_catalogue(settings: DiagnosisSettings, recording: Recording, excluded: frozenset[str]) -> list[Effect]:
     """Select the effects to try: the catalogue and the kept laws without the excluded effects, and without
-    `GAIN_EFFECTS` for a fitted model; excluded effects that others refine are included as rivals that cannot be
-    named."""
+    `GAIN_EFFECTS` for a fitted model unless there are clean recordings; excluded effects that others refine are
+    included as rivals that cannot be named."""
     omitted = {*settings.without, *(GAIN_EFFECTS if settings.fitted and not settings.clean else ())}
     all_effects = (*CATALOGUE, *make_library_effects(settings.kept, recording))
     catalogue = [effect for effect in all_effects if effect.name not in omitted]

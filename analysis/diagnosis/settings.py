@@ -1,8 +1,8 @@
-"""All limits by which the diagnosis decides, in one table: of the search by simulation, then of the force balance and
-first models, then of the comparison with clean recordings. Imported by the modules of `analysis.diagnosis`; the heading
-of each section names the main ones.
+"""The main limits by which the diagnosis decides, in one table: of the search by simulation, then of the force balance
+and first models, then of the comparison with clean recordings. Imported by the modules of `analysis.diagnosis`, of
+which each section's heading names the main ones, and by those that report limits.
 
-Grids of starting values and purely numerical tolerances are defined in the files that use them.
+Grids of starting values, numerical tolerances and limits within one step are defined in the files that use them.
 
 Unless a comment says otherwise, an error is an rms error over the rms noise (1 = noise alone), in the worst channel,
 and a gain is the difference of the mean log error power between two fits (`FitScore.mean_log_error`).
@@ -50,7 +50,7 @@ CHOOSE_SHARE = 0.25  # share of the fitting time, from its end, to choose by whe
 TEST_SHARE = 0.25  # share of the time, or of each part's motion, from its end, to test by where no segment has a role
 AT_REST = 0.02  # share of a response's range within which it counts as at rest at the end of a part
 LONGEST_TAIL = 0.05  # share of a part: longest rest at its end that needs no other split and gives the rest value
-STILL_SHARE = 0.01  # share of the mean square of the fitted motion, below which held-out motion tests nothing
+STILL_SHARE = 0.01  # share of the mean square of the fitted motion, below which motion is rest and tests nothing
 
 # Which error measure suits (`error_measure_rule`, `closed_loop`). By hand.
 FED_BACK_SHARE = 0.1  # share of the command's rms by which it must differ from the recorded excitation in a closed loop
@@ -111,7 +111,7 @@ SAME_FIT_COST_SHARE = 0.01
 # share of an effect's gain by which the predictions of two laws may differ to share a sensitivity
 SHARED_SENSITIVITY_SHARE = 0.05
 SECOND_START_ERROR = 1.08  # error above which a fit is repeated from a second starting point
-# error after three steps up to which a fit is continued where the best one has already reached the noise
+# error up to which a fit is continued after three steps, if the best is at the noise, and no pair is searched for
 NEAR_NOISE_ERROR = 2.0
 # noise variances, in sum, that a law with more parameters must gain over one of similar effect
 RICHER_LAW_SQUARES = 4.0
@@ -221,7 +221,7 @@ LAW_MAIN_PART = 0.3  # share of the misfit that one term may leave; with more, a
 LAW_NOISE_POWER = 1.1  # held-out error power along an axis, 1 = noise, below which no law is searched for
 LAW_WORTH_SHARE = 0.4  # share of the error left above the noise that a further term must remove
 LAW_AXES_SHARE = 0.3  # share of the largest held-out misfit that a second axis needs to be searched in the same round
-LAW_FITTED = 3  # most sums that are fitted by output error
+LAW_FITTED = 3  # most sums that are fitted by output error, without a rival of other variables
 LAW_FITTED_WITHIN = 3.0  # largest ratio of the excess error of a fitted sum to that of the best one
 LAW_MOST_ROUNDS = 3  # most laws that are added one after the other
 # relative distance from a simple exponent, and relative increase of the cost, up to which a law is rounded
@@ -400,7 +400,7 @@ NEW_LINE_RATIO = 6.0  # least ratio to its prominence on the clean recordings, a
 # the motion is no sensor noise
 NOISE_INCREASE = 4.0
 NOISE_BAND_RATIO = 1.6  # largest ratio of the powers of white noise in two bands
-NOISE_STRETCHES = 6  # number of stretches in which the noise is compared
+NOISE_STRETCHES = 6  # about the number of stretches of a part in which the noise is compared
 REVERSAL_SHARE = 0.05  # share of a gap by which a reading must go back to count as a reversal
 LARGEST_CLOCK_ERROR = 0.05  # largest relative rate error of a clock
 DELAY_STEP = 0.25  # rows between the delays that are tried around the delay of a cross-correlation

@@ -25,7 +25,7 @@ ENVELOPE_COLUMNS = 1200
 """Largest number of columns of a drawn time series, each from its lowest to its highest sample. The numbers of this
 module are chosen by hand."""
 SHOWN_SAMPLES = 600
-"""Number of samples that are shown where two time series are compared."""
+"""Largest number of samples that are shown where two time series are compared."""
 _FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 """Background colours of samples to fit, of samples to test, and of the driven band."""
 _SHOWN_DECADES = 8

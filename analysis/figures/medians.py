@@ -2,7 +2,7 @@
 estimates, and the limit of direction perception.
 
 The values come from a hierarchical psychometric model (`analysis.psychophysics.hierarchy`). Thresholds are force
-amplitudes in N. Above the cap, the largest force that was played, only a lower bound is known. Called by
+amplitudes in N. Above the cap, the largest force of the staircase, only a lower bound is known. Called by
 `study_pictures` for the report of a study. The constants below set the layout; chosen by eye.
 """
 
@@ -30,7 +30,8 @@ from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnal
 _PARTICIPANT_SPREAD = 0.5
 """Width over which the participants are spread at one frequency, as a share of the step between frequencies."""
 _ABOVE_CAP_RATIO, _SMALLEST_TOP_RATIO = 1.12, 1.45
-"""Ordinate at which thresholds above the cap are drawn, and smallest upper end of the axis, relative to the cap."""
+"""Ordinate at which participants' thresholds above the cap are drawn, and smallest upper end of the axis, relative to
+the cap."""
 _LARGEST_TOP_RATIO, _LEAST_ARROW_RATIO = 8.0, 1.25
 """Largest upper end of the axis, relative to the cap; and smallest ratio of an arrow's upper to its lower end."""
 _MAX_LEGEND_PARTICIPANTS = 24
@@ -41,7 +42,8 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     """Draw thresholds in N on a logarithmic axis, by frequency.
 
     A threshold above the cap has no known size: participants are drawn on a common line with an arrow, and a median as
-    an arrow that begins at its one-sided lower bound. cap_n: largest force that was played, N."""
+    an arrow that begins at its one-sided lower bound, without one at the lower end of the axis. cap_n: largest force
+    of the staircase, N."""
     figure = create_figure(PAGE_WIDTH_IN, 4.2)
     axes = figure.add_subplot()
     style_axes(axes)
@@ -124,7 +126,8 @@ def _draw_median(axes: Axes, index: int, median: MedianThreshold, axis_ends_n: t
 
 def _draw_direction_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tuple[float, ...], cap_n: float) -> None:
     """Draw the limit of direction perception (the frequency at which the median reaches the cap) with its interval, on
-    the line of the cap; nothing without a limit. The abscissa is interpolated in log frequency."""
+    the line of the cap; nothing without a limit. A bound that is None is drawn at the outermost frequency. The abscissa
+    is interpolated in log frequency."""
     if limit.frequency_hz is None:
         return
     limit_and_ends_hz = (limit.lower_hz or frequencies_hz[0], limit.frequency_hz, limit.upper_hz or frequencies_hz[-1])

@@ -1,8 +1,9 @@
 """All figures of one study with titles and captions, in the order of its report (`analysis.reports.study_report`).
 
-Thresholds by frequency and in other units, psychometric functions of the model, delivered acceleration, staircases, and
-acceleration ellipses. A figure without data is left out; in the report, those of single participants are collapsed.
-Called by `study.workflows.results.analyze_data` and `reproduction_pictures`; exported as `analysis.study_pictures`.
+Thresholds by frequency and in other units, medians and psychometric functions of the model, delivered acceleration,
+staircases, and acceleration ellipses. A figure without data is left out; in the report, those of single participants
+are collapsed. Called by `study.workflows.results.analyze_data` and `reproduction_pictures`; exported as
+`analysis.study_pictures`.
 """
 
 import re
@@ -161,7 +162,8 @@ def _make_medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
 
 
 def _sanitize_subject_code(subject: str) -> str:
-    """Replace characters of a subject's code other than ASCII letters and digits by hyphens, as picture names need."""
+    """Replace each run of characters of a subject's code other than ASCII letters and digits by a hyphen, and remove
+    hyphens at both ends, as picture names need."""
     return re.sub(r"[^A-Za-z0-9]+", "-", subject).strip("-")
 
 

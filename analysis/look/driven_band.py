@@ -186,8 +186,8 @@ def find_silent_segments(recording: Recording) -> tuple[str, ...]:
 
 
 def check_coherences(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
-    """Check each coherence. For other segments than `_BROADBAND_KINDS`, and with feedback controllers, the estimate by
-    windows is unreliable: a notice at most."""
+    """Check each coherence. Without segments, with others than `_BROADBAND_KINDS`, and with an excitation that is no
+    command (feedback controllers), the estimate by windows is unreliable: a notice at most."""
     kinds = {segment.kind for segment in recording.segments}
     is_broadband = bool(kinds) and kinds <= _BROADBAND_KINDS and recording.excitation is None
     return tuple(_check_coherence(coherence, is_broadband) for coherence in coherences)

@@ -1,9 +1,10 @@
 """Overview of a recording before any model is fitted: its channels, spectra and levels, and all checks of its quality.
 
-The checks find missing samples, constant or copied channels, clock errors, wrong units, inconsistent kinematics,
-clipping, coarse quantization, offsets, axes without excitation, low coherence and poor repeatability; each gives a
-sentence and advice. Called by `study.workflows.recording.look_at_recordings`, exported as `analysis.overview`;
-`analysis.reports.look_report` shows it.
+The checks find missing samples, constant or copied channels, clock errors, wrong units, inconsistent kinematics, lags
+between channels, clipping, coarse quantization, offsets, axes without excitation, low coherence, levels out of
+proportion and poor repeatability; each gives a sentence, and advice where needed. Called by
+`study.workflows.recording.look_at_recordings`, exported as `analysis.overview`; `analysis.reports.look_report` shows
+it.
 """
 
 from collections.abc import Sequence
@@ -119,7 +120,8 @@ class Overview(SummaryDisplay):
     bands: tuple[DrivenBand, ...]
     """Driven bands of the excitations, or of the commands where no excitation varies; empty without spectra."""
     coherences: tuple[ResponseCoherence, ...]
-    """Coherence of responses with commands in these bands; empty without spectra."""
+    """Coherence of responses with commands in these bands; empty without spectra, and where `estimate_coherences`
+    returns none."""
     pairs: tuple[KinematicPair, ...]
     """Pairs of channels of which the second should be a time derivative of the first."""
     repeats: Repeats

@@ -59,7 +59,8 @@ class DeclaredResult:
     confidence: float
     """Confidence level of the intervals, 0 to 1."""
     results: tuple[ContrastResult, ...]
-    """The declared analysis first, then the other; none without a declared contrast."""
+    """The declared analysis first, then the other (hierarchical first where none is declared); none without a declared
+    contrast."""
     participants_declared: int
     """Declared sample size; 0: none declared."""
     participants_analysed: int

@@ -69,7 +69,8 @@ class PhasorEllipse:
     """Amplitude perpendicular to the test direction over that along it; None if the latter is 0. The perpendicular
     amplitude is the root sum of squares of both axes."""
     harmonic_share: float
-    """Squared amplitudes of harmonics 2 to `MOST_HARMONICS`, summed over all axes, over those of the fundamental."""
+    """Squared amplitudes of harmonics 2 to `MOST_HARMONICS` below half the sample rate, summed over all axes, over
+    those of the fundamental."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,8 @@ values is 0 where both have the same variance. Values are thresholds, or pseudo-
 
 Sources: S. Holm, Scand. J. Stat. 6 (1979), 65-70; D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987), 657-680 (two
 one-sided tests); E. J. G. Pitman, Biometrika 31 (1939), 9-12 and W. A. Morgan, Biometrika 31 (1939), 13-19 (equal
-spread of paired values). Called by `study_analysis`, `hierarchy.primary` and the simulated studies of `power`.
+spread of paired values). Called by `study_analysis`, `hierarchy.primary` and the simulated studies of `power`;
+`hierarchy.inference`, `tobit` and `cues.cue_findings` call single functions.
 """
 
 import math

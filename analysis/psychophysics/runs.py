@@ -69,7 +69,7 @@ def recompute_runs(
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
     answers before it lead to, a run has two frequencies, an answer has no `correct`, a catch trial was not played at
-    the cap, or a row is missing, doubled or too many.
+    the cap, or a row between others is missing, or one is doubled or too many.
     """
     phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
     trials_by_run: dict[tuple[str, str, int], list[Trial]] = {}

@@ -120,7 +120,7 @@ class StudyAnalysis(SummaryDisplay):
     mean_contrasts: tuple[Contrast, ...]
     """Differences of reversal means (dB) from the lowest frequency (of `primary`, if any), within participants."""
     tobit: tuple[Contrast, ...]
-    """The same contrasts by the Tobit model for values cut by the cap, a sensitivity analysis; empty where none is."""
+    """The same contrasts by a Tobit model (sensitivity analysis); empty where `compute_tobit_contrasts` gives none."""
     declaration: str
     """The analysis that the protocol declares before any data, in words."""
     declared_result: DeclaredResult

@@ -2,7 +2,7 @@
 
 A run also has its response bias (d', criterion), counts of trials, and the threshold as measured acceleration and
 displacement. Runs are recomputed from the answers (`runs`). The rows are those of the table `thresholds.csv`. Called
-by `study_analysis`, `detection` and `study.workflows.results.session_results`.
+by `study_analysis`, `detection`, `study.workflows.results.session_results` and `figures.staircases`.
 """
 
 from collections.abc import Iterable, Sequence

@@ -2,9 +2,10 @@
 
     y_ij = mu_j + b_i + e_ij,    b_i ~ N(0, sd_people²),  e_ij ~ N(0, sd_error²)    person i, frequency j; y in dB
 
-y is the mean level at the reversals of a staircase run. A run is censored where at least one of these reversals is
-a peak at the largest permitted force, the cap (`thresholds.is_censored`). An uncensored run contributes the density of
-y to the likelihood, a censored run P(Y >= y). The random effect b_i is integrated out by Gauss-Hermite quadrature.
+y is the mean level at the reversals of a staircase run. A run is censored where at least one of these reversals is a
+peak at the largest permitted force, the cap (`thresholds.is_censored`). Under Psi, y is the posterior mean, and
+`thresholds.CUT_PROBABILITY` decides. An uncensored run contributes the density of y to the likelihood, a censored run
+P(Y >= y). The random effect b_i is integrated out by Gauss-Hermite quadrature.
 
 Limits: the mean of a censored run is not an exact lower bound, because its valleys lie below the cap, and means near
 the cap are biased low even in uncensored runs. The model therefore removes only a part of the bias; `measured_coverage`
@@ -56,9 +57,9 @@ def compute_tobit_contrasts(
     of the intervals, 0 to 1.
 
     A frequency without an uncensored run is left out, because its likelihood has no maximum. Empty where no run is
-    censored (the analysis of the plain means then suffices), the first frequency is left out, or there are fewer than
-    three people (chosen). `Contrast.p_holm` is corrected over the contrasts that are returned alone. Raises LinAlgError
-    as `fit_tobit` does.
+    censored (the analysis of the plain means then suffices), the first frequency or every other one is left out, or
+    there are fewer than three people (chosen). `Contrast.p_holm` is corrected over the contrasts that are returned
+    alone. Raises LinAlgError as `fit_tobit` does.
     """
     is_measured = np.isfinite(values_db)
     has_uncensored: NDArray[np.bool_] = np.asarray((is_measured & ~is_censored).any(axis=0))

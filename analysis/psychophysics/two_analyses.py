@@ -100,8 +100,8 @@ def describe_comparison(
     rule: StaircaseRule,
 ) -> str:
     """Describe the differences between the published and the primary analysis. primary: None without a fit.
-    mean_contrasts: contrasts of reversal means in dB, against the same frequency as those of the primary analysis.
-    rule: the staircase of the study."""
+    mean_contrasts: contrasts of the thresholds of runs in dB (reversal means; Psi: posterior means), against the same
+    frequency as those of the primary analysis. rule: the staircase of the study."""
     if primary is None:
         return (
             "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
@@ -141,7 +141,7 @@ def describe_measured_coverage(analyses: Sequence[str], table: ThresholdTable, r
 
 def _describe_differences(primary: PrimaryAnalysis, mean_contrasts: Sequence[Contrast], rule: StaircaseRule) -> str:
     """Describe the frequencies at which the differences in dB by the model and by the thresholds of runs differ by at
-    least `NOTABLE_DIFFERENCE_DB`, or that there are none."""
+    least `NOTABLE_DIFFERENCE_DB`, that there are none, or that either gives no difference to compare."""
     means_noun = select_threshold_words(rule).noun
     means_by_frequency = {contrast.frequency_hz: contrast for contrast in mean_contrasts}
     reference = f"{primary.frequencies_hz[0]:g} Hz"
@@ -165,8 +165,8 @@ def _describe_differences(primary: PrimaryAnalysis, mean_contrasts: Sequence[Con
 
 
 def _describe_significance(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
-    """Describe the frequencies at which only one analysis finds a difference at the 5 % level; empty where they have
-    no pair in common."""
+    """Describe the frequencies at which only one analysis finds a difference at the 5 % level, or that there are none;
+    empty where the analyses have no pair in common."""
     reference_name = format_frequency(primary.frequencies_hz[0])
     tukey_p_values = {pair.second: pair.p for pair in comparisons.pairs if pair.first == reference_name}
     disagreeing_texts = [

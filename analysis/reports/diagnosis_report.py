@@ -1,8 +1,8 @@
 """HTML report of a diagnosis: named effects, the evidence for each, and the prediction errors with and without them.
 
-This module decides the sections and their order; sentences come from `analysis.diagnosis.result`, tables from
-`diagnosis_tables`, `diagnosis_distortion` and `diagnosis_method`. Called by
-`study.workflows.diagnosis.write_diagnosis`.
+This module decides the sections and their order; most sentences come from `analysis.diagnosis`, tables from
+`diagnosis_tables`, the section on distortion from `diagnosis_distortion`, that on the method from `diagnosis_method`.
+Called by `study.workflows.diagnosis.write_diagnosis`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -81,7 +81,7 @@ def render_diagnosis_report(
 
 
 def _join_doubts(findings: Findings) -> str:
-    """Join the doubts about the answer to one text; empty without doubts."""
+    """Join the doubts about the named effects to one text; empty without doubts or without effects."""
     has_effects = bool(findings.diagnosis.effects)
     doubts = [describe_confirmation(findings.diagnosis.fit.fit, findings.diagnosis.fit.test)] if has_effects else []
     if has_effects and findings.black_box is not None and is_black_box_better(findings.black_box):

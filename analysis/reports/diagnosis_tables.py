@@ -41,8 +41,8 @@ def tabulate_parameters(effect: NamedEffect) -> Table:
 
 
 def tabulate_rivals(effect: NamedEffect) -> Table:
-    """Tabulate a named effect and its rivals, with probabilities and reasons; rivals that cannot be distinguished come
-    first."""
+    """Tabulate a named effect, then its rivals, with probabilities and reasons; of the rivals, those that cannot be
+    distinguished come first."""
     rival_rows = [(capitalise(get_noun(effect.effect)), format_probability(effect.probability), "named", "")]
     rival_rows += [
         (
@@ -99,7 +99,7 @@ def tabulate_errors(findings: Findings) -> Table:
 def tabulate_channel_errors(findings: Findings, part: Literal["fit", "test"]) -> Table | None:
     """Tabulate the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
     where there are no time series. Channels without a known noise are left out. part: set of samples, a key of
-    `_PART_NAMES`. Where a statistic was fitted, its chance error takes the place of the noise."""
+    `_PART_NAMES`. Where a statistic was fitted, its chance error takes the place of the noise, and the unit is 1."""
     if not findings.time_series:
         return None
     channel_names, channel_units, noise_rms_by_channel = (

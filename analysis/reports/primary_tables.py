@@ -203,7 +203,7 @@ def format_median_interval(lower: float | None, upper: float | None, above_cap: 
 def _make_contrast_table(
     caption: str, contrasts: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
 ) -> Table:
-    """Make the table of contrasts between two frequencies (dB); those whose median is above the cap are marked."""
+    """Make the table of contrasts (dB) between two frequencies, the first marked where its median is above the cap."""
     above_cap_hz = {median.frequency_hz for median in medians if median.above_cap}
     return Table(
         caption=caption,

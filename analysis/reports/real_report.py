@@ -99,8 +99,9 @@ def make_overview_table(answers: Sequence[RealAnswer]) -> Table:
 
 
 def _format_overview_row(real_answer: RealAnswer) -> tuple[str, ...]:
-    """Format the row of a recording. A dash stands for the error with effects where no effect is named, and for that of
-    the black box where it was not computed; the other errors are empty where nothing was held out."""
+    """Format the row of a recording. A dash stands for the error with effects where no effect is named or nothing was
+    held out, and for that of the black box where it was not computed; the other errors are empty where nothing was held
+    out."""
     errors = real_answer.held_out
     error_texts = (
         ("", "", "", "") if errors is None else tuple(map(format_error, (errors.before, errors.retuned, errors.noise)))
@@ -132,9 +133,9 @@ def _describe_unusable_inputs(unusable_inputs: Sequence[UnusableInput]) -> str:
 
 
 def _make_recording_section(real_answer: RealAnswer, picture: Picture | None) -> Section:
-    """Make the section of one recording: verdict and model as paragraphs; location of the mismatch, named effects,
-    parameters, further tests, remarks and objections as a list; errors by stretch as a table. The picture is shown only
-    where it has rows of errors."""
+    """Make the section of one recording: title, verdict, model, error measure and what remains as paragraphs; location
+    of the mismatch, named effects, parameters, a change of the device, candidates, further tests, remarks and
+    objections as a list; errors by stretch as a table. The picture is shown only where it has rows of errors."""
     points = (
         *real_answer.where,
         *real_answer.named,
@@ -183,8 +184,8 @@ def _make_stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
 
 
 def describe_parameter(parameter: OwnParameter) -> str:
-    """Describe a fitted parameter of the model in a sentence with its 95 % interval and, where its value is known by
-    other means, with its deviation from it in %, which a known value of 0 does not have."""
+    """Describe a fitted parameter of the model in a sentence, with its 95 % interval where both ends are known and,
+    where its value is known by other means, with its deviation from it in %, which a known value of 0 does not have."""
     interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
     value_text = (
         f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after the last fit"

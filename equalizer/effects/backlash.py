@@ -108,9 +108,9 @@ def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> Float
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find the two gaps whose simulated impacts match the residual's spectrum best (mean squared log ratio); empty
-    without a command. Spectra are compared because the waveform of impacts cannot be predicted. The tried gaps scale
-    with the rms travel that the command would give the free motor if all its power were at 10 Hz (chosen; the tried
-    gaps span two decades)."""
+    where the command does not vary. Spectra are compared because the waveform of impacts cannot be predicted. The tried
+    gaps scale with the rms travel that the command would give the free motor if all its power were at 10 Hz (chosen;
+    the tried gaps span two decades)."""
     motor_mass, contact_stiffness, contact_damping = _derive_motor_and_contact(evidence.model, axis, {})
     contact_values = {
         "motor_mass": motor_mass,

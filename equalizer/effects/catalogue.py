@@ -1,8 +1,9 @@
-"""Catalogue of all effects that a diagnosis can name and a simulation can include.
+"""Catalogue of the effects that a diagnosis can name and a simulation can include by their name.
 
-Each module that is imported here defines one `EFFECT`. A new effect needs its own module, an entry here and its name in
-`equalizer.plant.effect_vocabulary`, in the same order. Read by the search for effects (`analysis.diagnosis`) and by
-`equalizer.effects.placing`; exported by `equalizer`.
+A diagnosis can also name laws that are not listed here; a simulation includes them as formulas, if at all
+(`analysis.diagnosis.effect_words`). Each module that is imported here defines one `EFFECT`. A new effect needs its own
+module, an entry here and its name in `equalizer.plant.effect_vocabulary`, in the same order. Read by the search for
+effects (`analysis.diagnosis`) and by `equalizer.effects.placing`; exported by `equalizer`.
 """
 
 from equalizer.effects import (

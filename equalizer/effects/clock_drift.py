@@ -43,7 +43,7 @@ def _apply_position_drift(position: FloatArray, sample_rate_hz: float, values: V
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find ppm from the slope of the response's time shift over time. Two sets of values, with band-limited and with
     linear interpolation, the better fit first: only linear interpolation lowers peaks. Empty where the slope is not
-    significant or too large, and for a channel other than the first (the clock is common to all)."""
+    known, not significant or too large, and for a channel other than the first (the clock is common to all)."""
     shift_rate = _estimate_significant_shift_rate(evidence) if channel <= 0 else None
     if shift_rate is None:
         return ()
@@ -81,8 +81,8 @@ def _detect_position_drift(evidence: Evidence, response_shift_rate: float) -> fl
 
 
 def _estimate_significant_shift_rate(evidence: Evidence) -> float | None:
-    """Estimate the slope of the response's time shift (s per s, equal to -1e-6 ppm); None where it is not significant
-    or larger than `LARGEST_PPM`."""
+    """Estimate the slope of the response's time shift (s per s, equal to -1e-6 ppm); None where it is not known, not
+    significant, or not below `LARGEST_PPM`."""
     rate_and_error = _estimate_shift_rate(
         evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise
     )

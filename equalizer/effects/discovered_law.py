@@ -39,7 +39,7 @@ _RESERVED_NAMES = {
     *FUNCTIONS,
     *(prefix + letter for letter in AXIS_LETTERS for prefix in (*DERIVATIVE_PREFIXES, COMMAND_PREFIX)),
 }
-"""Names that a recorded condition cannot have in a formula, because they have another meaning."""
+"""Names that a recorded condition cannot have in a formula, because they have another meaning (as have p0, c1, …)."""
 LARGEST_PARAMETER, LARGEST_EXPONENT = 1e15, 20.0
 """Largest magnitude of a free parameter, and of an exponent. Chosen."""
 
@@ -196,7 +196,7 @@ def derive_axis_letters(channels: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def list_response_signals(channels: Channels) -> tuple[str, ...]:
-    """List the names of the response's channels in a formula: ax, ay, az of accelerations, or the channel names."""
+    """List the names of the response's channels in a formula: by quantity and axis (ax, ay, az), or channel names."""
     name_by_column: dict[int, str] = {}
     for name, column in _index_response_signals(channels).items():
         name_by_column.setdefault(column, name)
@@ -213,7 +213,7 @@ def index_force_signals(channels: Channels) -> dict[str, int]:
 
 
 def _iterate_motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
-    """Iterate over the names of the axes' signals and their indices after the time; a response channel is named only
+    """Iterate over the names of the axes' signals and their indices after the time; response channels are named only
     where there is one per axis."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     for axis, letter in enumerate(derive_axis_letters(channels.inputs)):

@@ -1,10 +1,10 @@
 """Data types of a physical effect for simulation and diagnosis: equation, source, parameters, place and action.
 
 An effect acts in one of five ways: it changes the linear structure (`Structure`), adds a motion-dependent force at a
-driven axis (`AxisForce`) or within a joint (`JointForce`), changes the command before it becomes a force
-(`OnCommand`), or changes the sensed response (`OnResponse`). Sizes: n samples or coordinates, m commands, p response
-channels. SI units; on rotational axes N stands for N m and m for rad. Each module of `catalogue` makes an `Effect`;
-`placing` binds it to axes, `simulation` evaluates it, and the search of `analysis.diagnosis` fits it.
+driven axis (`AxisForce`) or within a joint (`JointForce`), changes the command before it becomes a force (`OnCommand`),
+or changes the sensed response (`OnResponse`). Sizes: n samples or coordinates, m commands, p response channels. SI
+units; on rotational axes N stands for N m and m for rad. Each module of `catalogue` makes an `Effect`, as does
+`discovered_law`; `placing` binds it to axes, `simulation` evaluates it, and the search of `analysis.diagnosis` fits it.
 """
 
 from collections.abc import Callable, Mapping
@@ -105,15 +105,17 @@ class OnCommand:
     """Action that changes one channel of the command before it becomes a force."""
 
     change: Callable[[FloatArray, float, Values], FloatArray]
-    """Arguments: samples (n,), sample period in seconds, values. A sample is the mean over its period."""
+    """Arguments: the command (n,), one value per integration step; length of a step in seconds; values. A value is the
+    mean over its step, or that at its end where `at_end` is None."""
     fine: bool = False
     """Whether the force changes between samples, so that it is computed in several steps per sample."""
     at_end: Callable[[FloatArray, float, Values], FloatArray] | None = None
     """The force at the end of each step, computed from the same means, where it changes between samples; None: `change`
     gives both."""
     of_all: Callable[[FloatArray, int, float, Values], tuple[FloatArray, FloatArray]] | None = None
-    """Used instead of `change` and `at_end` where the force depends on other channels too. Arguments: samples (n, m),
-    channel, sample period in seconds, values. Returns two arrays (n,): mean over each step, and value at its end."""
+    """Used instead of `change` and `at_end` where the force depends on other channels too. Arguments: commands (n, m)
+    as for `change`, channel, length of a step in seconds, values. Returns two arrays (n,): mean over each step, and
+    value at its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +148,8 @@ Action = Structure | AxisForce | JointForce | OnCommand | OnResponse
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
 class Effect:
-    """A catalogue entry. Its name, place, units and reported parameters are listed in
-    `equalizer.plant.effect_vocabulary`."""
+    """A catalogue entry or a discovered law. Name, place, units and reported parameters of a catalogue entry are listed
+    in `equalizer.plant.effect_vocabulary`."""
 
     name: str
     equation: str
@@ -160,7 +162,7 @@ class Effect:
     action: Action
     starts: Callable[[Evidence, int], tuple[Values, ...]]
     """Arguments: evidence, index of an axis or channel (or ALL_SITES). Returns sets of starting values, the likeliest
-    first; empty where the data contradict the effect."""
+    first; empty where none were found, as where the data contradict the effect."""
     sites: tuple[Literal["one", "all", "each"], ...] = ("one",)
     """Where the effect can act. one: a single axis or channel; all: every one, with the same parameters; each: every
     one, with its own parameters."""

@@ -87,10 +87,11 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 def _find_best_stop(
     motion: AxisMotion, regression: PartialRegression, stop_sign: float, stop_distances: FloatArray
 ) -> tuple[float, Values] | None:
-    """Find the best stop on the side `stop_sign` (1 or -1), with a second stop at the same distance on the other
-    side. A trial whose second stop is more than 10 % stiffer (chosen) is left out, because the stiffer stop is found
-    from the other side; up to 10 % stiffer counts as equal. Returns the share of the missing force that both explain,
-    and the values; None where no stop has a positive stiffness. stop_distances: distances (m) to try."""
+    """Find the best stop on the side `stop_sign` (1 or -1), with a second stop at the same distance on the other side
+    where the motion goes beyond it. A trial whose second stop is more than 10 % stiffer (chosen) is left out, because
+    the stiffer stop is found from the other side; up to 10 % stiffer counts as equal. Returns the share of the missing
+    force that both explain, and the values; None where every trial is left out: not reached by the motion, or without a
+    positive stiffness. stop_distances: distances (m) to try."""
     candidates: list[tuple[float, Values]] = []
     for stop_distance in stop_distances.tolist():
         penetration, opposite_penetration = (

@@ -45,8 +45,8 @@ def _repeat_at_random(
 def _repeat_as_measured(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """Repeat the samples of the response (n, p) that the measurement shows as lost; unchanged for a fraction of 0 or
-    1."""
+    """Repeat the samples of the response (n, p) that the measurement shows as lost; unchanged unless the fraction lies
+    between 0 and 1."""
     if not 0 < values["fraction"] < 1:
         return response
     columns, readings = list(channels), response.copy()
@@ -121,9 +121,9 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
 
 
 def _estimate_fraction(evidence: Evidence, columns: list[int], direction: int) -> float | None:
-    """Estimate the fraction of lost samples among those where a loss is distinguishable; None for fewer than
-    `LEAST_LOST_SAMPLES`. direction: 1, or -1 for the negative control, in reversed time (samples that equal the
-    next)."""
+    """Estimate the fraction of lost samples among those where a loss is distinguishable, at most `LARGEST_FRACTION`;
+    None for fewer than `LEAST_LOST_SAMPLES`. direction: 1, or -1 for the negative control, in reversed time (samples
+    that equal the next)."""
     samples, measured = evidence.predicted[::direction, columns], evidence.response[::direction, columns]
     noise, is_used = evidence.noise[columns], evidence.used[::direction] > 0
     is_distinguishable = (

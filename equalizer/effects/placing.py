@@ -53,8 +53,8 @@ def convert_to_model_effects(
     placed_effects: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[ModelEffect, ...]:
     """Convert placed effects to entries of a model file, the inverse of `place_effects`: an entry per site, or a single
-    entry without an axis where an effect acts on all sites with the same values. Raises PlacingError for a site beyond
-    the channels."""
+    entry without an axis under the conditions of `_iterate_axis_names`. Raises PlacingError for a site beyond the
+    channels."""
     return tuple(
         _convert_to_model_effect(placed_effect, axis_name)
         for placed_effect in placed_effects
@@ -94,8 +94,9 @@ def shorten_axis_name(channel: str, channels: tuple[str, ...]) -> str:
 
 
 def _iterate_axis_names(placed_effect: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
-    """Iterate over the axis names of the sites, or yield a single None for all sites. Raises PlacingError for a site
-    beyond the channels."""
+    """Iterate over the axis names of the sites, or yield a single None where an effect other than a law acts on all
+    channels; where there is only one channel, only for an effect that cannot act on one alone. Raises PlacingError for
+    a site beyond the channels."""
     is_at_all_sites = placed_effect.effect.law is None and set(placed_effect.sites) == set(range(len(channels)))
     if is_at_all_sites and (len(channels) > 1 or "one" not in placed_effect.effect.sites):
         yield None

@@ -165,8 +165,8 @@ class _DimensionSolver:
 
     def _is_determined_by_signals(self, part: Node, factor: Node) -> bool:
         """Whether the dimension of a factor follows from the signals in it and not from the product: it is a sum,
-        power, minimum or maximum with signals of known dimension, and the other factor is a number that is part of the
-        form, which may have a unit."""
+        power, minimum or maximum with signals of known dimension, and the other factor contains a number that is part
+        of the form, which may have a unit."""
         is_sum = isinstance(part, Apply) and part.name in ("+", "-", "minimum", "maximum", "**")
         has_unknown_unit = self.find_dimension(factor, None) is None and self.find_dimension(factor) is not None
         return is_sum and has_unknown_unit and self.find_dimension(part, None) is not None

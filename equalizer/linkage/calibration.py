@@ -135,7 +135,8 @@ def check_difference(difference: float) -> Iterator[str]:
 def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
     """Check a reading and yield its problems, a clause for each: values that are not finite, a singular Jacobian, an
     inertia that is not symmetric, not positive definite or not plausible. gravity_known: whether the gravity force must
-    be a number; an infinite one is a problem in any case."""
+    be a number; an infinite one is a problem in any case. Where Jacobian or inertia is not finite, the other conditions
+    are not checked."""
     position_text = "(" + ", ".join(f"{1000 * coordinate:.0f}" for coordinate in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
     position_and_angles = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}

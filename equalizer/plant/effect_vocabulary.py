@@ -25,9 +25,9 @@ class EffectParameter:
 
     name: str
     unit: str
-    """SI unit in a translational model; RESPONSE is replaced by the unit of the response."""
+    """Unit in a translational model, SI except degrees and ppm; RESPONSE is replaced by the unit of the response."""
     rotational_unit: str
-    """SI unit in a rotational model."""
+    """The same in a rotational model."""
     optional: bool = False
     """Whether a file may omit it; it is needed to reproduce an effect exactly as it was fitted."""
 
@@ -53,7 +53,8 @@ class EffectEntry:
 
     @property
     def main(self) -> EffectParameter:
-        """The first parameter, which measures the effect's strength."""
+        """The first parameter: in most effects the strength, in others such as `end_stop` or `extra_mode` a position or
+        frequency."""
         return self.parameters[0]
 
 
@@ -232,7 +233,8 @@ EFFECT_ENTRIES: tuple[EffectEntry, ...] = (
     EffectEntry("logger_offset", "sensor", (_make_required("offset", "s"), _make_optional("interpolated", "1"))),
     EffectEntry("lost_samples", "sensor", (_make_required("fraction", "1"),)),
 )
-"""All effects of the vocabulary but `DISCOVERED_LAW`, by place: mechanism, hand, actuator, sensor. Units are SI."""
+"""All effects of the vocabulary but `DISCOVERED_LAW`, by place: mechanism, hand, actuator, sensor. Units are SI, except
+degrees and ppm."""
 
 DISCOVERED_LAW = "discovered_law"
 """Name of an effect that is a formula with free parameters p0, p1, …; see `equalizer.laws`. Its place follows from the

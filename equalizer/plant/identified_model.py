@@ -65,7 +65,8 @@ class IdentifiedModel(SummaryDisplay):
     """Relative errors of the model: misfit, scatter and held-out error; None = not known."""
 
     def __post_init__(self) -> None:
-        """Copy the arrays as read-only double precision, and check all values. Raises IdentifiedModelError."""
+        """Copy the arrays as read-only double precision, and check the values, but not `provenance` and `quality`.
+        Raises IdentifiedModelError."""
         for name in ("A", "B", "C", "D", "covariance", "samples"):
             if getattr(self, name) is not None:
                 matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
@@ -87,7 +88,8 @@ class IdentifiedModel(SummaryDisplay):
 
     def replace_parameters(self, parameters: FloatArray) -> Self:
         """Copy the model with other entries of A, B, C, D. parameters: (k,), in the order of the property
-        `parameters`. Raises ValueError for another number of entries."""
+        `parameters`. Raises ValueError for another number of entries, IdentifiedModelError for entries that are not
+        finite."""
         shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]
         split_indices = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
         flat_matrices = np.split(np.asarray(parameters, dtype=np.float64), split_indices)

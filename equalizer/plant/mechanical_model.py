@@ -51,7 +51,7 @@ class ActuatorLimits:
     bandwidth_hz: float = 0.0
     """Bandwidth (Hz) of a first-order low pass per channel."""
     limit: float = 0.0
-    """Largest force (N) or torque (N m) per channel."""
+    """Largest force (N) or torque (N m) per channel; in the command's unit where that is another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class MechanicalModel(SummaryDisplay):
     """Units of the parameters where these are not SI, as for commands that are currents; None = SI, by `rotational`."""
 
     def __post_init__(self) -> None:
-        """Copy the matrices as read-only double precision, and check all values. Raises MechanicalModelError."""
+        """Copy the matrices as read-only double precision, and check the values. Raises MechanicalModelError."""
         for name in ("mass", "damping", "stiffness", "input", "output"):
             matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
             matrix.flags.writeable = False
@@ -170,7 +170,7 @@ def adopt_recording_units(
 
 def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
     """Suggest the most similar of the allowed words, as text to append to a message; empty if none is similar."""
-    similar_words = get_close_matches(word[:60], allowed, n=1)  # the comparison of longer words takes minutes
+    similar_words = get_close_matches(word[:60], allowed, n=1)  # the comparison of very long words takes minutes
     return f" (did you mean '{similar_words[0]}'?)" if similar_words else ""
 
 

@@ -83,7 +83,8 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
 
 
 def format_mechanical_model(model: MechanicalModel) -> str:
-    """Format a model as TOML text, from which `parse_mechanical_model` reads the same values."""
+    """Format a model as TOML text, from which `parse_mechanical_model` reads the same values, apart from None in the
+    provenance, which is left out. Raises TypeError for a value of the provenance that `_format_value` does not take."""
     lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
         lines.append("rotational = true")

@@ -1,9 +1,9 @@
 """Resampling to a uniform time grid: zero-order hold, linear or band-limited interpolation.
 
 The method must suit the signal. Zero-order hold is exact for a command that is held until the next command.
-Band-limited interpolation (a Kaiser-windowed low pass) is accurate up to `PASSBAND` for a signal that was sampled
-behind an anti-aliasing filter; a hold would add spectral images. Missing samples (NaN, gaps in the time stamps) remain
-missing. Called by `clock_offset` and `study.importing`.
+Band-limited interpolation (a Kaiser-windowed low pass; for uneven times, a spline) is accurate up to `PASSBAND` for a
+signal that was sampled behind an anti-aliasing filter; a hold would add spectral images. Missing samples (NaN, gaps in
+the time stamps) remain missing. Called by `clock_offset` and `study.importing`.
 """
 
 from dataclasses import dataclass
@@ -123,8 +123,8 @@ def _mark_missing(
 
 def _resample_band_limited(samples: Samples, grid: Grid) -> FloatArray:
     """Resample by a polyphase filter where the rates have a simple ratio and the grid begins at a sample; else
-    oversample, and interpolate by a spline. Simple: a denominator up to 1000, chosen, as the filter's length is
-    proportional to it."""
+    oversample, and interpolate by a spline. Simple: a denominator up to 1000, chosen, as the filter's length grows
+    with it."""
     if not samples.rate_hz:
         return _resample_uneven(samples, grid)
     first_index = (grid.start_s - samples.times_s[0]) * samples.rate_hz

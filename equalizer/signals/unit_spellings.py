@@ -64,7 +64,7 @@ _UNIT_BY_SPELLING = {
     "lbfin": "lbf in", "lbfft": "lbf ft", "ozfin": "ozf in", "kgfcm": "kgf cm", "kgcm": "kgf cm", "gfcm": "gf cm",
     "gcm": "gf cm", "N_m": "N m", "kg f": "kgf", "lb f": "lbf", "g f": "gf",
 }  # fmt: skip
-"""Spellings that are looked up as a whole, because their parts have other meanings."""
+"""Spellings that are looked up as a whole, because the rules for single symbols do not give their unit."""
 _TORQUE_BY_SPELLING = {
     "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
     "kg cm": "kgf cm", "g cm": "gf cm",
@@ -85,7 +85,8 @@ _AMPLITUDE = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.
 
 def respell(text: str, known_symbols: Collection[str]) -> str:
     """Rewrite a unit in the spelling of `signals.units`, by the listed spellings and the rules of this module; other
-    parts are unchanged. known_symbols: symbols of that spelling, which are not changed."""
+    parts are unchanged. known_symbols: symbols of that spelling, which are changed only as parts of a unit that is
+    looked up as a whole."""
     spelling = text.strip()
     if amplitude_match := _AMPLITUDE.fullmatch(spelling):
         return amplitude_match["unit"]

@@ -2,7 +2,7 @@
 
 A unit is a product of symbols with exponents; each symbol after a slash divides. Factors are exact by definition: inch,
 pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi (BIPM, SI Brochure; NIST SP 811). Called by the
-readers of recordings, models and import maps.
+readers of recordings, models and import maps, among others.
 """
 
 import math
@@ -44,7 +44,8 @@ class Unit:
     """Not zero only for a temperature in `degC` or `degF` by itself: in a product these are temperature differences."""
 
 
-# Decimal prefixes, and the symbols that take them. Other symbols take none: `kg` is a mass, not a multiple of gravity.
+# Decimal prefixes, and the symbols that take them. Other symbols take none, except in listed units such as `mbar`: `kg`
+# is a mass, not a multiple of gravity.
 _PREFIX_FACTORS = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIXABLE_DIMENSIONS: dict[str, Dimension] = {
     "N": (1, 1, -2, 0, 0, 0),
@@ -109,7 +110,7 @@ KNOWN_UNITS = (
     "gf", "daN", "lb", "oz", "psi", "bar", "mbar", "hPa", "degC", "degF", "Nm", "mNm", "Ncm", "Nmm", "kNm", "counts",
 )  # fmt: skip
 """Units accepted in addition to SI. `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf`
-forces; `counts` are plain numbers of unknown scale."""
+forces; `counts` (`count` is accepted, too) are plain numbers of unknown scale."""
 
 UNITS_CLAUSE = (
     "allowed are SI symbols in ASCII (N, N m, m, rad, m/s, m/s^2, rad/s^2, V, A, kg, s, Hz, 1 ...; "
@@ -133,7 +134,7 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
 """SI units that a well-known quantity may have. A quantity that is not listed may have any unit."""
 
 NO_UNIT = "1"
-"""SI unit of numbers without a unit or of unknown scale (`counts`); they are not converted."""
+"""SI unit of numbers without a unit or of unknown scale (`counts`); they are not converted, except `%`."""
 
 MAX_UNIT_TEXT_LENGTH = 100
 """Largest number of characters of a text for which other spellings are tried. Chosen: longer than any unit; bounds the
@@ -180,8 +181,8 @@ def check_quantity(quantity: str, unit: Unit) -> None:
 
 
 def suggest_force_unit(quantity: str, unit: Unit) -> str:
-    """Suggest units for a force or torque that is stated in a unit of mass, mass times length, or in `g`, as a clause
-    that follows the error; empty for other units."""
+    """Suggest units for a force or torque that is stated in a unit of mass or in `g`, or a torque in mass times length,
+    as a clause that follows the error; empty for other units and quantities."""
     is_gravity = unit.si == "m/s^2" and unit.factor == _UNPREFIXED_UNITS["g"].factor
     if quantity == "force" and (is_gravity or unit.si == "kg"):
         return "; grams as a force are written gf" if is_gravity else "; as a force write lbf, ozf or kgf"

@@ -108,9 +108,9 @@ class ProbeSettings:
 
 
 def find_probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
-    """Find contradictions of the probes with other settings of the protocol: forces above the cap of the trials (N), a
-    slope above the slew limit, and kept recordings that are shorter than a period. Empty where no probes are played.
-    Called by `study_contradictions`."""
+    """Find contradictions of the probes with other settings of the protocol: a cap not below that of the trials, a
+    reference force above it, a slope above the slew limit, and kept recordings that are shorter than a period. Empty
+    where no probes are played. Called by `study_contradictions`."""
     probes, cap_n = protocol.probes, protocol.staircase.cap_n
     if not probes.is_enabled:
         return []

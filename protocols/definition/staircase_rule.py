@@ -2,9 +2,10 @@
 
 A transformed up-down rule (Levitt, Journal of the Acoustical Society of America 49 (1971), 467) raises the level after
 a number of wrong answers in a row and lowers it after a number of right ones; its levels settle where both are equally
-likely (1 up, 3 down: 79.4 % right). The rule is computed by `protocols.procedure.staircase`. Field of
-`study_protocol.StudyProtocol`; the descriptions are printed in docs/formats.md and in the JSON schema. 3 N is the
-safety limit of a stimulus with a hand (docs/safety.md); the other bounds are chosen, wide enough for any study.
+likely (1 up, 3 down: 79.4 % right). The rule is computed by `protocols.procedure.staircase`, Psi by
+`protocols.procedure.psi`. Field of `study_protocol.StudyProtocol`; the descriptions are printed in docs/formats.md and
+in the JSON schema. 3 N is the safety limit of a stimulus with a hand (docs/safety.md); the other bounds are chosen,
+wide enough for any study.
 """
 
 from enum import Enum
@@ -16,7 +17,8 @@ from pydantic.dataclasses import dataclass
 from protocols.definition.problem import Problem, refuse
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
-"""pydantic configuration of all settings classes of a protocol: unknown keys, infinities and NaN are refused."""
+"""pydantic configuration of all settings classes of a protocol and of the lab's settings file: unknown keys, infinities
+and NaN are refused."""
 
 
 class StepChange(Enum):

@@ -1,4 +1,4 @@
-"""Schema of a study protocol (pydantic): all settings of a session, each with unit, bounds, default and its reason.
+"""Schema of a study protocol (pydantic): all settings of a session, with units, bounds, defaults and their reasons.
 
 Built from TOML by `protocols.document.loading`; a protocol whose settings contradict each other is refused with
 `problem.InconsistentError`. Classes and descriptions are the source of docs/formats.md and of the JSON schema. The

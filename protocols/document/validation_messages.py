@@ -69,8 +69,8 @@ def find_nearest_key(key: str, known_keys: Sequence[str]) -> str | None:
 
 
 def describe_value(value: Any) -> str:
-    """Describe a value for a message: numbers as in the file, texts and truth values with their type, lists and tables
-    by type only."""
+    """Describe a value for a message: numbers and dates as Python prints them, texts and truth values with their type,
+    lists and tables by type only."""
     match value:
         case bool():
             return f"{str(value).lower()}, a truth value"

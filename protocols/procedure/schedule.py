@@ -65,7 +65,8 @@ class Draw:
     """Random choices for one presentation of a stimulus: its direction and its polarity."""
 
     direction: int
-    """1 or 2, in the order of the protocol; `label_direction` gives the number on the screen."""
+    """1 or 2, in the order of the protocol; `label_direction` gives the number on the screen. In detection: the
+    interval with the stimulus."""
     polarity: int
     """Sign of the first half-wave, 1 or -1."""
 

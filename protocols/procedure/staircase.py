@@ -3,7 +3,7 @@
 Read `step` first: it is the complete rule, except for runs whose levels the Psi method chooses
 (`protocols.procedure.psi`). The state is a value: `begin_staircase` makes it, `step` returns the next one. Levels are
 in dB re 1 N and not restricted to a grid of steps, because a level that was limited to the cap need not be on that
-grid. `study.session.state` folds a session's log with these functions; the simulations of `analysis` use them too.
+grid. `study.session.state` folds a session's log with these functions; `analysis` uses them too.
 
 Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
 """
@@ -35,9 +35,9 @@ class StaircaseState:
     wrong_in_a_row: int = 0
     """Consecutive wrong answers since the last right answer, or since a step of the up-down rule reset the count."""
     heading: Heading = Heading.NONE
-    """Direction of the last change of level."""
+    """Direction of the last change of level; NONE throughout where Psi chooses the levels."""
     reversal_levels_db: tuple[float, ...] = ()
-    """Level presented in the trial that made each reversal, dB re 1 N."""
+    """Level of the trial that made each reversal, before roving, dB re 1 N."""
     reversal_trials: tuple[int, ...] = ()
     """Index of the trial whose answer made each reversal, from 0."""
     trials: int = 0
@@ -47,11 +47,12 @@ class StaircaseState:
     pushes_against_cap: int = 0
     """Number of times the up-down rule asked for a level above the cap."""
     reversals_at_cap: int = 0
-    """Number of reversals whose trial was presented at the cap."""
+    """Number of reversals whose trial had the cap as its level."""
     answered: tuple[LevelAndAnswer, ...] = ()
     """All answers of a run whose levels are chosen by Psi; empty for other rules."""
     spread_db: float = math.inf
-    """Standard deviation of the threshold's posterior (dB), for a run whose levels are chosen by Psi."""
+    """Standard deviation of the threshold's posterior (dB), for a run whose levels are chosen by Psi; infinite before
+    its first answer and for other rules."""
 
     @property
     def reversals(self) -> int:
@@ -70,7 +71,8 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     The level rises after `up_after_wrong` consecutive wrong answers and falls after `down_after_right` consecutive
     right ones (after one each until the first reversal, with `initial_one_up_one_down`); a change of direction is a
     reversal; the run ends with its last reversal, or at the rule's trial limit. A rule with `is_bayesian` takes its
-    levels from Psi instead, and ends by `is_complete`. Raises ValueError if the run is already finished.
+    levels from Psi instead, and ends by `is_complete` or at the trial limit. Raises ValueError if the run is already
+    finished.
     """
     if is_finished(rule, state):
         raise ValueError("this run is finished: no answer can follow")
@@ -195,7 +197,7 @@ def _is_in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
 
 
 _LEVEL_TOLERANCE_DB = 1e-9
-"""Tolerance (dB) within which two levels are equal: above rounding, below any allowed step. Chosen."""
+"""Tolerance (dB) within which two levels are equal: above rounding, far below any step in use. Chosen."""
 
 
 def _is_at_cap(rule: StaircaseRule, level_db: float) -> bool:

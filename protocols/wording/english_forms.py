@@ -1,4 +1,4 @@
-"""English texts of the forms (consent, exclusion, set-up, questions), and of the shipped protocols, by key.
+"""English texts of the forms (consent, exclusion, set-up, questions, reference), and of the shipped protocols, by key.
 
 Merged into `english.ENGLISH`. A key that ends in `_1` is the singular, in `_n` the form for any other count. Names in
 braces are placeholders that the program fills in; every translation has the same keys and placeholders (`translation`).

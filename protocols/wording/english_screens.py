@@ -1,9 +1,9 @@
 """English texts of the participants' screens and of line mode (plain text in a terminal), by key.
 
-Merged into `english.ENGLISH`, looked up by `words`. A key that ends in `_1` is the singular, in `_n` the form for any
-other count. Names in braces are placeholders that the program fills in; every translation has the same keys and
-placeholders (`translation`). A protocol in German or Spanish contains its texts, and its hash covers them: a new key,
-or a change of a shipped translation, changes the hashes of these protocols.
+Merged into `english.ENGLISH`, looked up by `words`. Of two keys that end in `_1` and `_n`, the first is the singular,
+the second the form for any other count. Names in braces are placeholders that the program fills in; every translation
+has the same keys and placeholders (`translation`). A protocol in German or Spanish contains its texts, and its hash
+covers them: a new key, or a change of a shipped translation, changes the hashes of these protocols.
 """
 
 SCREEN_TEXTS: dict[str, str] = {

@@ -4,6 +4,7 @@ simulated participant. Provides the participant, runs the sitting, and prints th
 Called by `study.cli.study` and `study.cli.resume`.
 """
 
+import hashlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -134,10 +135,16 @@ def _provide_participant(
     typer.echo(f"\n{words['for_experimenter']}", err=True)
 
 
+LONGEST_NAME = 15
+"""Letters and digits of a simulated participant's name that fit into a participant code, which has 16 at most."""
+
+
 def make_simulated_code(observer: str) -> str:
-    """Make the participant code of a simulated participant: the first 15 ASCII letters and digits of its name, then
-    "1". Each simulated participant has a separate code, so that their sessions are not mixed."""
-    return "".join(character for character in observer if character.isascii() and character.isalnum())[:15] + "1"
+    """Make the participant code of a simulated participant: the ASCII letters and digits of its name, then "1". Of more
+    than `LONGEST_NAME` the first 9 are used, and 6 digits of the name's SHA-256, so that each name has its own code."""
+    letters = "".join(character for character in observer if character.isascii() and character.isalnum())
+    is_short = len(letters) <= LONGEST_NAME
+    return (letters if is_short else letters[:9] + hashlib.sha256(observer.encode()).hexdigest()[:6]) + "1"
 
 
 def _ask_subject(options: SittingOptions) -> str:

@@ -193,7 +193,8 @@ def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "Fel
 def _apply_person_options(crowd: "Crowd", people: str, curve: str, lapse: float, repeats: int) -> "Crowd":
     """Apply the options on people to the population: habits, curve and lapse rate. repeats: most repeats in a run. The
     numbers of the habits are chosen: a guessing share of 0.1; repeats within 0.5 standard errors of the criterion; a
-    criterion drift of 0.3 (d') per 100 trials. Raises WrongUseError for an unknown curve or kind of people."""
+    criterion's drift per 100 trials with a standard deviation between people of 0.3 (d'). Raises WrongUseError for an
+    unknown curve or kind of people."""
     from analysis.psychophysics.hierarchy.curve import Family
 
     crowds_by_habit: dict[str, Crowd] = {

@@ -39,7 +39,7 @@ def watch(
     as_json: Annotated[bool, typer.Option("--json", help="With --once: one JSON document on stdout.")] = False,
 ) -> None:
     """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
-    folder = _find_folder(session or _find_last_changed(data), data)
+    folder = _find_folder(session, data) if session else _find_last_changed(data)
     if stop or pause or note or adverse:
         _send_requests(folder, stop, pause, ((note, False), (adverse, True)))
     elif once or as_json:
@@ -51,9 +51,9 @@ def watch(
 
 
 def _find_folder(session: str, data: Path) -> Path:
-    """Find the session's folder by its path, or by its name in `data`. Raises StudyError where there is no session, or
+    """Find the session's folder by its name in `data`, or by its path. Raises StudyError where there is no session, or
     a withdrawn one."""
-    for path in (Path(session), data / session):
+    for path in (data / session, Path(session)):
         if (path / LOG_NAME).is_file():
             return path.resolve()
     from study.store.sessions.archive import find_session
@@ -61,8 +61,8 @@ def _find_folder(session: str, data: Path) -> Path:
     return find_session(session, data).path
 
 
-def _find_last_changed(data: Path) -> str:
-    """Find the name of the session in `data` whose log changed last. Raises WrongUseError without a session."""
+def _find_last_changed(data: Path) -> Path:
+    """Find the folder of the session in `data` whose log changed last. Raises WrongUseError without a session."""
     logs = sorted(data.glob(f"*/{LOG_NAME}"), key=lambda log: log.stat().st_mtime)
     if not logs:
         from study.errors import WrongUseError
@@ -70,7 +70,7 @@ def _find_last_changed(data: Path) -> str:
         raise WrongUseError(
             "There is no session to watch", f"No folder in {data} holds a session.", "Give a session, or --data."
         )
-    return logs[-1].parent.name
+    return logs[-1].parent.resolve()
 
 
 def _show_screen(folder: Path) -> None:

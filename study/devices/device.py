@@ -1,9 +1,9 @@
 """Device port: the interface through which the rest of the program uses a haptic device. Implemented by
 `study.devices.safe.SafeDevice` and, over pipes, by `loop_process.remote_device.RemoteDevice`.
 
-Arguments and results are plain values that can be sent between processes, because a real device's 1 kHz loop runs in a
-separate process (`loop_process`). `hold` has no fixed duration, because a participant may feel a stimulus until the
-answer.
+Arguments and results, but not `on_progress`, are plain values that can be sent between processes, because a real
+device's 1 kHz loop runs in a separate process (`loop_process`). `hold` has no fixed duration, because a participant may
+feel a stimulus until the answer.
 """
 
 from collections.abc import Callable
@@ -75,8 +75,8 @@ class DeviceSettings:
 
 
 class Fault(Enum):
-    """Why the safety layer released the force without a request. Each fault ends a trial; its value is part of a
-    sentence for messages. Codes in the same order: `governor.cells`."""
+    """Why the safety layer released the force without `release`. Each fault but NONE ends a trial; its value is part of
+    a sentence for messages. Codes in the same order: `governor.cells`."""
 
     @property
     def sentence(self) -> str:
@@ -177,7 +177,8 @@ class Device(Protocol):
     def hold(self, stimulus: HeldStimulus) -> None:
         """Fade the stimulus in and repeat its loop until `release`. Returns at once.
 
-        Raises `DeviceError`, before anything moves, for a stimulus that is not within the limits.
+        Raises `DeviceError`, before anything moves, for a stimulus that is not within the limits, while another is
+        held, after `stop`, and for a lost or closed device.
         """
         ...
 
@@ -194,7 +195,7 @@ class Device(Protocol):
         ...
 
     def health(self) -> Health:
-        """Counters of the safety layer since `hold`, up to now. Fast, like `fault`."""
+        """Counters of the safety layer since `hold` or `play`, up to now. Fast, like `fault`."""
         ...
 
     def release(self) -> PlaybackResult:

@@ -24,11 +24,11 @@ Addresses = npt.NDArray[np.int64]
 
 CLOCK, SLEEP, MONOTONIC, ACQUIRE, RELEASE, LOCK, SYSTEM_SIZE = range(7)
 """Indices into `collect_system_calls`: clock_gettime, clock_nanosleep, Python's `time.monotonic`, the functions of
-PyThread that acquire (timeout in µs) and release a lock, and the lock. CLOCK and SLEEP are 0 except on Linux with its
-usual monotonic clock."""
+PyThread that acquire (timeout in µs) and release a lock, and the lock; SYSTEM_SIZE is their number. CLOCK and SLEEP are
+0 except on Linux with its usual monotonic clock."""
 
 _intrinsic: Any = intrinsic
-"""These functions of numba as `Any`, because numba declares no types for them."""
+"""numba's decorator `intrinsic` and module `cgutils` as `Any`, because numba declares no types for them."""
 _cgutils: Any = cgutils
 
 _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
@@ -56,7 +56,7 @@ def _make_caller(result_type: Any) -> Any:
 
 
 call_int = _make_caller(types.int32)
-"""call_int(address, arguments): call a C function that returns an int."""
+"""call_int(address, arguments): call a C function that returns an int, or nothing (the value is then meaningless)."""
 call_float = _make_caller(types.float64)
 """call_float(address, arguments): call a C function that returns a double."""
 
@@ -78,8 +78,8 @@ def _make_stack_allocator(word_count: int) -> Any:
 
 
 allocate_2_words, allocate_16_words = _make_stack_allocator(2), _make_stack_allocator(16)
-"""Return the address of 2 or 16 words of 8 bytes on the stack of the calling function: zero at the start of that
-function, and invalid after its end."""
+"""Return the address of 2 or 16 words of 8 bytes on the stack of the calling function: zero after each such call, and
+invalid after the end of that function."""
 
 
 @_intrinsic

@@ -30,7 +30,7 @@ CLAIM_PORT, WRITE_DATA, RELEASE_PORT = 0x708B, 0x40017086, 0x708C
 
 
 class Line(Protocol):
-    """Interface of an open line. Every call raises OSError where the hardware is missing, as pyserial does."""
+    """Interface of an open line. Every call may raise OSError, as pyserial does where the hardware is missing."""
 
     def raise_level(self) -> None:
         """Begin the pulse: set the control line or the data lines, or send the byte."""
@@ -123,7 +123,7 @@ class OnsetLine:
 
     def _play_pulse(self, reply_queue: SimpleQueue[Pulse]) -> None:
         """Open the line if needed, raise it, put the result into `reply_queue`, and lower it after `width_s` (s). A
-        line that fails is closed."""
+        line that does not begin the pulse is closed."""
         try:
             self._line = self._line or self._open_line(self._settings)
             self._line.raise_level()

@@ -144,7 +144,7 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
 
 
 def _make_unknown_device_error(name: str) -> DeviceError:
-    """Make the error for a name that belongs to no device; it lists the known names."""
+    """Make the error for a name that belongs to no device; it lists `DEVICES` and the kinds of files."""
     return DeviceError(
         f"There is no device called {name!r}",
         f"Known are {', '.join(DEVICES)}, {REPLAY_PREFIX}FILE.h5 for a recording, and {CALIBRATED_PREFIX}FILE.h5 for a "

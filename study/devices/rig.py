@@ -1,5 +1,5 @@
-"""Interfaces of a bare haptic device ("rig"), which has no limits of force. Only the safety layer
-(`study.devices.safe`) may drive it; the drivers and simulations of devices implement it.
+"""Interfaces of a bare haptic device ("rig"), which need not limit its force. Only the safety layer
+(`study.devices.safe`) may drive it, apart from the acceptance test; drivers and simulations of devices implement it.
 
 A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits (by the safety layer), `write` (held until t_(k+1)).
 `Rig` is called from Python at each tick; `CompiledIo` and `CompiledRig` are called from compiled loops.
@@ -24,7 +24,8 @@ POSITION = slice(0, 3)
 ACCELERATION = slice(3, 6)
 """Slice of a reading: acceleration by the accelerometer, m/s², in the device's axes as mounted, zeroed at rest."""
 TRUE_ACCELERATION = slice(6, 9)
-"""Slice of a reading: true acceleration of the handle, m/s², known for a simulated device only; NaN for others."""
+"""Slice of a reading: true acceleration of the handle, m/s², known for a simulated device only; for a replay the
+recorded acceleration; NaN for others."""
 SENSOR_CLIPPED = 9
 """Index in a reading: 1 if a channel of the accelerometer was at its limit, else 0."""
 READING_SIZE = 10
@@ -64,7 +65,8 @@ class Rig(Protocol):
         ...
 
     def write(self, force_n: FloatArray) -> None:
-        """Command a force (x, y, z), shape (3,), N; held until the next command."""
+        """Command a force (x, y, z), shape (3,), N; held until the next command. May raise
+        `study.errors.DeviceError`."""
         ...
 
     def close(self) -> bool | None:
@@ -91,7 +93,7 @@ class CompiledIo:
     cells: FloatArray
     """State of the driver, read and changed by `sense` and `write`; its layout is that of the driver."""
     samples: FloatArray
-    """Samples of the accelerometer, shape (rows, columns)."""
+    """Samples of the accelerometer, shape (rows, columns); a single row without one."""
     error: Callable[[int], Exception]
     """error(code): the exception that the rig's method of the same name raises; called in the thread that got the
     code."""

@@ -46,7 +46,8 @@ by hand."""
 
 class Ring:
     """Writer's side of a ring. path: empty to make one of `rows` rows, which `remove` removes; else the ring of another
-    program. The attribute `path` is empty where the system gave no memory: then the device works without a ring."""
+    program. The attribute `path` is empty where the ring could not be made (no memory): then the device works without
+    it."""
 
     def __init__(self, path: str = "", rows: int = RING_ROWS) -> None:
         self.path = path
@@ -80,7 +81,8 @@ class Ring:
             self.path = ""
 
     def _make_ring_file(self, row_count: int) -> None:
-        """Make, lock and fill the ring's file; without memory for all rows, no ring is made."""
+        """Make, lock and fill the ring's file; without a lock, or memory for all rows, no ring remains. Raises OSError
+        where the file cannot be made."""
         # Kept open: as long as it is locked, the ring is in use.
         self._descriptor, self.path = tempfile.mkstemp(RING_FILE_SUFFIX, RING_FILE_PREFIX, _choose_ring_folder())
         empty_rows = np.zeros((1 + row_count, cells.RING_WIDTH))
@@ -106,14 +108,14 @@ class Telemetry:
     """(n,) number of the tick in its stimulus, from 0; negative while the handle is brought to rest before it."""
     position_m: FloatArray
     velocity_m_per_s: FloatArray
-    """Velocity as the damper uses it, low-passed at 50 Hz; NaN while the force is released."""
+    """Velocity as the damper uses it, low-passed at 50 Hz; NaN in the phases 0 and 3."""
     acceleration_mps2: FloatArray
     commanded_n: FloatArray
-    """The stimulus, within its cap and with its fade."""
+    """The stimulus, within its cap and with its fade; 0 in the phases 0 and 3."""
     applied_n: FloatArray
     """Force that was sent to the device: with spring, damper, slew limit and total cap."""
     phase: FloatArray
-    """(n,) 0: no force, 1: playing, 2: force being faded out, 3: force switched off by the safety layer."""
+    """(n,) 0: no force, 1: playing, 2: fade-out of the stimulus, 3: safety fade of the last force."""
     fault: FloatArray
     """(n,) index of `study.devices.device.Fault`; 0 = none."""
     missed: FloatArray
@@ -125,7 +127,7 @@ class Telemetry:
 
 class TelemetryReader:
     """Reader's side of a ring, from the first row that is written after it was made. Raises `StudyError` for a file
-    that is no ring."""
+    that cannot be read or is no ring."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -211,8 +213,8 @@ def _choose_ring_folder() -> str:
 
 
 def _lock_file(descriptor: int) -> bool:
-    """Lock the file, and return whether it was locked: False where another program has the lock; always True on
-    Windows, which has no such locks."""
+    """Lock the file, and return whether it was locked: False where another program has the lock or locking fails;
+    always True on Windows, which has no such locks."""
     if sys.platform == "win32":
         return True
     import fcntl
@@ -225,8 +227,9 @@ def _lock_file(descriptor: int) -> bool:
 
 
 def _remove_abandoned_rings() -> None:
-    """Remove the rings of programs that were killed: those without a lock. Never raises. On Windows, where a ring has
-    no lock, they remain."""
+    """Remove the rings of programs that were killed: those of this user without a lock, older than
+    `MIN_ABANDONED_AGE_S`. Never raises for a ring that cannot be removed. On Windows, where a ring has no lock, they
+    remain."""
     if sys.platform == "win32":
         return
     for path in Path(_choose_ring_folder()).glob(f"{RING_FILE_PREFIX}*{RING_FILE_SUFFIX}"):

@@ -1,8 +1,8 @@
 """Build one recording in SI units from files and a map, with a report of every conversion.
 
 For each part (one file, or one run in it): arrays are read, the clocks of its loggers aligned, and its channels put
-onto one time grid (`resample_part`). The parts are then concatenated and converted to SI units, and segments are found
-if the map states none. Called by `study.workflows.recording.import_recording` and
+onto one time grid (`resample_part`). The parts are then concatenated and converted to SI units; where the map states no
+segments, they are found if the excitation repeats. Called by `study.workflows.recording.import_recording` and
 `study.evaluation.real.diagnose_real`.
 """
 
@@ -114,7 +114,7 @@ def build_recording(
 
 
 class _ProgressCounter:
-    """Progress of the import: number of finished channels (a fraction at the start of a part), out of all."""
+    """Progress of the import: number of finished channels of all parts, out of all."""
 
     def __init__(self, done_count: float, step_count: int, on_progress: Callable[[float], None]) -> None:
         self.done_count = done_count

@@ -50,7 +50,8 @@ class MapFile:
 
 @dataclass(frozen=True, slots=True)
 class FoundMap:
-    """A map, and the files that it combines into one recording, in the order of its patterns."""
+    """A map, and the files that it combines into one recording: in the order of its patterns or, for a map that was
+    made from headers, of the numbers in their names."""
 
     source: MapFile
     files: tuple[Path, ...]
@@ -89,8 +90,8 @@ def read_map(name: str) -> MapFile:
 
 def find_maps_for_folder(folder: Path) -> tuple[FoundMap, ...]:
     """Find the maps for the recordings in a folder: those in the folder or, without any, shipped maps that match file
-    names and arrays; empty if none matches. Raises CannotReadError or UnusableFileError for a map that cannot be read
-    or is invalid, OSError where the folder cannot be listed."""
+    names and arrays; empty if none matches. A TOML file that cannot be read counts as no map. Raises UnusableFileError
+    for an invalid map, OSError where the folder cannot be listed."""
     paths = sorted(path for path in folder.iterdir() if path.is_file())
     map_paths = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
     if map_paths:
@@ -120,7 +121,7 @@ def find_map_for_files(paths: Sequence[Path]) -> MapFile | None:
 def make_map_from_headers(folder: Path) -> FoundMap:
     """Make a map from headers, for a folder without a map. Raises WrongUseError for no files, for hapteq recordings, or
     for file names that differ by more than numbers; MapNeededError where the header of the first file does not
-    suffice; CannotReadError and ImportRefusedError as `read_without_map`."""
+    suffice; CannotReadError and ImportRefusedError as `read_without_map`; OSError where the folder cannot be listed."""
     data_paths = sorted(
         (path for path in folder.iterdir() if path.is_file() and path.suffix not in NON_DATA_SUFFIXES),
         key=_make_natural_sort_key,
@@ -182,8 +183,8 @@ def _match_recordings(map_file: MapFile, paths: Sequence[Path]) -> Iterator[Foun
 
 
 def _has_required_arrays(found_map: FoundMap) -> bool:
-    """Whether the files of a recording's first part have all names in the map's expressions of channels and clocks
-    (computed channels are not checked); False where a file cannot be read."""
+    """Whether the files of a recording's first part have all names in the map's expressions of channels and of the time
+    or rate of clocks (alignments and computed channels are not checked); False where a file cannot be read."""
     import_map = found_map.source.map
     try:
         part = assign_files(import_map, found_map.files)[0]

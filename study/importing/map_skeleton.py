@@ -1,7 +1,8 @@
 """Make an incomplete import map for a file of which only the arrays are known, to be completed by the user.
 
-Clocks, channels and runs are proposed from names, units, shapes and data. Unknown values are left empty or described
-in a comment. Called by `study.workflows.recording.import_recording` and `map_library` where a map is missing.
+Clocks, channels and runs are proposed from names, units, shapes and data; `hold` and the segment are a common choice.
+Other unknown values are left empty or described in a comment. Called by `study.workflows.recording.import_recording`
+and `map_library` where a map is missing.
 """
 
 import json
@@ -35,7 +36,7 @@ from study.importing.surplus_arrays import (
 _FORCE_QUANTITIES = ("force", "torque")
 """Quantities of forces: in rotation, torques."""
 _MAX_LISTED_RUNS = 4
-"""Largest number of further runs that a comment of the map names; dots stand for the rest. Chosen."""
+"""Largest number of arrays of further runs that a comment of the map names; dots stand for the rest. Chosen."""
 _ROLE_SUFFIX = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
@@ -43,7 +44,8 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 
 
 def make_map_skeleton(arrays: Arrays) -> str:
-    """Make the map as TOML text. Unknown values are empty texts, with which an import fails and names the key."""
+    """Make the map as TOML text. An unknown device, role or unit of time is an empty text, with which an import fails
+    and names the key; an empty unit of a channel stands for a plain number."""
     return "\n".join(_write_lines(arrays)) + "\n"
 
 
@@ -90,8 +92,8 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
 
 
 def _find_ungrouped_runs(all_arrays: Arrays, run_groups: RunGroups) -> list[str]:
-    """Find the arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not
-    count."""
+    """Find the arrays of runs in cells that belong to no group; empty without any group. Arrays of fewer than
+    `LEAST_SAMPLES` hold constants and do not count."""
     long_cell_arrays = [
         name
         for name, array in all_arrays.by_name.items()
@@ -140,7 +142,7 @@ def _match_clock(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
 
 def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
     """Write a comment, in lines of up to 110 characters, that says whether the force or the motion is taken for the
-    command; nothing where the names determine it."""
+    command; nothing where names and quantities determine it."""
     parsed_names = [parse_signal_name(_strip_value_suffix(name)) for name in roles]
     if may_be_imposed_motion(parsed_names):
         force_roles = [

@@ -1,7 +1,8 @@
 """Channels of one part of a recording, resampled to one uniform time grid. Called by `build_recording`.
 
-The grid covers the time range in which all clocks have samples. Channels whose samples lie on the grid are copied; all
-others are resampled as the map states. Computed channels are then evaluated on the grid.
+The grid covers the time range in which all channels have samples, within the limits of the part. Channels whose samples
+lie on the grid are copied; all others are resampled as the map states. Computed channels are then evaluated on the
+grid.
 """
 
 from collections.abc import Callable, Mapping
@@ -87,7 +88,7 @@ def resample_part(
 
 def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> Value:
     """Compute the samples (n,) of a channel on its clock; a single number is repeated. Raises ImportProblemError for
-    another shape or length, and for infinite values."""
+    an expression that cannot be computed, another shape or length, and infinite values."""
     label = f"channel '{channel.name}'"
     try:
         values = logger.namespace.compute_value(channel.value, logger.base)
@@ -125,8 +126,9 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
 def _make_grid(
     import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...], channel_samples: list[Samples]
 ) -> Grid:
-    """Make the grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
-    ImportProblemError for uneven stamps without a stated rate, and for too many or too few samples."""
+    """Make the grid over the time range common to all channels, within the limits of the part, at the stated rate or
+    the highest of the clocks. Raises ImportProblemError for uneven stamps without a stated rate, and for too many or
+    too few samples."""
     uneven_loggers = [logger for logger in loggers if not logger.base.rate_hz]
     if uneven_loggers and not import_map.rate_hz:
         steps_ms = np.diff(uneven_loggers[0].base.times_s(0)) * 1e3
@@ -162,7 +164,7 @@ def _make_grid(
 
 def _put_on_grid(channel: ChannelMap, samples: Samples, grid: Grid, report: Callable[[str], None]) -> FloatArray:
     """Put the samples of a channel on the grid (grid.count,): copied where they lie on it, otherwise resampled. Raises
-    ImportProblemError where the map does not state how to resample."""
+    ImportProblemError where the map does not state how to resample, or the stated method cannot be applied."""
     first_index = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
     if _has_same_rate(samples, grid) and abs(first_index - round(first_index)) < TIME_TOLERANCE:
         column = samples.values[round(first_index) : round(first_index) + grid.count]
@@ -205,7 +207,8 @@ def _compute_channel(
     channel_name: str, expression: str, columns: Mapping[str, FloatArray], grid: Grid, file_namespace: Namespace
 ) -> FloatArray:
     """Evaluate the expression of a computed channel on the grid (grid.count,); a single number is repeated. columns:
-    the channels by name. Raises ImportProblemError for another shape, and for infinite values."""
+    the channels by name. Raises ImportProblemError for an expression that cannot be computed, another shape, and
+    infinite values."""
     arrays = {**file_namespace.arrays, "clock_s": grid.compute_times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(

@@ -37,7 +37,7 @@ _USUAL_UNIT_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 _MAX_STEP_RANGE = 0.02
 """Largest range (maximum minus minimum) of the steps of a time, relative to their median, that counts as even."""
 SAME_CLOCK_TOLERANCE = 0.5
-"""Largest difference, in steps, between two time columns shifted to begin at 0 that count as the same clock."""
+"""Largest difference, in median steps, between two time columns shifted to begin at 0 that count as the same clock."""
 
 
 def find_surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
@@ -118,7 +118,8 @@ def _is_row_number(name: str, array: Array) -> bool:
 
 def find_equal_clocks(arrays: Arrays) -> Mapping[str, str]:
     """Find the time columns that repeat another; returns the name of the kept column by the name of the repetition. Of
-    equal columns, one with a unit of time is kept, then one that holds dates or clock times (`Arrays.clocks`)."""
+    equal columns, one with a unit of time in brackets is kept, then one that holds dates or clock times
+    (`Arrays.clocks`)."""
     kept_clocks: list[str] = []
     repeated_clocks = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]

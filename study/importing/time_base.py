@@ -1,9 +1,10 @@
 """Time base of a logger's channels: a stated rate, or time stamps, which are checked and brought to a uniform grid.
 
 Stamps are refused where they are missing, run backwards (a counter that wraps around, a clock that is set back),
-repeat, or jump; the message names the key of the map that corrects them. Stamps that are uniform apart from rounding
-and skipped rows give a rate and the index of each sample (`uniform_stamps`). Rows that a logger wrote twice are removed
-(`drop_doubled_rows`). Called by `build_recording`, `alignment` and `part_signals`.
+repeat, or jump by an hour or too far (`MAX_SAMPLES`); the message names the first such sample and, where there is one,
+the remedy. Stamps that are uniform apart from rounding and skipped rows give a rate and the index of each sample
+(`uniform_stamps`). Rows that a logger wrote twice are removed (`drop_doubled_rows`). Called by `build_recording`,
+`alignment` and `part_signals`.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +22,8 @@ from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.uniform_stamps import GRID_TOLERANCE, IntArray, find_decimal_unit, fit_uniform_rate
 
 _GAP_STEPS = 3
-"""A step longer than this many median steps is a gap, unless the map states `gap_s`. Chosen."""
+"""A step longer than this many median steps, or than 1.5 periods of a uniform grid, is a gap, unless the map states
+`gap_s`. Chosen."""
 _HOUR_S = 3600.0
 """Step (s) of a clock that is set to summer time or back."""
 _COUNTER_LIMITS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
@@ -30,7 +32,7 @@ such as the microseconds or nanoseconds of a second."""
 PLACEHOLDER_RATE_HZ = 1.0
 """Placeholder rate (Hz) of samples whose time is unknown."""
 MAX_SAMPLES = 10**8
-"""Most samples of a recording (28 hours at 1 kHz). A wrong stamp would otherwise fill the memory with missing
+"""Most samples of a part of a recording (28 hours at 1 kHz). A wrong stamp would otherwise fill the memory with missing
 samples. Chosen."""
 
 
@@ -45,7 +47,7 @@ class TimeBase:
     stamps_s: Value | None
     """(n,) as logged, in seconds; None for a clock with a rate only."""
     sample_index: IntArray | None
-    """(n,): index of each stamp's sample at the uniform rate; None if stamps are not uniform."""
+    """(n,): index of each stamp's sample at the uniform rate; None if stamps are not uniform, or there are none."""
     gap_s: float
     """A step of the stamps longer than this is a gap, in which samples are missing (s)."""
     offset_s: float = 0.0
@@ -116,7 +118,7 @@ class TimeBase:
 def make_time_base(clock: ClockMap, namespace: Namespace) -> TimeBase:
     """Make the time base of a clock of the map, without its offset to other clocks. namespace: the arrays of the file.
     With a rate, a step of more than 1.5 sample periods is a gap, unless the map states `gap_s` (chosen). Raises
-    ImportProblemError where the rate is not positive or the stamps are unusable."""
+    ImportProblemError where the rate cannot be computed or is not positive, or the stamps are unusable."""
     if clock.time:
         return _make_base_from_stamps(clock, namespace)
     rate_hz = PLACEHOLDER_RATE_HZ if clock.unknown else clock.rate_hz or namespace.compute_number(clock.rate)
@@ -126,8 +128,8 @@ def make_time_base(clock: ClockMap, namespace: Namespace) -> TimeBase:
 
 
 def _make_base_from_stamps(clock: ClockMap, namespace: Namespace) -> TimeBase:
-    """Make the time base from time stamps. Raises ImportProblemError where their unit, shape, values or number of
-    samples are unusable."""
+    """Make the time base from time stamps. Raises ImportProblemError where their unit, expression, shape, values or
+    number of samples are unusable."""
     try:
         unit = parse_unit(clock.time_unit)
     except UnknownUnitError as error:
@@ -164,8 +166,8 @@ def _format_stamps_expression(array_name: str, namespace: Namespace) -> str:
 
 
 def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) -> str:
-    """Find the problem with the stamps (n,) and the key of the map that corrects it, as a clause after the name of the
-    stamps; empty if they are finite and increase without a jump of an hour. time_expression: expression of the stamps;
+    """Find the problem with the stamps (n,) and its remedy, if there is one, as a clause after the name of the stamps;
+    empty if they are finite and increase without a single jump of an hour. time_expression: expression of the stamps;
     unit_s: their unit (s). Tolerances (chosen): two median steps for the limit of a counter, a minute for an hour back,
     ten median steps for an hour ahead, which is looked for only in stamps with median steps below 3.6 s."""
     if not np.isfinite(stamps_s).all():
@@ -209,9 +211,9 @@ def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) ->
 
 def drop_doubled_rows(clock: ClockMap, namespace: Namespace) -> tuple[Namespace, str]:
     """Remove rows that repeat the row above, with the same stamp. Returns the arrays without them, and a sentence with
-    their number, empty where nothing is removed: without stamps, without repeated ones, or if any row with a repeated
-    stamp has other values (row counters aside) than the row above. Raises ImportProblemError where the expression of
-    the stamps cannot be computed."""
+    their number, empty where nothing is removed: without two or more stamps, without repeated ones, or if any row with
+    a repeated stamp has other values (row counters aside) than the row above. Raises ImportProblemError where the
+    expression of the stamps cannot be computed."""
     if not clock.time:
         return namespace, ""
     stamps: Value = namespace.compute_value(clock.time, NoTime())

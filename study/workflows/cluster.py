@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SCHEDULER_TIMEOUT_S = 10.0
 """Longest wait (s) for an answer of the scheduler (chosen)."""
 WORKER_TIMEOUT_S = 60.0
-"""Longest time (s) that work waits while the scheduler has no worker or does not answer. Chosen: long enough for either
-to restart."""
+"""Longest time (s) that work waits while the scheduler has no worker or does not answer; also the time limit of the
+first request. Chosen: long enough for either to restart."""
 POLL_INTERVAL_S = 1.0
 """Interval (s) at which the workers are counted (chosen: short beside `WORKER_TIMEOUT_S`)."""
 RESULTS_KEPT_TEXT = "What was finished is kept."
@@ -38,9 +38,9 @@ def open_cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[
     dies is repeated by another. one_thread: refuse workers with several threads, for tasks that draw figures or
     measure processor time.
 
-    Raises StudyError where no scheduler answers, it has no workers, or a worker has another version; later, where the
-    scheduler is lost, a task repeatedly kills its workers, or for `WORKER_TIMEOUT_S` there is no worker or the
-    scheduler does not answer.
+    Raises StudyError where the package distributed is missing, no scheduler answers, it has no workers, or a worker has
+    another version or is refused by `one_thread`; later, where the scheduler is lost, a task repeatedly kills its
+    workers, or for `WORKER_TIMEOUT_S` there is no worker or the scheduler does not answer.
     """
     try:
         import dask
@@ -188,7 +188,7 @@ class _WorkerSetup:
     """Versions and threads of the workers of a scheduler."""
 
     versions: dict[str, str]
-    """Version of hapteq by the worker's address; empty where hapteq is not installed."""
+    """Version of hapteq by the worker's address; empty for all of them where a worker cannot import hapteq."""
     threads: tuple[int, ...]
     """Number of threads of each worker."""
 

@@ -60,9 +60,9 @@ def count_cores() -> int:
 
 
 def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: int | None = None) -> list[Result]:
-    """Map in parallel in forked processes, with results in the order of the items. items: iterables of equal length,
-    the arguments of `function`. workers: number of processes including this one; None = `count_cores()`. An exception
-    of `function` is raised here; no process is left running."""
+    """Map in forked processes, serially where that is impossible or not worthwhile; results in the order of the items.
+    items: iterables of equal length, the arguments of `function`. workers: number of processes including this one; None
+    = `count_cores()`. An exception of `function` is raised here; no process is left running."""
     tasks = list(zip(*items, strict=True))
     process_count = min(len(tasks), workers or count_cores())
     function_key = _identify_function(function)
@@ -144,8 +144,8 @@ class _SharedTasks:
         return results
 
     def _fork_worker(self, children: list[tuple[int, int]]) -> bool:
-        """Start a process and append (process id, reading end of its pipe) to `children`; False if the system
-        refuses."""
+        """Start a process and append (process id, reading end of its pipe) to `children`; False if the system refuses
+        the fork."""
         processor_s, parent_id = measure_processor_s(), os.getpid()
         # Signals wait: an exception here would leave a process that is not in `children`, or would let the child return
         # from this function and continue the work of its parent.

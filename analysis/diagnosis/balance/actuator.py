@@ -1,4 +1,4 @@
-"""Nonlinear laws of the actuator (dead band, saturation, curvature), found with the force balance inverted.
+"""Laws of the actuator (such as dead band, saturation and curvature), found with the force balance inverted.
 
 A law of the command cannot be a column of a regression of that command, because it would reproduce the command. In the
 balance solved for the acceleration, the command is a regressor without noise:
@@ -66,7 +66,8 @@ class ActuatorFit:
     replaces_motion_laws: bool = False
     """Whether its error alone is smaller than that of the laws of the motion named before."""
     suffices: bool = False
-    """Whether its error alone is about as small as with laws of the motion, and not larger than that of these alone."""
+    """Whether its error alone is about as small as with laws of the motion, and not larger than that of these alone;
+    not examined where it replaces them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +84,7 @@ def find_balance(
     motions: Sequence[Motion], driven: DrivenAxis, excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> Balance:
     """Find the balance of one axis: laws of the motion and, where significant, a law of the command. With a named one,
-    the laws of the motion are searched again for the force that it gives; else it is listed with its objection."""
+    the laws of the motion are searched again for the force that it gives; else it may be listed, with an objection."""
     axis, rotational = driven.number, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
     actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
@@ -183,7 +184,7 @@ def _select_promising(
     inverse: InverseBalance, kinds: LawKinds, limit: float, motion_laws: tuple[int, ...]
 ) -> list[CommandLaw]:
     """Select the laws of those kinds whose approximating sum has an error of at most `limit` on the samples that it is
-    fitted to: the laws of other kinds need not be tried one by one."""
+    fitted to, and of kinds without such a sum: other laws need not be tried one by one."""
     return [
         law
         for approx, laws in kinds

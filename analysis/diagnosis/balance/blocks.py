@@ -1,10 +1,11 @@
 """Normal equations of linear least squares, X'X w = X'y, block by block of consecutive samples.
 
-X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force. A
-block keeps the Gram matrix X'X, the cross products X'y and y'y in place of its samples. Sums of these over blocks give
-the fit to any subset of blocks and columns without the samples, which makes cross-validation fast. The residual sum of
-squares of weights w is y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part`, `judged_law`
-and `first_model.joint_fit`.
+X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force (in
+`inverse_balance`, the predicted motion, whose columns include the command). A block keeps the Gram matrix X'X, the
+cross products X'y and y'y in place of its samples. Sums of these over blocks give the fit to any subset of blocks and
+columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
+y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part`, `judged_law` and
+`first_model.joint_fit`.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,10 @@
 """Laws of an actuator, static nonlinearities and slew limits, on grids of parameters that span the command's range.
 
 Laws of the motion, such as friction, are further columns of the regression of the commanded force. The laws in this
-file map the command u to the force, f = g(u), so that they are tested in the force balance solved for the acceleration
-(`inverse_balance`). All grids below are chosen by hand: a grid need only be so fine that the search from its best law
-(`vary_parameters`) reaches the true parameters. Called by `actuator`.
+file map the command u to the force, f = g(u) (a magnet's also depends on the position), so that they are tested in the
+force balance solved for the acceleration (`inverse_balance`). All grids below are chosen by hand: a grid need only be
+so fine that the search from its best law (`vary_parameters`) reaches the true parameters. Called by `actuator`;
+`inverse_balance` fits them.
 
 Reference: Slotine and Li, Applied Nonlinear Control (1991), chapter 5 (dead zone, saturation, relay).
 """
@@ -25,7 +26,7 @@ DEADBAND_QUANTILES, SATURATION_QUANTILES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0
 )  # fmt: skip
 """Quantiles of the command's magnitude at which a dead band ends, and at which an actuator saturates."""
 POWER_CURVE_QUANTILES = (0.05, 0.1, 0.2, 0.3)
-"""Quantiles of the command's magnitude at which a power curve begins."""
+"""Quantiles of the command's magnitude at which a power curve begins; zero is tried as well."""
 POWER_CURVE_EXPONENTS = (0.3, 0.5, 0.7, 1.4, 2.0)
 """Exponents of the command beyond that quantile: below 1 for valves and magnets that saturate, 2 for propellers."""
 SQUARE_SHARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
@@ -126,8 +127,8 @@ def make_command_laws(command: FloatArray) -> Iterator[CommandLaw]:
 def make_slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
     """Make slew-rate limits: the output follows the command at a limited rate, as of a servo. commands: (n,) each. The
     rates range from the full stroke within the longest command up to, but without, the fastest change of any command;
-    none where these do not differ. A rate is left out where the limited output rarely reaches the command
-    (`SLEW_REACHED_SHARE`), because the force would then depend on the command's sign only."""
+    none unless the first is above zero and below the second. A rate is left out where the limited output rarely reaches
+    the command (`SLEW_REACHED_SHARE`), because the force would then depend on the command's sign only."""
     fastest_rate = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
     slowest_rate = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
     for rate in (
@@ -228,8 +229,8 @@ class PiecewiseCommandLaw:
 
 
 def make_piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
-    """Make a piecewise linear function of the command with jumps, separate for each sign. command: (n,), whose range
-    the nodes span."""
+    """Make a piecewise linear function of the command with jumps, separate for each sign. command: (n,), from whose
+    quantiles the nodes are taken."""
     nodes = np.unique(np.quantile(np.abs(command), NODE_QUANTILES))
 
     def compute_columns(u: FloatArray, position: FloatArray) -> FloatArray:
@@ -244,7 +245,7 @@ def make_piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
 
 def make_piecewise_attraction(position: FloatArray) -> PiecewiseCommandLaw:
     """Make the sum of the command and its square, each with a gain piecewise linear in the position. position: (n,),
-    whose range the nodes span."""
+    from whose quantiles the nodes are taken."""
     nodes = np.unique(np.quantile(position, NODE_QUANTILES))
 
     def compute_columns(u: FloatArray, x: FloatArray) -> FloatArray:

@@ -7,15 +7,15 @@ the motion is
     power_of_speed           w sgn(v) |v|^p         power_of_position        w sgn(q) |q|^p
     even_power_of_speed      w |v|^p                even_power_of_position   w |q|^p
     saturating_damping       w tanh(v / s)          exponential_spring       w exp(q / s)
-    damping_beyond_speed     w sgn(v) max(|v| - s, 0)   contact_beyond_position  w max(q - a, 0) or w max(a - q, 0)
+    damping_beyond_speed     w sgn(v) max(|v| - s, 0)   contact_beyond_position  w max(q - a, 0) or -w max(a - q, 0)
     falling_friction         w sgn(v) exp(-(v / s)^2)
     product_of_position_and_speed   w g(q, v), for each g in `PRODUCTS`
     inverse_distance         w / (q - a)^n, n = 1 or 2, with a outside the travel
 
 Each depends on one axis alone, which is what the formula of a `judged_law` can express. Nonlinear parameters are tried
-on grids over the motion and refined like those of the catalogue's laws (`structures`), within bounds chosen so wide
-that they only exclude columns that are zero or linear. In the code, c is the index of the driven channel in the motion
-m, n are the nonlinear parameters and w the weights, as in `law`.
+on grids over the motion and refined like those of the catalogue's laws (`structures`), within wide bounds, chosen by
+hand, that exclude columns that are nearly zero or linear. In the code, c is the index of the driven channel in the
+motion m, n are the nonlinear parameters and w the weights, as in `law`.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -56,7 +56,7 @@ SPEED_SHARES = (0.03, 0.1, 0.3, 1.0)
 TRAVEL_SHARES = (0.1, 0.3, 1.0)
 """Tried scales of a position and distances beyond the ends of the travel, relative to the travel."""
 LARGEST_EXPONENT = 30.0
-"""Largest |q / s| of an exponential: beyond it, the column is one spike at the end of the travel."""
+"""Largest |q / s| of a tried exponential: beyond it, the column is one spike at the end of the travel."""
 STOP_SHARES = (0.05, 0.15, 0.3, 0.5)
 """Tried onsets of a contact: distances from either end of the travel, relative to the travel."""
 PRODUCTS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
@@ -74,8 +74,8 @@ PRODUCTS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] 
 
 
 def make_free_laws(channel: int, scales: Scales) -> Iterator[Law]:
-    """Make all free laws of one channel of the motion; only those of the position without a time axis, and none of the
-    position for a shaft that turns freely."""
+    """Make all free laws of one channel of the motion. Without a time axis, only those of the position; without speed,
+    none of the speed alone; for a shaft that turns freely or without travel, only those of the speed."""
     if np.isfinite(scales.band_hz) and scales.speed > 0:
         yield from _make_speed_laws(channel, scales.speed)
     if scales.turns or not scales.travel > 0:

@@ -1,7 +1,7 @@
 """Dry friction and damping along one measured motion, over grids of speeds, widths and time constants.
 
 With position q, velocity v, sigma = tanh(v / width) in place of sgn v, time tau = -1 to 1 over the recorded part, and
-weights w, the force that resists the motion is (sources: the file of each name in `equalizer/effects`):
+weights w, the force that resists the motion is (sources: the file of the name in `equalizer/effects`, if any):
 
     coulomb_friction             w sigma
     stribeck_friction            w1 sigma + w2 sigma exp(-(v / v_s)^2)
@@ -38,8 +38,8 @@ from equalizer.effects.simulation.forces_along_motion import REST_SPEED_SHARE
 from equalizer.signals.signal import FloatArray
 
 LEAST_WIDTH_SHARE = REST_SPEED_SHARE
-"""Least width of tanh(v / width), relative to the rms speed: the speed below which an axis may count as resting in a
-simulation. Where the width is fitted, larger ones are tried as well."""
+"""Least tried width of tanh(v / width), relative to the rms speed: the speed below which an axis may count as resting
+in a simulation. Where the width is fitted, larger ones are tried, and the refinement may also make it smaller."""
 
 
 def compute_friction_widths(scales: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:

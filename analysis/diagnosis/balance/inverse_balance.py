@@ -50,7 +50,7 @@ class InverseBalance:
     search: StructureSearch
     """The search for laws of the motion, whose regression and base are used here."""
     map_: Mapper
-    """Like `map`; may run in parallel. Maps laws to their errors."""
+    """Like `map`; may run in parallel. Maps laws to their errors or refined values."""
     has_friction: bool
     """Whether friction is among the laws of the motion: samples at rest are then not used, because static friction
     balances any force up to its level."""
@@ -82,7 +82,7 @@ class InverseBalance:
         return float(self.evaluate_law(law, motion_laws, False).sum())
 
     def fit_lower_bound(self, law: CommandForce, motion_laws: Sequence[int]) -> float:
-        """Compute the sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
+        """Compute the sum of squared errors on the fitted samples: a lower bound for each law that it approximates."""
         fit_blocks, _ = self._build_blocks(self._build_regressors(law, motion_laws), False)
         products = [select_products(block, range(len(fit_blocks[0].cross))) for block in fit_blocks]
         weights = solve_normal_equations(sum_products(fit_blocks, range(len(fit_blocks[0].cross))), RIDGE)

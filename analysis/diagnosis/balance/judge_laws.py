@@ -53,7 +53,7 @@ WEAK_GAIN_OBJECTIONS = (
     "its gain is too small to be named",
     "its gain varies too much from stretch to stretch of the recording",
 )
-"""Objections: to a second law of a family; to a further law with a gain of at most, and above, `FURTHER_LAW_GAIN`."""
+"""Objections: to a second law of a family; without chosen laws, to a gain of at most, and above, `FURTHER_LAW_GAIN`."""
 CONDITION_LAWS = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws that depend on a recorded condition. They may form a class, although they belong to different families."""
 
@@ -62,7 +62,7 @@ CONDITION_LAWS = {"condition_dependent_friction", "condition_dependent_damping"}
 class Balance:
     """Result of the force balance of one axis: the chosen structure, with a test of each of its laws.
 
-    laws: of the chosen structure, the largest gain first. further_laws: others that would explain part of its residual.
+    laws: any of the command, then those of the structure by falling gain. further_laws: others that lower its error.
     linear, error, ceiling: rms error on the test blocks, relative to the force's rms, of mass, damping and stiffness
     alone, of the chosen structure, and of all laws together; without a test, all three are the cross-validated linear
     error. complete: whether the structure search was completed. tested: whether the blocks allow a test."""
@@ -114,7 +114,7 @@ def judge_laws(search: StructureSearch) -> Balance:
 
 
 def _has_two_frictions(regression: Regression, law_indices: Sequence[int]) -> bool:
-    """Whether laws (indices in the regression) contain two different frictions of the same channel."""
+    """Whether laws (indices in the regression) contain two laws of the family of friction for the same channel."""
     law_keys = [regression.laws[law_index].key for law_index in law_indices]
     channels = [channel for effect, channel in set(law_keys) if effect in find_family("coulomb_friction")]
     return len(channels) > len(set(channels))
@@ -200,7 +200,7 @@ def _judge_law(
 
 
 def _compute_fold_errors(regression: Regression, law_sets: Sequence[Sequence[int]]) -> list[FloatArray]:
-    """Compute cross-validated errors (fit blocks,) of each set of laws; empty if these blocks are the test blocks."""
+    """Compute cross-validated errors (fit blocks,) per set of laws; of length 0 if these are the test blocks."""
     if select_test_blocks(regression) is not regression.test:
         return [np.zeros(0) for _ in law_sets]
     return [regression.cross_validate(regression.select_columns(law_indices)) for law_indices in law_sets]

@@ -34,9 +34,9 @@ FAMILIES = (
     FREE_SPEED_LAWS,
     FREE_POSITION_LAWS,
 )  # fmt: skip
-"""Families of effects with similar forces. A law whose equally good rivals are all of its own family, and not too many,
-is named with the rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a
-family of its own."""
+"""Families of effects with similar forces. A law whose equally good rivals are all of its own family, and not too many
+or all dry friction, is named with the rivals as its class; a law with such a rival of another family is not named. An
+unlisted effect is a family of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,17 +49,18 @@ class JudgedLaw:
     values: dict[str, float]
     """Parameters of the effect by name; empty where the fitted weights have signs that the effect cannot have."""
     gain: float
-    """Share of the squared error that the law removes when it is added to the other laws."""
+    """Share of the squared error that the law removes when it is added to the other laws; a law of the command may
+    replace these."""
     gain_low: float
     """Lower end of the 95 % bootstrap interval of the gain: the 2.5 % quantile."""
     share: float
     """Decrease of the squared error by this law, over the decrease by all laws together; for a law of the command, over
     the error of the linear balance."""
     equivalents: tuple[str, ...]
-    """Rivals: effects that fit about as well in place of this law."""
+    """Rivals: effects that fit about as well in place of this law; not sought for a further law of a balance."""
     probability: float
     """Share of bootstrap draws in which no other effect in its place has a smaller error, apart from effects that
-    contain it as a special case."""
+    contain it as a special case; 0 for a further law."""
     objection: str
     """Reason not to name the law, as a clause; empty where it is named."""
     stands_for: str = ""

@@ -1,7 +1,7 @@
 """Candidate terms of the force balance of a moving axis, each on a grid of its nonlinear parameters.
 
-Defined here: nonlinear springs, end stops, backlash, gravity torque, cogging, pose-dependent inertia, an extra mode and
-amplifier lag. Friction and damping are in `friction_laws`; `law` states the balance.
+Defined here: nonlinear springs, end stops, backlash, gravity torque, cogging, pose-dependent inertia, an extra mode,
+amplifier lag and a drifting force. Friction and damping are in `friction_laws`; `law` states the balance.
 
 The force of a law is phi(q, v, a; n)' w: linear in the weights w, with columns phi from the measured motion for given
 nonlinear parameters n. The grids of n span the travel and the band of the recording, so that the search needs no
@@ -38,7 +38,7 @@ MOST_WAVENUMBERS = 600
 """Number of wavenumbers that are searched, from the longest pitch down: pitches below 1 / 211 of the travel, or below 1
 / 601 of a turn for a shaft that turns, are not found."""
 MOST_SPECTRUM_SAMPLES = 6000
-"""About the largest number of samples, evenly spaced, from which the spectrum over the position is computed."""
+"""The spectrum over the position is computed from evenly spaced samples, fewer than twice this number."""
 MOST_PITCHES = 4
 """Largest number of pitches that are kept: those of the strongest spectral lines."""
 STOP_DISTANCES = (0.02, 0.05, 0.1, 0.2)
@@ -51,9 +51,9 @@ hand."""
 
 
 def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
-    """Make all laws of the catalogue, and those of recorded conditions, for all channels; without `make_cogging_law`,
-    whose pitch is found from the residual of the others. Laws that need a time axis are left out where the band is
-    infinite; the drifting force also where an acceleration was measured."""
+    """Make all laws of this file and `friction_laws`, and those of recorded conditions, for all channels; without
+    `make_cogging_law`, whose pitch is found from the residual of the others. Laws that need a time axis are left out
+    where the band is infinite; the drifting force also where an acceleration was measured."""
     for channel in range(len(motions[0].channels)):
         scales = measure_scales(motions, channel, rotational)
         yield from make_friction_laws(channel, scales)

@@ -63,7 +63,7 @@ class Motion:
     """(n, d); without a time axis, the change of the position per sample."""
     acceleration: FloatArray
     force: FloatArray
-    """(n, m): as commanded or measured."""
+    """(n, m): as commanded or measured, or computed from that with an actuator's law, known effects or a delay."""
     condition: FloatArray
     """(n, q): recorded conditions such as a temperature, standardised; q may be 0."""
     fit: Mask
@@ -205,7 +205,7 @@ def _compute_motion(
 
 def filter_band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
     """Filter columns (n, k) to the band from `lowest_hz` to `band_hz` without a phase shift; a low pass where
-    `lowest_hz` is 0."""
+    `lowest_hz` is 0. The straight line between their ends is kept."""
     return filter_spectrum(columns, rate_hz, lambda frequency_hz: _compute_band_gain(frequency_hz, band_hz, lowest_hz))
 
 
@@ -287,7 +287,7 @@ def _fit_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, Floa
 
 def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
     """Standardise the conditions that vary to mean 0 and standard deviation 1 over all records. Returns them and their
-    samples (n, q) per record; q is 0 where the records differ in their conditions or have none."""
+    samples (n, q) per record; q is 0 where the records differ in their conditions, or none varies."""
     signals = [getattr(record.recording, "condition", None) for record in records]
     if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:
         return (), [np.zeros((len(record.command), 0)) for record in records]

@@ -6,7 +6,7 @@ is fitted and tested without another pass over the samples.
 The base is mass, damping and stiffness along every measured motion, linear dynamics of a higher order where there are
 any (`BaseTerms`), and a constant. Errors are sums of squares of the residual force within the band. In
 cross-validation, the error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111,
-1974). Called by `structures`, `judge_laws`, and the fits of a first model (`first_model`).
+1974). Used in `balance` and `first_model`, by `contrast.force_base` and `result.curves.state_maps`.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 RIDGE_PARAMETERS = tuple(10.0**exponent for exponent in range(-8, 1))
-"""Ridge parameters relative to the mean power of a column; cross-validation selects one. Range chosen."""
+"""Ridge parameters relative to the mean power of a column; cross-validation selects one. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,8 +33,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 LEAST_SAMPLES_PER_PERIOD = 6.0
-"""Least samples per period of the band's upper end at which laws are computed, so that harmonics of nonlinear laws are
-not aliased into the band. Chosen by hand."""
+"""Least samples per period of the band's upper end that decimation before the laws keeps, so that harmonics of
+nonlinear laws are not aliased into the band. Chosen by hand."""
 DIFFERENCE_STEP = 0.1
 """Step of the finite differences for the parameters of modes, in standard deviations of the calibration. Chosen by
 hand."""
@@ -80,8 +80,8 @@ def _select_axis(motion: Motion, axis: int) -> Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PreparedRecord:
-    """One record along the m driven axes, decimated to at least `LEAST_SAMPLES_PER_PERIOD` samples per period of the
-    band's upper end."""
+    """One record along the m driven axes, decimated, where its rate allows, to at least `LEAST_SAMPLES_PER_PERIOD`
+    samples per period of the band's upper end."""
 
     motion: Motion
     """Motion of the driven axes; its force is that of the actuators and known effects there, in N (N m)."""

@@ -51,7 +51,7 @@ from equalizer.signals.signal import FloatArray
 
 INTERVAL_HALF_WIDTH = 1.96 * INTERVAL_FACTOR
 """Half-width of a 95 % interval in standard errors, widened as in `identifiability`. A positive parameter is fitted as
-its logarithm: if the half-width exceeds 1, the parameter counts as undetermined."""
+its logarithm: if the half-width is at least 1, the parameter counts as undetermined."""
 _NamedLaws = list[tuple[int, JudgedLaw]]
 """(axis index, law named on that axis) each."""
 
@@ -113,8 +113,9 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], noise
 def _confirm_by_simulation(
     start: _ConfirmationStart, named_laws: Sequence[tuple[int, JudgedLaw]]
 ) -> tuple[SearchResult, _NamedLaws] | None:
-    """Fit the laws until all are confirmed, dropping undetermined ones, and the last one where the held-out error does
-    not fall enough; returns the result and these laws, None where there are none."""
+    """Fit the laws until all are confirmed. Undetermined ones are dropped or replaced by a special case; the last one
+    is dropped where too little held-out error is explained. Returns the result and these laws; None where none is
+    left."""
     context, named_laws = start.full_context, refit_laws(start.balances, named_laws)
     while named_laws:
         steps, with_laws = _fit_from_starts(context, start.balances, (start.retuned, start.baseline), named_laws)

@@ -127,7 +127,8 @@ def _find_best_rival(context: SearchContext, result: SearchResult) -> FittedCand
 
 
 def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
-    """Whether the balance of the claim's axis names the effect, a law simulated as it, or a law that it rivals."""
+    """Whether the balance of the claim's axis names the effect, a law simulated as it, or a law that it rivals; False
+    for an effect that is not of one axis."""
     if claim.spread != "one" or claim.sites[0] >= len(balances):
         return False
     names = {

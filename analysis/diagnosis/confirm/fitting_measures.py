@@ -1,9 +1,10 @@
-"""Choice of the error measure in which the laws of a force balance are fitted.
+"""Choice of the error measure for a search by simulation, and the constants that it may add to the commands.
 
 A linear model that was fitted to deviations from the mean has no constants: neither the command at the operating point
 nor the zero of a sensor. Without them, its simulation has an offset far larger than the errors of its dynamics.
 Therefore a constant is added to the commands: for positions K x = B u at rest (`shift_to_operating_point`), for forces
-the mean error (`shift_to_mean_force`). Called by `diagnose`, `search_by_simulation` and `force_balance_measures`.
+the mean error (`shift_to_mean_force`). Called by `diagnose` and `force_balance_measures`; `search_by_simulation` takes
+the `FittingMeasure`.
 """
 
 from collections.abc import Sequence
@@ -40,7 +41,8 @@ class FittingMeasure:
     narrow: bool = False
     """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
     is_reduced: bool = False
-    """Whether the force of further motions, modes and a delay was subtracted from the commands."""
+    """Whether the force of further motions, modes and a delay was subtracted from the commands. Only set by
+    `choose_forces_of_balance`, for the search by simulation: always False from `list_fitting_measures`."""
 
 
 def choose_fitting_measure(
@@ -53,7 +55,7 @@ def choose_fitting_measure(
     """Choose the measure that `errors.choose_measure` selects. clean: recordings without the fault. compared: motion,
     force or automatic. about_mean: whether the model was fitted to deviations from the mean; without clean recordings,
     a constant is then added to the commands of a free simulation or predicted force, where the error over noise falls
-    to `CONSTANT_ERROR_RATIO` or less."""
+    to `CONSTANT_ERROR_RATIO` of its value without the constant, or less."""
     fitting = FittingMeasure(model, make_measure(recordings, model, clean, compared))
     if not about_mean or clean:
         return fitting
@@ -122,7 +124,8 @@ def add_to_commands(recordings: Sequence[Recording], constant: FloatArray) -> tu
 
 
 def _compute_means(recordings: Sequence[Recording], responses: int) -> tuple[FloatArray, FloatArray]:
-    """Compute the means of commands (m,) and responses (p,) over the samples to fit and to choose by."""
+    """Compute the means of commands (m,) and responses (p,) over the samples to fit and to choose by. responses: number
+    of response channels."""
     records = observe_parts(recordings, responses)
     masks = [record.fit | record.choose for record in records]
     commands = np.vstack([record.command[mask] for record, mask in zip(records, masks, strict=True)])

@@ -139,7 +139,7 @@ def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], law
     """Compute the starting deviations of mass, damping and stiffness, in standard deviations: from the model's values
     to those that the balance fits together with the laws. Zeros unless there is a single balance, without a given
     model, and the model has one coordinate. A mass is at least a tenth of the model's (chosen); deviations are clipped
-    to 3.9, just within `RETUNING_BOUND` = 4. laws: indices of the named laws in the regression."""
+    to +-3.9, just within `RETUNING_BOUND` = 4. laws: indices of the named laws in the regression."""
     deviations = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
         return deviations

@@ -4,9 +4,9 @@ Of the faults that pass all tests of `_find_objection`, the one with the smalles
 of it that these data cannot distinguish from it. Its class contains the rivals whose error is not significantly larger
 (bootstrap over blocks; a rival that contains the best as a special case only where it is significantly better), and
 those that failed a test but fit about as well (`_find_inconclusive`), the latter only until the class with the best has
-`LARGEST_FAULT_CLASS` members. No fault is named where the class is too large, a fault that failed a test has a clearly
-smaller error, the best explains too small a share of the difference, or its axis is ambiguous. Errors and gains are
-those of `rank_faults`. Called by `compare_with_reference`."""
+`LARGEST_FAULT_CLASS` members, and effects with the same signals (`ALIASES`). No fault is named where the class is too
+large, a fault that failed a test has a clearly smaller error, the best explains too small a share of the difference, or
+its axis is ambiguous. Errors and gains are those of `rank_faults`. Called by `compare_with_reference`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -158,7 +158,7 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
 
 
 def _mask_interior(valid: Mask, gap_reach: int) -> Mask:
-    """Mask the valid rows (n,) at least `gap_reach` rows from gaps and `REACH` rows from the ends of the valid rows."""
+    """Mask the valid rows (n,) over `gap_reach` rows from gaps and at least `REACH` from the ends of the valid rows."""
     invalid = np.pad(~valid, gap_reach)
     settled = np.array(np.convolve(invalid, np.ones(2 * gap_reach + 1), "valid") == 0)
     indices = np.flatnonzero(valid)
@@ -264,7 +264,8 @@ def _compute_error_factor(
     compared: ComparedBase, data: RecordingSet, fault: Fault, variant: Variant, undone: UndoneRows
 ) -> float:
     """Compute the factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the
-    module's docstring. The factor by which interpolation scales errors of an autoregression is divided out."""
+    module's docstring. The factor by which interpolation scales errors of an autoregression is divided out; for
+    actuators, the spread ratio is a further factor."""
     factor = variant.error_factor
     if variant.curve is not None:
         factor *= _compute_slope_factor(compared, data, variant.curve)

@@ -1,8 +1,9 @@
 """Force balance as the base model of a comparison with reference recordings: the device without the fault.
 
-Per driven axis, F = M a + D v + K q + c + sum of w phi(q, v): linear regression of the force on the motion of all
-measured channels, a constant, and nonlinear laws phi that lower the cross-validated error (`balance.regression`). The
-laws only make the base accurate; none of them is reported. Built by `bases`, used by `compared_base` and `rank_faults`.
+Per driven axis, F = M a + D v + K q + c + sum of w phi: linear regression of the force on the motion of all measured
+channels, a constant, and further laws phi of the motion, some of them linear or of the time (`balance.laws`), that
+lower the cross-validated error (`balance.regression`). The laws only make the base accurate; none of them is reported.
+Built by `bases`, used by `compared_base` and `rank_faults`.
 """
 
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ class ForceBase:
     axis: int
     """Index of the driven axis in the command."""
     laws: tuple[Law, ...]
-    """Nonlinear laws in addition to mass, damping, stiffness and constant; may be empty."""
+    """Laws in addition to mass, damping, stiffness and constant; may be empty."""
     band_hz: float
     """Upper end of the band (Hz) to which force and columns are filtered."""
     is_free_rotation: bool

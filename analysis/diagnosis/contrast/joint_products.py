@@ -6,7 +6,8 @@ where the fault is linear, and to first order about size 1 elsewhere. The base i
 it is never extrapolated beyond the states of one set. Gram matrices P of the columns (z, d), summed over each block of
 rows, are sufficient statistics: with T = [I, s D], where D assigns the changes to their columns, T P T' is the Gram
 matrix of the rows with the fault undone. Sizes are found by variable projection (Golub and Pereyra, SIAM J. Numer.
-Anal. 10:413, 1973). Called by `fit_faults` and `rank_faults`; `compared_base` computes the Gram matrices.
+Anal. 10:413, 1973). Called by `fit_faults` and `rank_faults`; `compared_base` computes the Gram matrices. It,
+`likely_delays` and `study.evaluation.real.injected_halves` use `solve_residual_weights`.
 """
 
 from collections.abc import Sequence

@@ -1,5 +1,6 @@
 """Faults of a mechanism: additional forces along the measured motion, each undone by subtracting it from the command.
-`rank_faults` fits them.
+`rank_faults` fits them. Two are reported with other parameters than those of the subtracted force: end stops at both
+ends by the position of the upper one alone, cogging by the phase of the opposite force.
 
 With x the measured position, q its distance from the middle of the travel, v the velocity, a the acceleration and
 sigma = tanh(v / width):

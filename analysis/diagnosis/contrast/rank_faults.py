@@ -1,8 +1,8 @@
 """Test which fault explains the difference between faulty and clean recordings of one device.
 
-A base is a regression model of the recordings: a force balance or an autoregressive model. E(f) is the sum of squared
-whitened errors of a base that is fitted to both sets jointly, with fault f undone in the faulty set (`compared_base`,
-`joint_products`). The gain of f is
+A base is a regression model of the recordings: force balance, autoregressive model, or one sensor by another. E(f) is
+the sum of squared whitened errors of all bases, fitted to both sets jointly, with fault f undone in the faulty set
+(`compared_base`, `joint_products`). The gain of f is
 
     gain(f) = E(none) / E(f) - 1.
 

@@ -251,8 +251,8 @@ def _make_power_law(channel: _Channels, share: float, power: int, parameter_name
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
-    """Solve y = x + share x^power for x (n,) by 20 Newton steps, with the slope at least 0.1, so that steps stay short
-    near a turning point; clipped to -3 to 3. y: readings over the largest."""
+    """Solve y = x + share x^power for x (n,) by 20 Newton steps. A slope within +-0.1 counts as 0.1, so that steps stay
+    short near a turning point; clipped to -3 to 3. y: readings over the largest."""
     x = y.copy()
     for _ in range(20):
         slope = 1 + power * share * x ** (power - 1)

@@ -1,7 +1,7 @@
 """Detect faults from the spectrum or the values of a single signal, without a model of the device.
 
-Mains hum and white noise in a response are faults where neither the clean recordings nor, for hum, the commands have
-them; a quantized command is one where its step is coarser than that of the clean commands. Called by
+Mains hum and white noise in a response are faults where they are clearly stronger than in the clean recordings and, for
+hum, in the commands; a quantized command is one where its step is coarser than that of the clean commands. Called by
 `reference.compare_with_reference`. Limits are in `analysis.diagnosis.settings`; other numbers are chosen by hand.
 """
 
@@ -36,12 +36,13 @@ class SignalFault:
     channels: tuple[int, ...]
     """Indices of the channels that have the fault."""
     values: dict[str, float]
-    """Parameters of the effect for the channel with the largest fault, by name, in SI units."""
+    """Parameters of the effect for the channel with the largest fault, by name; amplitudes in the unit of the
+    signal."""
 
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Find mains hum that only the faulty parts have, with the amplitude (unit of the response) and frequency (Hz) of
-    its strongest channel; None where there is none."""
+    """Find mains hum that is clearly stronger in the faulty parts, with the amplitude (unit of the response) and
+    frequency (Hz) of its strongest channel; None where there is none."""
     mains_lines = [
         (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])
@@ -84,7 +85,7 @@ def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Find the first command whose values are multiples of a coarser step (N) than those of the clean command; None
+    """Find the first command whose values are multiples of a coarser step than those of the clean command; None
     where there is none. Commands are not compared unless the clean one has more than twice as many distinct values."""
     for channel in range(faulty[0].command.shape[1]):
         faulty_values, clean_values = (
@@ -125,7 +126,7 @@ def _estimate_noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, 
 def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
     """Find the largest mains line of a response in the longest faulty part: its amplitude (unit of the response) and
     frequency (Hz). None where no line exceeds the spectrum around it, or where the clean recordings or the commands
-    have it as well. Mains frequencies above 0.4 of the sample rate are not tested."""
+    have it nearly as strongly. Mains frequencies above 0.4 of the sample rate are not tested."""
     longest = max(faulty, key=lambda part: len(part.response))
     strongest: tuple[float, float] | None = None
     for mains_hz in MAINS_HZ:
@@ -144,10 +145,10 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
 
 
 def _measure_mains_line(samples: FloatArray, rate_hz: float, mains_hz: float) -> tuple[float, float, float]:
-    """Measure the largest spectral line within `MAINS_TOLERANCE_HZ` of `mains_hz` (Hann window): the ratio of its power
-    to the median power around it, its amplitude (unit of the samples) and its frequency (Hz). The median is over lines
-    within 6 Hz, or 24 lines if these are more, without those near the mains frequency. Ratio and amplitude are 0 where
-    the spectrum has no line there, or none around it. samples: (n,)."""
+    """Measure the largest spectral line within `MAINS_TOLERANCE_HZ` (or 1.5 lines) of `mains_hz` (Hann window): the
+    ratio of its power to the median power around it, its amplitude (unit of the samples) and its frequency (Hz). The
+    median is over lines within 6 Hz, or 24 lines if these are more, without those near the mains frequency. Ratio and
+    amplitude are 0 where the spectrum has no line there, or none around it. samples: (n,)."""
     window = np.hanning(len(samples))
     detrended = samples - np.linspace(samples[0], samples[-1], len(samples))
     power = np.abs(np.fft.rfft((detrended - detrended.mean()) * window)) ** 2

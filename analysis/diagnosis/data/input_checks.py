@@ -1,6 +1,6 @@
 """Input checks of a diagnosis: recordings of one device, a model of that device, enough data. Recordings that fail are
 refused and get no verdict, not even `unexplained`. Called by `study.workflows.diagnosis` before `diagnose`, and by
-`diagnose_values`, `prepare_recordings` and `fit_without_model`."""
+`diagnose`, `diagnose_values`, `prepare_recordings` and `study.evaluation.real`."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations

@@ -59,7 +59,7 @@ def run_smoother(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes
     """Run the smoother of the module's equations: fill `smoothed` (n, s), whose first row is the initial prediction.
 
     transition (s, s): T; observation (c, s): H; gain (s, c): K; smoother_gain (s, s): S. step_input (n, s): (B u, 0) of
-    the step that begins at a sample. measured (n, c): y - D u; a sample with a NaN is skipped."""
+    the step that begins at a sample. measured (n, c): y less D u of the step before; a sample with a NaN is skipped."""
     n, s, c = smoothed.shape[0], smoothed.shape[1], observation.shape[0]
     predicted = np.empty((n, s))
     state = smoothed[0].copy()
@@ -122,7 +122,7 @@ def smooth_motion(
     )
     transition *= 1 - _LEAK_SHARE
     observation, feedthrough = _build_observation_matrices(discrete_model, record.measured.shape[1])
-    expected_force = EXPECTED_CHANGE_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12  # N; above 0
+    expected_force = EXPECTED_CHANGE_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12  # N (N m); above 0
     walk_variance = np.concatenate([np.zeros(state_count), expected_force**2 / (CHANGE_TIME_S * rate_hz)])
     gain, smoother_gain = _compute_smoother_gains(
         transition,

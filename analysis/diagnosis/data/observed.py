@@ -139,8 +139,8 @@ def find_moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) ->
 
 
 def _find_end_of_motion(samples: FloatArray) -> int:
-    """Count the samples until the end of motion, at least half of them; all where the part does not come to rest before
-    its last `LONGEST_TAIL`. The rest value is the median over that tail."""
+    """Count the samples until the end of motion, at least half of them; all where the part does not move, or does not
+    come to rest before its last `LONGEST_TAIL`. The rest value is the median over that tail."""
     samples = samples[:, np.isfinite(samples).any(axis=0)]
     tail_start = int((1 - LONGEST_TAIL) * len(samples))
     is_complete: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
@@ -165,10 +165,10 @@ def split_samples(
     Segments marked as test are held out; of the others, those marked as fit are fitted, or all without such marks.
     Segments of rest and samples outside segments belong to no set, unless no segment remains to fit; nothing is fitted
     where all driven segments are marked as test. Without test marks and external test, the last share `TEST_SHARE` of
-    each segment is held out, in whole periods, so that every level is tested; where all segments have the same level,
-    that share of the time. Of the fitted segments, those of the middle level are the validation set where there are at
-    least `LEVELS_TO_HOLD_ONE_BACK` levels: laws differ in how they grow with the level, whereas further periods of a
-    fitted level differ by noise only. Otherwise it is the last share `CHOOSE_SHARE` of the remaining time.
+    each segment is held out, in whole periods, so that every level is tested; with fewer than `LEVELS_TO_STRATIFY`
+    levels, that share of the time. Of the fitted segments, those of the middle level are the validation set where there
+    are at least `LEVELS_TO_HOLD_ONE_BACK` levels: laws differ in how they grow with the level, whereas further periods
+    of a fitted level differ by noise only. Otherwise it is the last share `CHOOSE_SHARE` of the remaining time.
 
     Without segments, the last share `TEST_SHARE` of each part's motion is held out; the rest period after it, which may
     show a force but no motion, is fitted."""
@@ -223,8 +223,8 @@ def _mask_segments(segments: list[Segment], length: int) -> Mask:
 
 
 def _mask_segment_ends(segments: list[Segment], length: int) -> Mask:
-    """Make the mask (length,) of the last share `TEST_SHARE` of each segment, rounded to whole periods but at least one
-    period; of that share of the time where there are fewer than `LEVELS_TO_STRATIFY` levels."""
+    """Make the mask (length,) of the last share `TEST_SHARE` of each segment, in whole periods and at least one of them
+    where it has two or more; of that share of the time where there are fewer than `LEVELS_TO_STRATIFY` levels."""
     mask = np.zeros(length, dtype=np.bool_)
     if len(_list_levels(segments)) < LEVELS_TO_STRATIFY:
         indices = np.flatnonzero(_mask_segments(segments, length)) if segments else np.arange(length)

@@ -3,8 +3,8 @@ noise.
 
 A linear device responds on driven lines only. Where all driven lines are odd multiples of one line, odd distortion
 falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon, IEEE Control Systems 36 (2016), 38).
-The driven lines are found in the measured excitation, so that any multisine with silent lines is suitable. Called by
-the modules of `analysis.diagnosis.localisation`.
+The driven lines are found in the recorded excitation or command, so that any multisine with silent lines is suitable.
+Called by the modules of `analysis.diagnosis.localisation`.
 
 Lines are tested in octaves that begin at powers of 2 Hz, the same for all recordings, so that results of different
 recordings can be compared band by band. The ratio of the power on silent lines to that of the noise is F-distributed.

@@ -166,7 +166,9 @@ def _find_fit_objections(discovery: Discovery, explanation: Explanation) -> Iter
 
 def _needs_law(result: SearchResult) -> bool:
     """Whether laws are to be searched: only a free simulation can confirm a law, and an error at the noise level leaves
-    none to find, unless the named effects may approximate a law (`may_approximate_law`)."""
+    none to find, unless the named effects may approximate a law (`may_approximate_law`). False also with clean
+    references or detected sensor faults (`SearchContext.certain`), after a search that ended early, or where a
+    statistic of the response was compared."""
     context, explanation = result.context, result.found
     if (
         context.measure.name != "free simulation"

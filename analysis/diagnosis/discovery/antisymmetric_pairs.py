@@ -134,9 +134,9 @@ def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) ->
 
 
 def can_coupling_imitate(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]) -> bool:
-    """Whether the model's coupled damping or stiffness could imitate a fitted law that is linear in the motion of
-    another axis. A force on a single axis: always. An antisymmetric pair: if re-tuning within its bound can reach its
-    factor. inputs: command channels."""
+    """Whether the model's damping or stiffness could imitate a fitted law that is linear in the motion of an axis. A
+    force on a single axis: always. An antisymmetric pair: if re-tuning within its bound can reach its factor. inputs:
+    command channels."""
     couplings = _find_coupled_laws(fitted, inputs)
     for (prefix, axis, coupled_axis), (_, factor) in couplings.items():
         partner_factor = couplings.get((prefix, coupled_axis, axis), (0, 0.0))[1]

@@ -50,8 +50,8 @@ class Round:
     sums: tuple[Sum, ...]
     """The screened sums in the order of `fitted_candidates`."""
     chance_share: float
-    """Negative control: largest share of the held-out squares that a term removes from the missing force after that was
-    shuffled in time."""
+    """Negative control: largest share of the held-out squares that a term removes from the missing force (or a
+    reading's residual) after that was shuffled in time; 0 where the law's view was not screened."""
     complete: bool = True
     """Whether time was left after the sums were fitted."""
 
@@ -92,8 +92,8 @@ def discover_laws(
     """Search laws by forward selection: at most `max_laws` (an antisymmetric pair counts as one), fitted by output
     error; None where the error is that of the noise, where no law is worth its parameters or, with single_term, where
     such a law does not suffice. catalogue_explanation: by effects of the catalogue; its re-tuned model is the start.
-    single_term: only laws of single terms that are likely to explain the whole error; the search ends where a screen or
-    a fit shows that they do not, unless such a law depends on another axis."""
+    single_term: only laws of single terms that are likely to explain the whole error; the search ends where a screen
+    shows that they do not, or a fit of a law that depends on no other axis."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = catalogue_explanation.retuned.fitted
     current = context.score_fit(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))

@@ -3,9 +3,9 @@
 A term is a shape times a factor; its free parameters (exponents, widths, time constants, pitches) start on a grid that
 spans the recording's travel, speed and duration. Forces linear in an axis's own motion are not terms: mass, damping and
 stiffness are parameters of the model. Nor is a constant force, which each regression contains (`screen_terms`).
-docs/diagnosis.md lists what the grammar contains and what it does not. Grids and bounds, relative to the scales of the
-recording, are chosen by hand. `view_terms` calls `list_terms`; `Term` and the names of signals are used throughout the
-package.
+docs/diagnosis.md lists what the grammar contains and what it does not. Grids and bounds, most of them relative to the
+scales of the recording, are chosen by hand. `view_terms` calls `list_terms`; `Term` and the names of signals are used
+throughout the package.
 """
 
 import re
@@ -36,13 +36,13 @@ class Term:
     shape: str
     """Formula in the language of laws; its free parameters are p0, p1, …"""
     numbers: tuple[float, ...] = ()
-    """Starting values of the free parameters, in SI units."""
+    """Values of the free parameters, in SI units: starting values in the grammar, fitted ones in a `Sum`."""
     bounds: tuple[tuple[float, float], ...] = ()
     """Bounds of each parameter."""
     exponents: tuple[int, ...] = ()
     """Indices of the parameters that are exponents."""
     angles: tuple[int, ...] = ()
-    """Indices of the parameters that are angles; all others are positive."""
+    """Indices of the parameters that are angles; no other is negative."""
     family: str = ""
     """Shapes of one family differ by an integer exponent; where one ranks high, all are fitted. Empty: the shape
     itself."""
@@ -251,8 +251,8 @@ def _generate_memory_terms(axis: Axis, duration_s: float, rate_hz: float) -> Ite
 
 
 def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Iterator[Term]:
-    """Generate terms of the motion or the command of other axes, alone or times a signal of the own axis; and drag by
-    the speed in space."""
+    """Generate terms of the motion or the command of other axes, alone, times each other or times a signal of the own
+    axis; and drag by the speed in space."""
     x, v, f = own_axis.x, own_axis.v, own_axis.f
     for other_axis in other_axes:
         shapes = (
@@ -279,7 +279,7 @@ def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> It
 def _generate_inertia_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Iterator[Term]:
     """Generate inertia that changes with the position q as m(q) = m0 + c q or m0 + c q², by Lagrange's equation m(q)
     dv/dt + m'(q) v²/2 = F; that of the own axis may depend on another axis's position, whose speed then enters, and
-    that of another axis on the own position."""
+    that of another axis on the own position. Terms of the acceleration are also tried without that of the speed."""
     x, v = own_axis.x, own_axis.v
     for shape in (f"({x}*d{v} + {v}**2/2)", f"({x}**2*d{v} + {x}*{v}**2)", f"{x}*d{v}"):
         yield Term(shape)

@@ -263,8 +263,8 @@ def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
 
 
 def _list_blocks(record: Observed) -> list[tuple[int, int]]:
-    """List start and stop of the segments that are not held out; with fewer than `LAW_BLOCKS` of them, of as many equal
-    parts of the samples."""
+    """List start and stop of the segments of which more than half is not held out; with fewer than `LAW_BLOCKS` of
+    them, of as many equal parts of the samples."""
     is_used = record.fit | record.choose
     blocks = [
         (segment.start, min(segment.stop, len(is_used)))

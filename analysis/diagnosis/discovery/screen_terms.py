@@ -9,7 +9,8 @@ with the calibration's values w0 of the model's parameters, the prior precision 
 error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974). Only the
 products X'X (Gram matrix) and X'r are needed, which are computed once per block, for all terms at once.
 
-Sizes: s samples of the residual (`matched_filter.View`), k base columns. Called by `discover`, `beam` and `fit_sum`.
+Sizes: s samples of the residual (`matched_filter.View`), k base columns. Called by `discover`, `beam`, `fit_sum` and
+`antisymmetric_pairs`.
 """
 
 from collections.abc import Sequence

@@ -51,7 +51,7 @@ def converge_and_snap(context: SearchContext, fitted: Fitted) -> Fitted:
 
 
 def _can_simplify(law: Law) -> bool:
-    """Whether a law has an exponent, a short lag or a soft limit that might be simplified: only then are standard
+    """Whether a law has an exponent, a lag or a soft limit that might be simplified: only then are standard
     errors needed, which take a simulation per parameter."""
     has_exponent = "exponent" in find_parameter_roles(law.tree).values()
     return (

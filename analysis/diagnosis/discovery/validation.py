@@ -1,7 +1,7 @@
 """Checks that a discovered law must pass before it is named; each check that fails gives a reason, as a clause.
 
 Of the many formulas that the search tries, some fit any data. A law is named only where held-out stretches of another
-kind than the fitted ones confirm it (extrapolation), where its parameters agree between stretches (stability), where
+kind than the fitted ones confirm it (extrapolation), where its factor agrees between stretches (stability), where
 the same search in a time-shuffled force finds clearly less (negative control), where no law of other variables fits as
 well, no exponent is beyond the grammar's bounds, and the model's coupled parameters cannot imitate it. Called by
 `add_laws`."""
@@ -57,10 +57,10 @@ def find_failed_checks(
 
 
 def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discovery:
-    """Replace the last law by an inseparable law of the same round whose held-out error is significantly smaller, if
-    there is one: formulas that agree on the fitted data may differ on stronger commands. The alternatives are few and
-    fixed beforehand, and the chosen law must still pass all other checks. Ends early with the time of the context's
-    map."""
+    """Replace the last law by an inseparable law of the same round (no pair) whose held-out error is significantly
+    smaller, if there is one: formulas that agree on the fitted data may differ on stronger commands. The alternatives
+    are few and fixed beforehand, and the chosen law must still pass all other checks. Ends early with the time of the
+    context's map."""
     last_round, best_candidate, law_count = discovery.rounds[-1], discovery.explanation.after, 1
     chosen_sum = last_round.sums[0]
     for candidate, term_sum in zip(last_round.fitted_candidates[1:], last_round.sums[1:], strict=True):

@@ -7,8 +7,8 @@ With the differences e of ln a, measured less predicted (`band_power`), and devi
 
 with Huber's loss rho (Huber, Ann. Math. Stat. 35:73, 1964) over the N fitted bands. Simulations of impacts are chaotic:
 the spread of ln a between simulations whose parameters differ by rounding sets the weights, and derivatives are central
-differences over large steps. Called by `refine_band_power` and, for rattling play, by `search.impacts`. All constants
-are chosen by hand.
+differences over large steps. Called by `refine_band_power` and, for rattling play, by `search.impacts` and
+`search.second_effect_with_play`. All constants are chosen by hand.
 """
 
 from dataclasses import dataclass, replace
@@ -160,8 +160,8 @@ def differentiate_hypothesis(problem: BandPowerProblem, iterate: BandPowerFit) -
 
 
 def _take_gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) -> BandPowerFit:
-    """Take a bounded step with line search, and estimate the standard errors; the cost is higher than before where no
-    factor of `STEP_FACTORS` reduces it."""
+    """Take a bounded step with line search, and estimate the standard errors; the cost is not lower than before where
+    no factor of `STEP_FACTORS` reduces it."""
     hypothesis_columns = np.array(
         [_select_weighted(problem, column) for column in differentiate_hypothesis(problem, iterate)]
     )

@@ -1,9 +1,9 @@
 """Make the error measure for recordings and a model, by the rule of `error_measure_rule` or by the user's choice.
 
-In this order: the samples of each recording are divided into those to fit, to choose and to test by; the noise of each
-channel is estimated; errors get their unit from the noise; the rule selects free simulation, windows or forces.
-Called at the start of a diagnosis (`diagnose`), by `confirm` and `learn_model_error`, and where models are compared on
-recordings (`prediction_error`).
+In this order, unless forces are requested: the samples of each recording are divided into those to fit, to choose and
+to test by; the noise of each channel is estimated; errors get their unit from the noise and the signal
+(`compute_error_units`); the rule selects free simulation, windows or forces. Called at the start of a diagnosis
+(`diagnose`), by `confirm` and `learn_model_error`, and where models are compared on recordings (`prediction_error`).
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ Compared = Literal["auto", "motion", "force"]
 """Signals that the user sets to be compared; auto: by the rule."""
 
 LEAST_DITHER = 0.02
-"""Rms noise over the step of a converter, below which differences between repeats do not show the noise. Chosen by
+"""Rms noise over the step of a converter, up to which differences between repeats do not show the noise. Chosen by
 hand."""
 UNTIMED_BAND_SHARE = 0.45
 """End of the band relative to the sample rate, for samples without a time axis: below half the rate. Chosen by hand."""
@@ -52,6 +52,10 @@ REQUESTED_MOTION_REMARK = (
 NO_STATE_REMARK = (
     "Short windows would be suitable, but the sensors do not show the model's state, so it was simulated from rest; "
     "errors may grow with time."
+)
+NO_STATE_FORCE_REMARK = (
+    "Short windows would be suitable, but the sensors do not show the model's state: the force that the model needs "
+    "along the measured motion is compared with the force that was applied."
 )
 """Remarks for the user on the chosen measure; those of the rule are in `error_measure_rule`."""
 
@@ -106,6 +110,7 @@ def make_measure(
                     floors,
                     (NO_STATE_REMARK, *_describe_model_effects(model_effects)),
                 )
+            remarks = (NO_STATE_FORCE_REMARK, *_describe_model_effects(model_effects))
     band_hz = UNTIMED_BAND_SHARE * recordings[0].sample_rate_hz if choice.reason == UNTIMED else None
     return _build_force_measure(records, model, floors, remarks, band_hz)
 
@@ -162,8 +167,8 @@ def _exclude_transient(record: Observed, model: MechanicalModel) -> Observed:
 
 
 def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
-    """Estimate (c,): rms noise of each channel in the quietest recording; `UNKNOWN_NOISE_SHARE` of the signal where
-    unknown."""
+    """Estimate (c,): rms noise of each channel in the record in which it is least; `UNKNOWN_NOISE_SHARE` of the rms
+    signal where unknown or 0."""
     channel_count = records[0].measured.shape[1]
     noise_by_record = [
         np.concatenate(
@@ -181,7 +186,8 @@ def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -
 def _subtract_rounding_noise(floor: NoiseFloor, record: Observed) -> FloatArray:
     """Compute (p,): rms noise of the response before a converter rounded it (rounding adds step² / 12), because
     quantisation is an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise
-    that was not estimated from repeats is unchanged, because it cannot be separated from rounding."""
+    that was not estimated from repeats is unchanged, because it cannot be separated from rounding; so is noise of which
+    no more than `LEAST_DITHER` would remain."""
     rms_noise = floor.response_rms
     if floor.method != "repeats":
         return rms_noise

@@ -10,14 +10,14 @@ needs along the measured motion; with accelerations only, windows are used;
 * a plant that is unstable within a window, such as a levitated body or an inverted pendulum: it was recorded under
 control, whether the data show it or not, and is compared likewise;
 
-* a plant without restoring force (integrator), whose slowest motion takes longer to decay than a third of the
-recording: any small error grows without bound. It is simulated in windows of 1 s or longer, each from a state estimated
-from the measured motion, or, where no state can be estimated, compared by forces;
+* a plant whose slowest motion decays with a time constant of a third of the longest recording or more, such as one
+without restoring force (integrator): small errors persist or grow. It is simulated in windows of 1 s or longer, each
+from a state estimated from the measured motion, or, where no state can be estimated, compared by forces;
 
 * a recording that does not begin at rest: the initial motion decays, so its first seconds are left out; where that
 would be more than a quarter of the recording, windows are used;
 
-* a recording of an imposed motion with a measured force, or without a time axis: forces are compared.
+* a recording of an imposed motion with a measured force, or of positions without a time axis: forces are compared.
 """
 
 from collections.abc import Sequence
@@ -145,8 +145,9 @@ def _compute_slowest_decay_rate(model: MechanicalModel) -> float:
 
 
 def _begins_in_motion(record: Observed) -> bool:
-    """Whether a channel is away from zero and changes in the first `REST_S`, both relative to the whole record. An
-    offset alone is no motion. False for records shorter than four times `REST_S`, or than 16 samples."""
+    """Whether the mean of a channel over the first `REST_S` (at least 4 samples) is away from zero and changes to that
+    over the next, both relative to the whole record. An offset alone is no motion. False for fewer complete samples
+    than four such blocks."""
     block_length = max(int(REST_S * record.recording.sample_rate_hz), 4)
     complete_samples = record.measured[np.isfinite(record.measured).all(axis=1)]
     if len(complete_samples) < 4 * block_length:

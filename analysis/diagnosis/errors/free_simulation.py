@@ -3,8 +3,9 @@
     e(t) = (y(t) - yhat(t)) / unit        yhat: simulated from rest at the first sample, without measured feedback
 
 The residual holds the noise and the whole effect of the missing physics, because no measured sample corrects the
-simulation. Made by `choose_measure`; the other measures compare short windows (`windows`) or forces
-(`predicted_force`).
+simulation (only the realisation of a random effect is conditioned on the measurement). Joined parts of records begin in
+given states instead (`restarts`). Made by `choose_measure`; the other measures compare short windows (`windows`) or
+forces (`predicted_force`).
 """
 
 from collections.abc import Callable, Sequence
@@ -35,12 +36,14 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSimulation:
-    """Output error of a simulation that starts at rest and is driven by the commands alone; an `ErrorMeasure`. The c
-    channels are those of the response, then those of the position where it was measured."""
+    """Output error of a simulation that starts at rest (a joined part: in its state of `restarts`) and is driven by the
+    commands alone; an `ErrorMeasure`. The c channels are those of the response, then those of the position where it was
+    measured."""
 
     records: tuple[Observed, ...]
     unit: FloatArray
-    """(c,): unit of the residuals, in each channel's unit: the rms noise, the floor of `with_floor` added in power."""
+    """(c,): unit of the residuals, in each channel's unit: the rms noise, with a share of the signal
+    (`compute_error_units`) and the floor of `with_floor` added in power."""
     noise: FloatArray
     """(c,): rms noise, in each channel's own unit, with the same floor added."""
     name: str = "free simulation"

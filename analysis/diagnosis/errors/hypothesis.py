@@ -41,17 +41,17 @@ class FreeParameter:
 
     parameter: Parameter
     unit: float
-    """Change of the value per unit of the coordinate where it is not logarithmic (SI)."""
+    """Change of the value per unit of the coordinate where it is not logarithmic."""
 
     def to_value(self, coordinate: float) -> float:
-        """Convert a coordinate to the parameter's value (SI), within its limits."""
+        """Convert a coordinate to the parameter's value, within its limits."""
         p = self.parameter
         # exp overflows a double above 709; values as large as exp(700) are clipped to the upper limit.
         value = float(np.exp(min(coordinate, 700.0))) if p.scale == "log" else coordinate * self.unit
         return min(max(value, p.lower), p.upper)
 
     def to_coordinate(self, value: float) -> float:
-        """Convert a value (SI), within its limits, to a coordinate: the logarithm on a log scale, else over `unit`."""
+        """Convert a value, limited to its range, to a coordinate: the logarithm on a log scale, else over `unit`."""
         p = self.parameter
         clipped = min(max(value, p.lower), p.upper)
         return float(np.log(clipped)) if p.scale == "log" else clipped / self.unit
@@ -74,7 +74,7 @@ class Hypothesis:
     claims: tuple[Claim, ...]
     starts: tuple[Values, ...]
     """Per group of each claim, values by parameter name: those of fixed parameters, and the magnitudes that are the
-    units of parameters of either sign."""
+    units of parameters of either sign; other values are not used."""
     point: FloatArray
     """(k,): coordinates of the free parameters, claim by claim, group by group (`FreeParameter.to_coordinate`)."""
 
@@ -139,9 +139,9 @@ def remove_claim(hypothesis: Hypothesis, claim_index: int) -> Hypothesis:
 
 def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> Hypothesis:
     """Move the coordinates of a hypothesis by a step (k,). along_values: logarithmic coordinates move by ln(1 + step),
-    so that values change in proportion to the step, and drop to a tenth at least; the result is clipped to the bounds.
-    Where a parameter of the model compensates for that of the effect (two masses), the cost has a valley that is
-    straight in the values only."""
+    so that values change in proportion to the step, and drop to no less than a tenth; the result is clipped to the
+    bounds. Where a parameter of the model compensates for that of the effect (two masses), the cost has a valley that
+    is straight in the values only."""
     if not along_values:
         return replace(hypothesis, point=hypothesis.point + step)
     is_logarithmic = np.array(
@@ -155,8 +155,7 @@ def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> 
 
 
 def make_claim_hypothesis(claim: Claim, values: Sequence[Values]) -> Hypothesis:
-    """Make the hypothesis of one claim, its point at the given values. values: parameter values (SI) by name, per
-    group."""
+    """Make the hypothesis of one claim, its point at the given values. values: parameter values by name, per group."""
     free_parameters = [(p, group_values) for group_values in values for p in claim.effect.parameters if not p.fixed]
     point = np.array(
         [

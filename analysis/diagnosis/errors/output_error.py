@@ -12,8 +12,8 @@ the maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
     (S'S + diag(1, 0)) step = -(S'e + (d, 0))        parameters that would leave their range are fixed at its end
 
 with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd, one simulation per
-parameter of the model, is computed once, de/dp at each step, by finite differences. Called by `search`, `confirm` and
-`discovery`. Source: Ljung, System Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
+parameter of the model, is computed once, de/dp at each step, by finite differences. Called by `search`, `confirm`,
+`discovery` and others. Source: Ljung, System Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
 """
 
 from collections.abc import Sequence
@@ -44,9 +44,9 @@ class Sensitivity:
     """Jacobian of the prediction at the residuals to fit ("samples" below): of the model's, or of all t parameters."""
 
     base_deviations: FloatArray
-    """(t,): deviations (standard deviations of the calibration) at which it was computed."""
+    """Deviations of the model's parameters (standard deviations of the calibration) at which it was computed."""
     columns: FloatArray
-    """(t, samples): change of the prediction per standard deviation, in units of the noise: -de/dd."""
+    """(t, samples): change of the prediction per standard deviation (or coordinate of a hypothesis): -de/dd."""
     gram: FloatArray  # (t, t): Gram matrix of the columns
     period_indices: npt.NDArray[np.int64] | None = None
     """Where columns contain one period of each segment: per sample to fit, index of its sample in the columns."""
@@ -206,7 +206,7 @@ def take_step(
     low[t:], high[t:] = np.maximum(low[t:], -largest_steps), np.minimum(high[t:], largest_steps)
     next_fit, is_invalid = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
     if next_fit is None and is_invalid:
-        # A mass whose best value is negative must not stop the other parameters: it stays fixed.
+        # A mass whose best value is negative must not stop the other parameters: all masses stay fixed.
         mass_indices = [index for index, parameter_name in enumerate(tuning.names) if parameter_name.startswith("mass")]
         low[mass_indices] = high[mass_indices] = 0.0
         next_fit, _ = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
@@ -221,10 +221,10 @@ def _search_damping(
     bounds: tuple[FloatArray, FloatArray],
     dampings: Dampings,
 ) -> tuple[Fitted | None, bool]:
-    """Find the first of ever shorter steps that lowers the cost (by 1e-9 of it), None where none does; and whether any
-    step led to an invalid mechanical model. system: normal matrix and right side."""
+    """Find the first of the damped steps that lowers the cost (by more than 1e-9 of it), None where none does; and
+    whether any step led to an invalid mechanical model. system: normal matrix and right side."""
     (products, rhs), t, is_invalid = system, len(iterate.deviations), False
-    # Steps that make the model less stable are refused, unless it is unstable already.
+    # Steps that make the model unstable within the longest record are refused, unless it is so already.
     is_unstable = is_unstable_within(tuning.tune(iterate.deviations), _find_longest_s(measure))
     for damping, along_values in dampings:
         step = solve_bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)

@@ -2,9 +2,9 @@
 
 Final fit (`finish_fit`), before the errors are computed: a search stops at a relative change of the cost, which with
 10^5 samples may leave a parameter several standard errors from the minimum. Gauss-Newton steps therefore continue until
-the sum of squares falls by less than `CONVERGED_DECREASE`. Sensitivities are central differences: parameters with the
-same effect on the prediction (an added mass and that of the model) must have proportional columns; the curvature error
-of one-sided differences would make them seem separable.
+the sum of squares falls by less than `CONVERGED_DECREASE`, or a limit of rounds or time is reached. Sensitivities are
+central differences: parameters with the same effect on the prediction (an added mass and that of the model) must have
+proportional columns; the curvature error of one-sided differences would make them seem separable.
 
 Random errors (`compute_standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over
 stretches longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch
@@ -45,11 +45,11 @@ hand."""
 BOUND_TOLERANCE = 1e-6
 """Distance of a coordinate from its bound at or below which it counts as at the bound. Chosen by hand."""
 CONVERGED_DECREASE = 0.01
-"""Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within a tenth of a standard
-error."""
+"""Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within about a tenth of a
+standard error."""
 FINAL_DAMPINGS = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
-"""Dampings of the final steps (pairs as in `output_error.Dampings`), smaller than in a search: in a direction that the
-data do not determine, the prior of the calibration must decide, not the damping. Chosen by hand."""
+"""Dampings of the final steps (pairs as in `output_error.Dampings`), the first smaller than in a search: in a direction
+that the data do not determine, the prior of the calibration must decide, not the damping. Chosen by hand."""
 MOST_ROUNDS, STEPS_PER_ROUND = 4, 3
 """Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round. Chosen by
 hand."""

@@ -6,8 +6,8 @@ of Craig and Bampton (AIAA Journal 6 (1968), 1313): the m driven axes, and the m
 (fixed-interface modes), scaled to unit mass. Free are then
 
 * each entry of the m x m blocks of mass, damping and stiffness at the driven axes (an absolute change);
-* of each mode k its frequency f, mass and damping ratio (relative changes df, dm, dz):  K_kk (1 + df)², the coupling to
-  the axes times sqrt(1 + dm), and B_kk (1 + df) (1 + dz).
+* of each mode k its frequency f, mass and damping ratio (relative changes df, dm, dz):  K_kk (1 + df)², B_kk (1 + df)
+  (1 + dz), the coupling c to the masses of the axes times sqrt(1 + dm), and dm c c' added to these masses.
 
 `make_tuning` makes a `Tuning`, whose function `tune` maps deviations, in standard deviations, to a model. The
 deviations are fitted together with hypotheses by `output_error`. Called by `search_by_simulation`,
@@ -33,7 +33,8 @@ from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
 UNSTATED_TOLERANCE = Tolerance(modes=UNSTATED_MODES)
-"""Tolerance of a model that states none; for parameters of the axes it is `UNSTATED_SHARE` of the largest entry."""
+"""Tolerance of a model that states none; for parameters of the axes it is `UNSTATED_SHARE` of the largest diagonal
+entry."""
 DAMPING_UNCERTAINTY_RATIO = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less
 accurately."""
@@ -58,7 +59,7 @@ class Tuning:
     """Units of the parameters; "1" for the relative changes of modes."""
     tune: Callable[[FloatArray], MechanicalModel]
     """The model with its parameters changed by deviations (parameters,), in standard deviations. Raises
-    MechanicalModelError where the mass is not positive definite."""
+    MechanicalModelError where that is no valid model, such as one whose mass is not positive definite."""
     bound: float = RETUNING_BOUND
     """Standard deviations of the calibration by which a parameter may move at most."""
 
@@ -82,13 +83,14 @@ class Tuning:
         )
 
     def to_changes(self, deviations: FloatArray) -> FloatArray:
-        """Convert deviations (parameters,), in standard deviations, to changes of the parameters, SI or relative."""
+        """Convert deviations (parameters,), in standard deviations, to changes of the parameters, in `units`."""
         return np.asarray(deviations * self.deviation)
 
 
 def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
     """Make the free parameters of a model. Where it states no tolerance of mass, damping or stiffness, `UNSTATED_SHARE`
-    of the largest at any axis is one standard deviation. input_channels: names of the driven axes."""
+    of the largest at any axis is one standard deviation (`_choose_deviation`). input_channels: names of the driven
+    axes."""
     modal_model = _transform_to_craig_bampton(model)
     m = model.inputs
     axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]

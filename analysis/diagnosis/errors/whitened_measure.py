@@ -89,8 +89,8 @@ def fit_whitening_filter(residuals: Sequence[FloatArray], white_noise_rms: Float
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhitenedMeasure:
-    """An error measure (`ErrorMeasure`) of whitened residuals. Samples count only where all samples that the filter
-    uses are known."""
+    """An error measure (`ErrorMeasure`) of whitened residuals. After `whiten_measure`, samples count only where all
+    samples that the filter uses are known."""
 
     base_measure: ErrorMeasure
     whitening: WhiteningFilter
@@ -98,7 +98,8 @@ class WhitenedMeasure:
     """(c,): divisor of the whitened residuals, in each channel's own unit: the noise, with a floor added in
     quadrature."""
     noise: FloatArray
-    """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
+    """(c,): rms of the whitened residual of the reference recordings, scaled with the signal, in each channel's own
+    unit, with the same floor."""
     least_error: float = 0.0
     """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
 

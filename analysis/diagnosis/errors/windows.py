@@ -1,9 +1,9 @@
 """Error measure by windows (multiple shooting): short simulations, each from an initial state estimated by a smoother.
 
-For plants without a restoring force, whose free simulation would drift. The estimated state is not exact, so that the
-residuals of each window are projected on the complement of its free motions from other initial states (least squares):
-only the error that no initial state explains counts (Bock and Plitt, IFAC World Congress 1984: multiple shooting).
-`choose_measure` builds the measure where it is the suitable one.
+For plants without a restoring force, whose free simulation would drift, and for recordings that do not begin at rest.
+The estimated state is not exact, so that the residuals of each window are projected on the complement of its free
+motions from other initial states (least squares): only the error that no initial state explains counts (Bock and Plitt,
+IFAC World Congress 1984: multiple shooting). `choose_measure` builds the measure where it is the suitable one.
 """
 
 from collections.abc import Sequence
@@ -32,8 +32,8 @@ _LEAST_SINGULAR_SHARE = 1e-9
 """Singular value of the free motions, over the largest, above which a direction of the state is fitted; the rest are
 rounding errors. Chosen."""
 READINGS_PER_STATE = 10.0
-"""Least readings of a channel in a window, per fitted state and channel: the fit then absorbs at most a tenth of the
-power of random errors. Chosen."""
+"""Least readings of all channels in a window, per fitted state: the fit then absorbs at most a tenth of the power of
+random errors. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +109,7 @@ class Windows:
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> tuple[SimulationResult, FloatArray]:
         """Simulate all windows from their initial states (windows, 2 n). Returns the simulation, and its residuals (n,
-        c) after the fit of the initial states."""
+        c) after the fit of the initial states; without that fit where the simulation diverged."""
         recording, p = record.recording, model.outputs
         model = add_payload(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
@@ -135,7 +135,8 @@ class Windows:
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, window_samples: int
     ) -> FloatArray:
         """Compute (n, c): residuals, NaN where missing, without their projection on the free motions from other initial
-        states, window by window; unchanged where a free motion diverges."""
+        states, window by window; unchanged where a free motion diverges, and in a last window with fewer readings than
+        `READINGS_PER_STATE` per state."""
         n, c = residual.shape
         # A fit may try an unstable model, whose free motion overflows: its residuals are returned unchanged.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -150,7 +151,7 @@ class Windows:
             projected[:full_windows_end] = _project_out(
                 residual[:full_windows_end].reshape(-1, window_samples * c), free_motion.reshape(window_samples * c, -1)
             ).reshape(-1, c)
-        if n > full_windows_end:
+        if (n - full_windows_end) * c >= READINGS_PER_STATE * free_motion.shape[2]:
             projected[full_windows_end:] = _project_out(
                 residual[full_windows_end:].reshape(1, -1),
                 free_motion[: n - full_windows_end].reshape((n - full_windows_end) * c, -1),

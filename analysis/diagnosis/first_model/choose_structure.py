@@ -1,8 +1,9 @@
 """Choose the structure of a first model: the requested one, or the plainest that fits held-out data about as well.
 
-The structures are those of `model_structures`, fitted by force balance where a motion was measured along the commands,
-else by spectra. A sentence states what the remaining error depends on (`describe_remaining_error`). Called where a user
-asks for a model alone (`study/workflows/diagnosis/fit_first_model`); a diagnosis uses `fit_without_model`.
+The structures are those of `model_structures`, fitted by force balance where a motion was measured along the commands;
+otherwise, and always with two modes, to spectra. A sentence states what the remaining error depends on
+(`describe_remaining_error`). Called where a user asks for a model alone (`study/workflows/diagnosis/fit_first_model`);
+a diagnosis uses `fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -41,13 +42,13 @@ the velocity is smoothed over 1 % of its standard deviation: chosen, narrow enou
 
 @dataclass(frozen=True, slots=True)
 class TriedStructure:
-    """A structure that was tried, with its held-out error or the reason for its refusal."""
+    """A structure that was tried, with its held-out error, or the reason why it was refused."""
 
     kind: Kind
     error: float | None
-    """Relative error (`StructureFit.error`), cross-validated or held-out; None where it was refused."""
+    """Relative error (`StructureFit.error`), cross-validated or held-out; None where it was not fitted."""
     refusal: str
-    """Reason of the refusal; empty where it was fitted."""
+    """Why it was not fitted, or, for two modes, not preferred to mass-spring; else empty."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +68,8 @@ def choose_structure(
     recordings: Sequence[Recording], requested_kind: Kind | None, on_progress: Callable[[float], None]
 ) -> ChosenStructure:
     """Fit the structures and choose one. requested_kind: fit this one only; None = choose. on_progress: receives the
-    share done, 0 to 1. Raises StructureFitError where the requested structure, or all structures, cannot be fitted."""
+    share done of a fit to spectra, 0 to 1. Raises StructureFitError where the requested structure, or all structures,
+    cannot be fitted."""
     try:
         balanced: BalancedRecordings | None = balance_recordings(recordings)
         no_balance_reason = ""
@@ -107,8 +109,9 @@ def choose_structure(
 
 
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
-    """Describe the model's error in a sentence and, where force balances were fitted (`balanced` is not None) to
-    recordings with a time axis, which regressor explains most of its power."""
+    """Describe the model's error in a sentence and, where `fit` is by force balance (`balanced` is not None) on
+    recordings with a time axis, which regressor explains most of its power, or that none explains
+    `REPORTED_REMAINDER_SHARE` of it."""
     error_text = f"{100 * fit.error:.3g} % of the {fit.error_signal}"
     if balanced is None or fit.joint is None or balanced.untimed:
         return f"An error of {error_text} remains."
@@ -142,8 +145,8 @@ def _compute_explained_share(columns: Sequence[FloatArray], residual_forces: Seq
 def _fit_structures(
     balanced: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
-    """Fit every structure that the recordings allow. balanced: for force balances; None where only spectra can be
-    fitted."""
+    """Fit every structure that the recordings allow, with force balances not yet two modes. balanced: for force
+    balances; None where only spectra can be fitted."""
     structure_kinds: tuple[Kind, ...] = (
         ("mass-spring", "two-mode") if balanced is None else ("massless", "motor", "mass-spring")
     )
@@ -168,7 +171,8 @@ def _compare_with_two_modes(
     choice: ChosenStructure, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> ChosenStructure:
     """Compare a chosen mass-spring with a structure of two modes, which is chosen instead where its error in a free
-    simulation of held-out samples is smaller by `MODES_GAIN`. Other choices are returned unchanged."""
+    simulation of held-out samples (of the fitted ones where none are) is smaller by more than `MODES_GAIN`. Other
+    choices are returned unchanged."""
     if choice.fit.kind != "mass-spring":
         return choice
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
@@ -184,6 +188,8 @@ def _compare_with_two_modes(
         for recording_part in test_recordings or fit_recordings
         if (lines := compute_segment_lines(*recording_part)) is not None
     ]
+    if not segment_lines:
+        return _append_trial(choice, TriedStructure("two-mode", modal_fit.error, "no segment to test by is excited"))
     band_edges_hz = [
         float(select_bound(lines_of_segment.frequency_hz[lines_of_segment.excited]))
         for lines_of_segment in segment_lines

@@ -1,9 +1,9 @@
 """Fit the first mechanical model, from which a diagnosis starts where the user gave no model.
 
 Methods, in the order in which they are tried: a spring per axis by force balance, for quasi-static recordings without
-time; the coefficients of the force balances, where these name laws along the motion of one body per command; mass,
-damper and spring by force balance, for a free motion; rigid bodies fitted to forces, for recordings in closed loop or
-of an imposed motion (`fit_rigid_model`); a mechanical model fitted to frequency responses (`mechanical_fit`), which
+time; the coefficients of the force balances, where these name laws along the motion of one body per command; damper and
+spring per unit mass by force balance, for a free motion; rigid bodies fitted to forces, for recordings in closed loop
+or of an imposed motion (`fit_rigid_model`); a mechanical model fitted to frequency responses (`mechanical_fit`), which
 takes longest, or rigid bodies where that fails. Tolerances are wide, because unmodelled physics biases the fitted
 parameters. Called by `diagnose_values` and `study.workflows.diagnosis.fit_without_model`.
 """

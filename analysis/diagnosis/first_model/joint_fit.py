@@ -33,12 +33,12 @@ class JointFit:
     """Symmetric mass, damping and stiffness matrices fitted together, with their intervals and held-out errors."""
 
     matrices: dict[Part, FloatArray]
-    """(d, d) each, SI units; zero where a part was not fitted."""
+    """(d, d) each, in the recordings' units; zero where a part was not fitted."""
     half_widths: dict[Part, FloatArray]
-    """(d, d) each, SI units: half-widths of the 95 % intervals (Student's t over blocks), with the possible bias by
-    noise of the motion, `ACCELERATION_NOISE_SHARE` of each entry, added in quadrature."""
+    """(d, d) each, in the same units: half-widths of the 95 % intervals (Student's t over blocks), with the possible
+    bias by noise of the motion, `ACCELERATION_NOISE_SHARE` of each entry, added in quadrature."""
     largest_standard_errors: dict[Part, float]
-    """By matrix: the largest standard error on its diagonal, SI units."""
+    """By matrix: the largest standard error on its diagonal, in the same units."""
     fold_errors: FloatArray
     """(blocks,): cross-validated sum of squares of each block over the power of all blocks, mean over the axes."""
     cross_validated_error: float
@@ -47,7 +47,7 @@ class JointFit:
     """(d,): rms of each axis's held-out error over that of its force about the mean; that of cross-validation where
     too little was held out (`fit_jointly`)."""
     residual_forces: tuple[FloatArray, ...]
-    """Per motion, (decimated samples, d): residual force, N (N m)."""
+    """Per motion, (decimated samples, d): residual force, in the commands' unit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +63,8 @@ class _Parametrisation:
 
 
 def build_regressions(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
-    """Build the regression of the force of each axis on mass, damping and stiffness alone, without laws. turns: whether
-    a shaft turns freely and has no stiffness (`build_regression`)."""
+    """Build the regression of the force of each axis on mass, damping, stiffness and a constant, without laws. turns:
+    whether a shaft turns freely and has no stiffness (`build_regression`)."""
     return tuple(build_regression(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
 
 

@@ -2,9 +2,9 @@
 
 The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. The
 tolerance of a matrix is half the largest difference between its entries and those of the balances with the named laws
-(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry. A mass is at least
-`MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical model needs
-a mass. Called by `fit_without_model` and `force_balance_measures`."""
+(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry, at least 1e-12. A mass is at
+least `MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical model
+needs a mass. Called by `fit_without_model` and `force_balance_measures`."""
 
 from collections.abc import Sequence
 

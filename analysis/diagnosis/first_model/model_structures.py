@@ -1,8 +1,8 @@
 """Fit candidate structures of a first linear model, M a + D v + K x = u, and choose one by cross-validated error.
 
-A diagnosis without a given model starts from such a model. Each structure omits some of the matrices (`PARTS_OF`). All
-are fitted to the same recordings: by the force balance where every command has a measured position or velocity
-(`fit_structure`), else to spectra (`fit_modal_structure`). Called by `choose_structure` and `fit_without_model`.
+A diagnosis without a given model may start from one. Some structures omit matrices (`PARTS_OF`). They are fitted by the
+force balance where every command has a measured position or velocity (`fit_structure`), else, and always with modes, to
+spectra (`fit_modal_structure`). Called by `choose_structure` and `fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import UnitSystem
 
 Kind = Literal["mass-spring", "two-mode", "gravity", "massless", "motor"]
-"""Structures: mass, damper and spring; the same with a mode on an axis; a pendulum, whose weight acts as a spring;
+"""Structures: mass, damper and spring; the same with modes on the axes; a pendulum, whose weight acts as a spring;
 damper and spring alone; mass and damper alone."""
 KINDS: tuple[Kind, ...] = get_args(Kind)
 PARTS_OF: dict[Kind, tuple[Part, ...]] = {
@@ -41,7 +41,7 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
 """Matrices that the force balance fits, by structure; "two-mode" is fitted to spectra only."""
 FIXED_SHARE = 1e-6
 """Chosen so that re-tuning cannot change a mass: without a time axis, factor on the least mass, and standard deviation
-stated for mass and damping (SI units); for a free motion, that of the mass over the largest mass."""
+stated for mass and damping (in their units); for a free motion, that of the mass over the largest mass."""
 NAME_TEMPLATE = "first model, {}"
 """Name of the fitted model, to be filled in with its structure."""
 MEASURED_FORCE, SIMULATED_MOTION = "force along the measured motion", "free simulation"
@@ -71,7 +71,7 @@ class StructureFit:
     model: MechanicalModel
     parameters: tuple[ParameterEstimate, ...]
     held_out: tuple[float, ...]
-    """Per axis or response channel: rms of the held-out error over that of the signal."""
+    """Per axis or response channel: rms error over that of the signal, on held-out data if there are any."""
     channels: tuple[str, ...]
     error_signal: str
     """Signal that the held-out errors refer to, in words."""
@@ -98,14 +98,14 @@ class BalancedRecordings:
     turns: bool
     """Whether a shaft rotates freely, so that no spring can hold it."""
     rotational: bool
-    """Whether the motion is an angle: inertia in kg m², stiffness in N m/rad."""
+    """Whether the motion is an angle: in SI, inertia in kg m², stiffness in N m/rad."""
     free: bool = False
     """Whether the motion is free (not driven): parameters are per unit mass."""
 
 
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
-    """Prepare the force balance of all axes. Raises NoMotionError where only accelerations (order 2) were measured, the
-    numbers of commands, responses and motions differ, or no sample is usable. recordings: at least one."""
+    """Prepare the force balance of all axes. Raises NoMotionError where no motion or only accelerations were measured,
+    the numbers of commands, responses and motions differ, or no sample is usable. recordings: at least one."""
     first = recordings[0]
     motions = compute_motions(observe_parts(recordings, len(first.response.channels)))
     axis_count = len(first.command.channels)
@@ -123,8 +123,8 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
 
 
 def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
-    """Fit a structure by the force balance. Raises StructureFitError where the recordings cannot determine it, or the
-    fitted mass or damping is negative."""
+    """Fit a structure by the force balance. Raises StructureFitError where the recordings cannot determine it, or no
+    valid model results, such as one with a negative mass."""
     _require_suitable(balanced, kind)
     parts: tuple[Part, ...] = ("stiffness",) if balanced.untimed else PARTS_OF[kind]
     if balanced.free:
@@ -245,8 +245,8 @@ def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> Mec
 
 
 def _find_least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Compute (d,), kg (kg m²): masses whose inertial force is `MASSLESS_SHARE` of the measured force (standard
-    deviations). A simulation needs a mass, even where the recordings show none."""
+    """Compute (d,): masses whose inertial force is `MASSLESS_SHARE` of the measured force (standard deviations). A
+    simulation needs a mass, even where the recordings show none."""
     force = np.vstack([motion.force for motion in motions]).std(axis=0)
     accel = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
     return np.asarray(MASSLESS_SHARE * force / np.maximum(accel, 1e-300))

@@ -43,8 +43,8 @@ def convert_to_driven_motions(
     recordings: Sequence[Recording], may_reverse: bool = True
 ) -> tuple[Recordings, tuple[str, ...]]:
     """Convert the recordings, with a sentence for each change. recordings: alike in channels, units and rate.
-    may_reverse: commands whose positive direction is opposite to that of their motion are reversed; False where a model
-    defines the directions."""
+    may_reverse: commands whose positive direction is opposite to that of their motion are reversed; False where the
+    directions were decided before, for other recordings of the device."""
     converted, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
         infer_quantities, convert_free_motion, _separate_conditions, _select_imposed_motion, _select_motions,
@@ -57,7 +57,8 @@ def convert_to_driven_motions(
 
 
 def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
-    """Move commands that drive no motion, such as temperatures and settings, to the recorded conditions."""
+    """Move commands that drive no motion, such as temperatures and settings, to the recorded conditions; unchanged
+    where all commands are of that kind."""
     command = recordings[0].command
     condition_channels = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVE_QUANTITIES]
     if not condition_channels or len(condition_channels) == len(command.channels):
@@ -76,7 +77,8 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
-    """Keep only the position of an imposed motion that was recorded as position and speed."""
+    """Keep only the lowest derivative of an imposed motion that was recorded as several, such as the position of
+    position and speed."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTION_QUANTITIES and set(response.quantities) <= FORCE_QUANTITIES):
         return recordings, ""
@@ -132,7 +134,8 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
 
 def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
     """Leave out commands that never change, because nothing about their axis can be identified, and with them the
-    motion of their axis, where there is one for each command."""
+    motion of their axis, where there is one for each command. Unchanged where all commands are constant, or responses
+    are more numerous."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([recording.command.samples for recording in recordings])
     samples = samples[np.isfinite(samples).all(axis=1)]

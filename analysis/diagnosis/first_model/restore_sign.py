@@ -1,8 +1,9 @@
-"""Restore the sign of a speed whose sensor measures its magnitude only, such as a pulse counter, from the command.
+"""Restore the sign of a speed or position whose sensor measures its magnitude only, from the command.
 
 Between two minima near zero the sign is constant. It is that of the speed which an FIR filter predicts from the
-command, and the filter is fitted to the signed speed in turn, until the signs no longer change (alternating
-projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972). Called by `one_motion_per_force`.
+command, and the filter is fitted to the signed speed in turn, until the signs no longer change or `MAX_FITS` is reached
+(alternating projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972). Called by
+`one_motion_per_force`.
 """
 
 import itertools

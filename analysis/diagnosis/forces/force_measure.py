@@ -3,7 +3,7 @@
 Theory of operation. With the motion q measured, the force that a model misses follows without simulation (inverse
 dynamics): the model's force M a + D v + K q + (effects along q) is compared with the actuator's force, both low-pass
 filtered up to `band_hz`. Differentiating q twice multiplies its noise by (2 pi f)² M, so the band is the widest in
-which that noise stays below `NOISE_SHARE` of the force, and ends where the force has no power. Noise densities of q are
+which that noise is at most `NOISE_SHARE` of the force, and ends where the force has no power. Noise densities of q are
 converted through the inverse response of the model; an actuator's own uncertainty is added in quadrature. Samples at
 the ends, where the filter has no full support, are not used. Called by `choose_measure` and `rigid_model`.
 """
@@ -46,7 +46,7 @@ class ForceMeasure:
     """The error measure on forces, with the noise of its forces."""
 
     measure: PredictedForce
-    """Compares the forces in N (N m)."""
+    """Compares the forces in the commands' unit, N or N m in SI."""
     floors: tuple[NoiseFloor, ...]
     """Noise of the forces, per record."""
 
@@ -123,8 +123,9 @@ def _compute_median_hz(force: FloatArray, rate_hz: float) -> float:
 
 def _build_force_record(record: Observed, force: FloatArray, band_hz: float) -> Observed:
     """Build the record with the filtered force of its actuators as the response; the samples at its ends that the
-    filter distorts, at most an eighth (by hand) each, have no role. force: (n, m), N (N m), means over the step after
-    each sample; half a step of delay makes them means around the sample. band_hz: end of the band in Hz."""
+    filter distorts, at most an eighth (by hand) each, have no role. force: (n, m), in the command's unit, means over
+    the step after each sample; half a step of delay makes them means around the sample. band_hz: end of the band in
+    Hz."""
     recording = record.recording
     rate_hz, command = recording.sample_rate_hz, recording.command
     filtered_force = filter_low_pass(force, rate_hz, band_hz, delay_s=0.5 / rate_hz)

@@ -2,9 +2,10 @@
 
     e = L (u + h) - L (M q'' + D q' + K q)        L: zero-phase low pass, see `force_measure`
 
-with the forces h of the effects along q (inverse dynamics). Because no simulation is needed, this error measure suits
-plants in closed loop and plants that drift. The forces in e are means over one sample period around each sample.
-Created by `force_measure`; used like the other error measures of the search (`ErrorMeasure`).
+with the forces h of the effects along q (inverse dynamics). The residual is e rescaled to an actuator gain of 1
+(`_balance_forces`). Because no simulation is needed, this error measure suits plants in closed loop and plants that
+drift. The forces in e are means over one sample period around each sample. Created by `force_measure`; used like the
+other error measures of the search (`ErrorMeasure`).
 """
 
 from collections.abc import Callable, Sequence
@@ -47,9 +48,9 @@ class PredictedForce:
     motions: tuple[BandMotion, ...]
     """Per record: measured motion of the model's first m outputs."""
     unit: FloatArray
-    """(m,): unit of a residual, N (N m)."""
+    """(m,): unit of a residual, in the commands' unit (N or N m in SI, here and below)."""
     noise: FloatArray
-    """(m,): rms noise of the forces, N (N m): see `force_measure`."""
+    """(m,): rms noise of the forces: see `force_measure`."""
     band_hz: float
     """Upper end (Hz) of the band in which forces are compared; it begins at 0."""
     name: str = "predicted force"
@@ -66,7 +67,7 @@ class PredictedForce:
         return replace(self, records=records)
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """Return the measure with noise of this rms (m,), N (N m), added in power, and 1 as its least error."""
+        """Return the measure with noise of this rms (m,) added in power, and 1 as its least error."""
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least_error=1.0)
 
     def shorten(self) -> "PredictedForce":
@@ -98,7 +99,8 @@ class PredictedForce:
         return replace(shortened, fit=shortened.fit & is_undistorted, choose=shortened.choose & is_undistorted)
 
     def can_observe(self, effect: Effect) -> bool:
-        """Whether the effect changes forces. Effects of sensors do not, because the reading is used as the motion."""
+        """Whether the effect changes forces along the axes. Effects of sensors do not, because the reading is used as
+        the motion; forces within joints are not computed along a measured motion."""
         return isinstance(effect.action, (Structure, AxisForce, OnCommand))
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
@@ -206,8 +208,8 @@ def count_edge_samples(sample_rate_hz: float, band_hz: float) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ActuatorForce:
-    """The actuators' force in N (N m), (n, m) each: mean over the step that begins at a sample; the same within the
-    band; and, within the band, the mean around the sample."""
+    """The actuators' force, (n, m) each: mean over the step that begins at a sample; the same within the band; and,
+    within the band, the mean around the sample."""
 
     force: FloatArray
     band_force: FloatArray
@@ -220,9 +222,9 @@ class _Balance:
 
     required_force: RequiredForce
     residual: FloatArray
-    """(n, m), N (N m): applied less required force, scaled to an actuator gain of 1."""
+    """(n, m): applied less required force, scaled to an actuator gain of 1."""
     applied_force: FloatArray
-    """(n, m), N (N m): force of the actuators and the effects."""
+    """(n, m): force of the actuators and the effects."""
 
 
 def _compute_rms(samples: FloatArray) -> FloatArray:

@@ -1,13 +1,13 @@
-"""Fit a rigid model, with one body per command, to a device in closed loop, by least squares on forces (inverse
+"""Fit a rigid model, with one body per command, by least squares on forces along the measured motion (inverse
 dynamics).
 
     f = M q'' + D q' + K q + f0        f, q: (samples, m) commands and measured motion, low-pass filtered alike
 
 The fitted matrices are made symmetric. K is kept only where it reduces the misfit by `SPRING_SHARE`. D and K that are
 not positive semidefinite are replaced, so that the model is passive, and the masses have a lower bound. Rigid robots
-are identified by the same regression: Gautier, Vandanjon and Pressé, Proc. IEEE Conf. Decision and Control 1994.
-Frequency responses from commands to motions would be biased by the controller. Called by `fit_without_model`, where no
-model was given."""
+are identified by the same regression: Gautier, Vandanjon and Pressé, Proc. IEEE Conf. Decision and Control 1994. Called
+by `fit_without_model`, where no model was given, for recordings in closed loop, where a controller would bias frequency
+responses from commands to motions, or of an imposed motion, and where a fit to frequency responses fails."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -94,7 +94,8 @@ class Distortions:
     """Distortion by cell, and sentences on the kinds that the recording cannot show."""
 
     cells: tuple[Distortion, ...]
-    """One per channel, input, level, band and kind that the recording can show; may be empty."""
+    """One per channel, periodic segment (its inputs and level), band and kind that the recording can show; may be
+    empty."""
     remarks: tuple[str, ...]
     """Sentences for the user."""
 
@@ -103,7 +104,8 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
     """Find the distortion of each channel of response and position, per input, level and band (the whole driven band
     and each octave of it).
 
-    floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so.
+    floor: the recording's noise; where it is not known, or nothing is periodic, no cell is evaluated and a remark says
+    so.
     """
     if not floor.is_known:
         return Distortions((), ("The noise is not known, so distortion cannot be distinguished from it.",))
@@ -130,7 +132,7 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
 
 
 def _list_untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
-    """List sentences on the kinds of distortion that this excitation cannot show, and why."""
+    """List sentences on what this excitation cannot show about distortion, and why."""
     remarks = []
     if all(period.count < 2 for period, _ in periods):
         remarks.append("No period was repeated: variation from period to period cannot be measured.")

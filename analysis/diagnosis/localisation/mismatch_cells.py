@@ -61,7 +61,8 @@ class MismatchCell:
     rms: float
     """Rms mismatch in the output's unit, noise subtracted."""
     signal_rms: float
-    """Rms response in the cell, or a tenth of that of the strongest channel, whichever is larger."""
+    """Rms response in the cell, noise subtracted; at each line at least a tenth of that of the strongest channel of its
+    quantity."""
     in_noise: float
     """Rms of the residual, in units of that from noise alone."""
     margin: float
@@ -69,7 +70,7 @@ class MismatchCell:
     p_value: float
     """p-value: probability of such a residual from noise and a mismatch of the margin's size."""
     adjusted_p_value: float
-    """p-value adjusted for the number of cells, within channel and band."""
+    """p-value adjusted for the number of cells, nested by channel and band."""
     seconds: float
     """Evaluated time, s."""
     lines: float = 1.0
@@ -79,7 +80,7 @@ class MismatchCell:
     signal_in_noise: float = 0.0
     """Power of `signal_rms` over the noise's, mean over the lines."""
     part: int = 0
-    """Index of the recordings' part that contains the cell."""
+    """Index of the record that contains the cell; 0 until `mismatch_maps` sets it."""
     beyond_noise: bool = False
     """Whether it is significant beyond noise and margin, regardless of the model's error in other cells."""
 

@@ -89,7 +89,7 @@ def build_mismatch_maps(
 
 
 def summarise_worst_channel(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
-    """Make one row for the channel with the largest error over the whole band, for use where no cell is significant.
+    """Make one row for the channel with the largest error over the whole band, for use where no other row is listed.
     Its p-value is that of an error above the noise (`_test_against_noise`); its share of the signal is at most 1."""
     record = measure.records[0].recording
     errors = np.fmax(np.maximum(score.fit, score.choose), score.test)
@@ -220,8 +220,8 @@ def adjust_for_model_error(cells: Sequence[MismatchCell], model_error: ModelErro
 def _compute_p_value(cell: MismatchCell, model_error: ModelError) -> float:
     """Compute the p-value of an F ratio of two sums of powers, each with the degrees of freedom of a chi-squared
     variable of its mean and variance (Satterthwaite, Biometrics Bulletin 2:110, 1946); at least the p-value against
-    noise, which is returned without neighbours. The model error in the cell has the degrees of freedom of a single
-    line."""
+    noise, which is returned without neighbours or without model error. The model error in the cell has the degrees of
+    freedom of a single line."""
     squared_share, neighbour_count = model_error.estimate_squared_share(cell)
     model_error_power = squared_share * cell.signal_in_noise
     if not neighbour_count or model_error_power <= 0:

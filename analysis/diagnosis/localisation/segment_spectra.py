@@ -2,8 +2,8 @@
 
 Silent lines are those that the excitation does not drive; `distortion`, which calls this module, finds nonlinear
 distortion there. With feedback, distortion of the response also appears in the command: the linear response to the
-command's silent lines is estimated from the driven lines (H1 estimate) and subtracted. Spectra are those of
-`periods.compute_period_spectra` (DFT divided by the length of the period).
+command's silent lines is estimated from the driven lines (H1 estimate) and subtracted, unless it is negligible or not
+determined. Spectra are those of `periods.compute_period_spectra` (DFT divided by the length of the period).
 """
 
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ class SegmentSpectrum:
     frequency_hz: FloatArray
     """(lines,)"""
     mean: ComplexArray
-    """Mean over the periods, less the response to the command's silent lines."""
+    """Mean over the periods, less the response to the command's silent lines where it is estimated."""
     mean_variance: FloatArray
     """Variance of the mean in squared units of the channel, that of the subtracted response included."""
     period_variance: FloatArray

@@ -2,9 +2,9 @@
 
 A state is a variable of the motion or of the signals: position, velocity, command, response, time. The mismatch may be
 larger in a region of the state, or follow its sign (`state_regions`); the p-value of each test is multiplied by the
-number of all tests (Bonferroni). A dependence is stated where the p-value is at most `FALSE_DISCOVERY_RATE` and, for
-a region, its share of the mismatch is clearly larger than that of the samples (`_is_informative`). Called by
-`localisation`.
+number of all tests of forces, or of sensor errors (Bonferroni). A dependence is stated where the p-value is at most
+`FALSE_DISCOVERY_RATE` and, for a region, its share of the mismatch is clearly larger than that of the samples
+(`_is_informative`), for at most `MOST_NAMED_STATES` per axis or channel. Called by `localisation`.
 """
 
 from collections.abc import Sequence

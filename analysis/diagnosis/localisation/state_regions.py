@@ -27,13 +27,13 @@ PERMUTATIONS = 60
 _LEAST_CONCENTRATION = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region. Chosen."""
 _LEAST_SHARE = 0.05
-"""Least share of the power that bin means must explain. Chosen."""
+"""Share of the power that bin means must explain at least. Chosen."""
 _SMALLEST_NORMAL = np.finfo(np.float64).tiny
 """Smallest normal number, against divisions by zero."""
 _LEAST_EXPECTED = 1e-9
 """Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested. Chosen."""
 MIDDLE_REGION_PHRASE = "at middling"
-"""First words of the text for a region with neither small nor large values of a state."""
+"""First words of the text for a region with neither small nor large magnitudes of velocity, command or response."""
 _DISPLAY_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 """Units in which positions are written, with the factor from SI."""
 
@@ -257,7 +257,8 @@ def describe_region(
     kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, is_one_stratum: bool
 ) -> str:
     """Describe a region of the state, such as "near x = 12 mm". bins: its first and last bin, and the number of all
-    bins. centre: mean of the state in the region, weighted by the mismatch's power, in `unit`."""
+    bins. centre: mean of the state in the region, weighted by the mismatch's power, in `unit`. is_one_stratum: whether
+    all samples are of one segment."""
     first_bin, last_bin, bin_count = bins
     is_lowest, is_highest = first_bin == 0, last_bin == bin_count - 1
     if kind == "time":

@@ -83,8 +83,8 @@ class ExperimentSet:
 def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
     """Choose recordings that discriminate the rivals of one effect (gain of at least `DISCRIMINATING_GAIN`). If single
     recordings discriminate all rivals, that with the largest gain per minute is chosen; else a greedy set cover, in
-    which each next recording reduces the missing gain most per minute. predicted: per rival, the gains of one menu, in
-    its order."""
+    which each next recording reduces the missing gain most per minute. Rivals that no set discriminates are left out.
+    predicted: per rival, the gains of one menu, in its order."""
     single_gains, shared_gains = (
         np.array(
             [[float(getattr(prediction, name)) for prediction in rival_gains] for rival_gains in predicted]
@@ -207,8 +207,8 @@ def _retune_rival(
     bench: Bench, rival: Fitted, information: FloatArray, prediction: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
     """Re-tune the rival by Gauss-Newton steps, and return the sum of the remaining squared differences and of the prior
-    penalty. prediction: the experiment, the difference of the predictions (n c,) in units of the noise, and the
-    sensitivities (d, n c) to the rival's parameters."""
+    penalty; that of the linearised model where the steps diverge. prediction: the experiment, the difference of the
+    predictions (n c,) in units of the noise, and the sensitivities (d, n c) to the rival's parameters."""
     experiment, difference, sensitivities = prediction
     parameter_change, deviation_count = np.zeros(len(information)), len(rival.deviations)
     target = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + difference

@@ -1,8 +1,8 @@
 """List the experiments that a laboratory could record next to discriminate rival effects, as commands to simulate.
 
-Sweeps at several levels, slow sinusoids, a longer sweep, pushes and releases, and a sweep with added mass:
-`propose_experiment` predicts by simulation how well each discriminates the rivals. Nothing exceeds the level already
-recorded. Commands are in the model's unit (N, N m, or that of the current). Also called by
+Sweeps at several levels, a wide and a longer sweep, slow sinusoids, for a stiff axis a sweep about a constant force and
+releases, and a sweep with added mass: `propose_experiment` predicts by simulation how well each discriminates the
+rivals. Nothing exceeds the level already recorded. Commands are in the unit of the model's commands. Also called by
 `study.evaluation.bank.follow_up`.
 """
 

@@ -1,8 +1,9 @@
 """Estimate noise from the differences between repeated periods. Called by `noise_floor`.
 
 Noise does not depend on the excitation, whereas variations of the device itself between periods grow with it. Therefore
-the segments with the smallest variance are averaged and, where even these exceed the noise at rest, the noise at rest
-is used. Densities are as in `ChannelNoise`: mean over lines = variance, in the channel's unit squared.
+the segments with the smallest variance are averaged and, where others are larger and even these exceed the noise at
+rest, the noise at rest is used. Densities are as in `ChannelNoise`: mean over lines = variance, in the channel's unit
+squared.
 """
 
 from collections.abc import Sequence
@@ -129,8 +130,8 @@ def _limit_to_rest_noise(
 ) -> tuple[FloatArray, Mask]:
     """Replace the density by the noise at rest in channels with varying variance (`is_varying`) that significantly
     exceed it, except at lines with a significantly lower density. Returns density (lines, channels) and mask
-    (channels,) of these channels; unchanged, and False, where the recording has no noise at rest. density: smoothed
-    over lines; freedom: (channels,), of its mean over lines."""
+    (channels,) of these channels; unchanged, and False, where the recording has no noise at rest, or no channel varies.
+    density: smoothed over lines; freedom: (channels,), of its mean over lines."""
     no_channel = np.zeros(len(is_varying), dtype=np.bool_)
     fast_noise = estimate_fast_rest_noise(recording, samples)
     if fast_noise is None or not is_varying.any():

@@ -99,7 +99,8 @@ def describe_model(findings: Findings) -> str:
 
 def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
     """List the held-out stretches by channel, with its times in s and three rms values: of the signal about its mean,
-    and of the errors of the re-tuned and the completed model. Stretches without finite values are left out."""
+    and of the errors of the re-tuned and the completed model. Channels without finite values in a stretch are left
+    out."""
     stretches = []
     for series in time_series:
         for start, stop in series.tested:
@@ -126,7 +127,8 @@ def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutS
 
 
 EXCERPT_SAMPLES = 900
-"""Largest number of samples of an excerpt, around where re-tuned and final prediction differ most. Chosen by hand."""
+"""Largest number of samples of an excerpt, around where re-tuned and final prediction differ most relative to the
+signal. Chosen by hand."""
 
 
 def select_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:

@@ -91,7 +91,7 @@ def learn_model_error(
     """Learn the residual spectrum of the re-tuned model on clean recordings, as noise for the search. clean: of the
     same device, alike in channels and units; the model is re-tuned to each separately, because recordings of different
     days differ. diagnosed: the recordings to diagnose, with the same measure. Raises IncomparableRecordingsError where
-    the measures differ."""
+    the measures differ, numpy.linalg.LinAlgError where a fit is singular."""
     measure_name = make_measure(diagnosed, model, clean).measure.name
     fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):

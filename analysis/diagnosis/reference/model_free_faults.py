@@ -1,8 +1,8 @@
 """Detect sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
 
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
-therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`). Called by
-`search_by_simulation` and `compare_with_reference`, where reference recordings are given.
+therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`), and the usual
+quantization step. Called by `search_by_simulation` and `compare_with_reference`, where reference recordings are given.
 
 Sizes: n samples, p response channels. The limits are chosen by hand, unless a reason is stated.
 """
@@ -78,8 +78,8 @@ def _stack_readings(recordings: Sequence[Recording]) -> FloatArray:
 
 def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every reference
-    (0 where a reference lies on none). All channels have the fault if their steps are equal, else the one with the
-    largest step. readings: (n, p); references: (samples, p) each."""
+    (0 where a reference lies on none). All channels have the fault if all have such a step and these are equal, else
+    the one with the largest step. readings: (n, p); references: (samples, p) each."""
     step_by_channel = {}
     for channel in range(readings.shape[1]):
         step = find_lattice_step(readings[:, channel])
@@ -145,8 +145,8 @@ def _count_top_readings(values: FloatArray) -> tuple[float, int]:
 
 def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find lost samples: significantly more runs of repeats than in the references, short and followed by a full step.
-    The parameter is the share of lost samples, and all channels have the fault. A sensor that rests for a while has not
-    lost samples. readings: (n, p); references: (samples, p) each."""
+    The parameter is the share of lost samples, less the usual share, and all channels have the fault. A sensor that
+    rests for a while has not lost samples. readings: (n, p); references: (samples, p) each."""
     is_repeat = _mark_repeats(readings)
     usual_count = max(float(_mark_run_starts(_mark_repeats(reference)).mean()) for reference in references) * len(
         is_repeat

@@ -158,7 +158,7 @@ def _search_whitened_residual(
 def _judge_with_margin(
     measure: ErrorMeasure, explanation: Explanation, is_named: bool, margin_factor: float
 ) -> Judgement:
-    """Judge the result with all thresholds raised by `margin_factor`, because devices differ from day to day. measure:
+    """Judge the result with the thresholds raised by `margin_factor`, because devices differ from day to day. measure:
     that of the residuals in `explanation`; its scores may be those of a whitened measure, which does not show slow
     changes."""
     if is_named:

@@ -46,8 +46,8 @@ def assemble_findings(
     result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: ModelErrorFloor
 ) -> Findings:
     """Assemble the findings of a search. result.found.after: the model with the named effects, or the re-tuned model
-    without any. floors: noise of each record. names: of the recordings. learned: the residual of clean recordings,
-    counted as noise."""
+    without any. floors: noise of each record. names: of the records (`name_parts`). learned: the residual of clean
+    recordings, counted as noise."""
     context, fits, verdict = result.context, result.found, result.judgement
     measure, tuning = context.full_measure, context.tuning
     recording, placed_effects = measure.records[0].recording, fits.after.fitted.hypothesis.list_placed_effects()
@@ -196,8 +196,8 @@ def _list_effects_with_gains(result: SearchResult, errors: FloatArray, labels: L
 
 
 def _propose(context: SearchContext, explanation: Explanation, judgement: Judgement) -> "Proposal | None":
-    """Propose the next recordings; None where no effect is named, where recordings cannot be predicted by simulation,
-    or no rival is as good."""
+    """Propose the next recordings; None where no effect is named, where recordings cannot be predicted by a free
+    simulation, band powers were compared, or there is nothing to propose."""
     if not judgement.named or context.full_measure.name != "free simulation" or explanation.statistic is not None:
         return None
     # Imported here: only named effects have rivals that a further recording could separate.
@@ -213,8 +213,8 @@ def list_channel_names(recording: Recording, channel_count: int) -> tuple[str, .
 
 
 def _build_time_series(measure: ErrorMeasure, explanation: Explanation, names: Sequence[str]) -> tuple[TimeSeries, ...]:
-    """Build, per record, the measured signals and those predicted at each stage. names: of the recordings; records
-    beyond them are numbered."""
+    """Build, per record, the measured signals and those predicted at each stage. names: of the records; those beyond
+    them are numbered."""
     time_series = []
     for record_index, record in enumerate(measure.records):
         channel_count = record.measured.shape[1]

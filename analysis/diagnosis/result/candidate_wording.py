@@ -1,7 +1,7 @@
 """Write sentences on classes of laws that the data cannot distinguish, and on unconfirmed candidates.
 
 A class contains a named effect and the effects that explain the held-out data equally well; where all of them belong to
-a family of `_LAW_FAMILIES`, the family's name replaces the list. Called by `wording`, `candidates`, `diagnosis_tables`,
+a family of `_LAW_FAMILIES`, its name is stated, too. Called by `wording`, `candidates`, `diagnosis_tables`,
 `real_answer.make_real_answer` and `view_diagnosis`.
 """
 
@@ -98,7 +98,7 @@ def describe_class(effect: NamedEffect) -> str:
     names = tuple(dict.fromkeys((*_list_class_names(effect), *inseparable_names)))
     if len(names) < 2:
         return ""
-    family = _find_family(_list_class_names(effect))
+    family = _find_family(names)
     family_title = family[1] if family is not None else "one of several laws that these data do not distinguish"
     return (
         f"{capitalise(family_title)}: {', '.join(map(get_noun, names[:-1]))} or {get_noun(names[-1])} would each "

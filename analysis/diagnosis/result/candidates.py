@@ -96,9 +96,9 @@ def add_balances_with_fitted_model(
     unconfirmed: Sequence[Candidate] = (),
 ) -> Diagnosis:
     """Add classes, shares and candidates to the diagnosis, for a model that was fitted to the same recordings.
-    unconfirmed: effects of actuator and sensor that a search found, listed after the significant laws of the motion. A
-    constant force or sensor offset that no balance names becomes a re-tuned parameter; where no effect remains, the
-    verdict "explained" becomes "parameters", and any other "unexplained"."""
+    unconfirmed: effects of actuator and sensor that a search found, listed after the laws of ranks 0 and 1
+    (`_rank_law`). A constant force or sensor offset that no balance names becomes a re-tuned parameter; where no effect
+    remains, the verdict "explained" becomes "parameters", and any other "unexplained"."""
     if not balances:
         return diagnosis
     judged_laws = [

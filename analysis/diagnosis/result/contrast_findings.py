@@ -1,7 +1,8 @@
 """Add the result of a comparison with clean recordings to the findings: verdict, named fault, and candidates.
 
-The comparison (`diagnosis.contrast`) replaces verdict, effects and errors of the search by simulation. Where the sets
-could not be compared, only a fault that the readings show without a model is named. Called by `diagnose`.
+The comparison (`diagnosis.contrast`) replaces verdict, effects and errors of the search by simulation. A fault that the
+recordings show without a model is named alone; where there is none and the sets could not be compared, the results of
+the search are kept. Called by `diagnose`.
 """
 
 from collections.abc import Mapping
@@ -38,7 +39,7 @@ NOT_COMPARED = (
     "contains far less motion than the other, or the fits failed. The results here use the model alone."
 )
 """Remark where no comparison was possible."""
-SHOWN_DIRECTLY = "The sensor's signal itself shows this fault, and the clean recordings do not; no model was used."
+SHOWN_DIRECTLY = "The recorded signal itself shows this fault, and the clean recordings do not; no model was used."
 """Remark on a fault found without a model."""
 
 
@@ -198,8 +199,8 @@ def _make_candidate(judged_fault: JudgedFault, reason: str, recording: Recording
 
 
 def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> NamedEffect | None:
-    """Find the fault that the readings show without a model (`signal_faults`, then `model_free_faults`), such as hum or
-    clipping; None without any. Its parameters have no intervals; share and probability are 1."""
+    """Find the fault that the recordings show without a model (`signal_faults`, then `model_free_faults`), such as hum
+    or clipping; None without any. Its parameters have no intervals; share and probability are 1."""
     place: Place = "sensor"
     if contrast.signal_fault is not None:
         name, sites, values, place = (

@@ -124,7 +124,8 @@ def describe_error(beginning: str, error: float | None, errors: Errors, noise_me
 
 def _describe_noise(errors: Errors, error: float, noise_method: str) -> str:
     """Compare an error with that of noise alone, as the end of a clause: by their ratio, or, for noise of
-    `_NOISE_SOURCES`, by naming the noise; a statement that the noise is not known where it is None or 0."""
+    `_NOISE_SOURCES`, by naming the noise; a statement that the noise is not known where it is None or 0, or its method
+    "unknown"."""
     if not errors.noise or noise_method == "unknown":
         return "; what noise alone would leave is not known"
     if noise_method in _NOISE_SOURCES:

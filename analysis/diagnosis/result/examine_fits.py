@@ -1,8 +1,8 @@
 """Examination of the fits after a search: localisation of the mismatch, curves of the effects, and a black-box model.
 
 First the entry point of the mismatch is located; then its dependence on the state, the effects' curves, the black box
-and the distortion are computed in parallel. A part that crashes is left out with a remark (`search.guard`). Called by
-`assemble_findings`.
+and the distortion are computed in parallel. A part that crashes is left out with a remark where the guard is enabled
+(`search.guard`). Called by `assemble_findings`.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class Examination:
     """Localisation of the mismatch, curves of the named effects and black-box model, computed after a search."""
 
     evidence: tuple[Evidence, ...]
-    """Residuals and motion under the re-tuned model, one entry per recording."""
+    """Residuals and motion under the re-tuned model, one entry per record."""
     localisation: Localisation
     """Entry point, dependence on the state, and distortion of the mismatch."""
     signatures: tuple[Signature, ...]
@@ -51,7 +51,7 @@ class Examination:
 
 def examine_fits(search_result: SearchResult, noise_floor: NoiseFloor, maps: MismatchMaps) -> Examination:
     """Localise the mismatch of the given, the re-tuned and the final model, and compute the curves of the named
-    effects. noise_floor: of the first recording. maps: mismatch maps of these three stages."""
+    effects. noise_floor: of the first record. maps: mismatch maps of these three stages."""
     context, explanation = search_result.context, search_result.found
     measure, tuning, stages = context.full_measure, context.tuning, explanation.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
@@ -85,7 +85,8 @@ def examine_fits(search_result: SearchResult, noise_floor: NoiseFloor, maps: Mis
 
 def _fit_black_box(context: SearchContext, explanation: Explanation) -> BlackBox | None:
     """Fit a black-box model to the residuals of the re-tuned model, with as many terms per channel as the effects have
-    parameters, at least 1; None where band powers are compared instead of samples."""
+    parameters, at least 1; None where band powers are compared instead of samples, or no error on held-out data is
+    known."""
     if explanation.statistic is not None:
         return None
     parameter_count = max(len(explanation.after.fitted.hypothesis.point), 1)

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeSeries:
-    """One recording, measured and predicted, in SI units: n samples of c channels, the response's before the
-    position's."""
+    """One record (a recording, or a part of one between gaps), measured and predicted, in `units`: n samples of c
+    channels, the response's before the position's."""
 
     name: str
     sample_rate_hz: float
@@ -62,9 +62,10 @@ class Signature:
     measured_abscissa: FloatArray
     """(k,): abscissa of the measured points."""
     measured: FloatArray
-    """(k,): mean of the missing force, or of the residual, at these points."""
+    """(k,): at these points, the mean of the missing force or of the residual, its running rms, or its amplitude
+    density."""
     standard_error: FloatArray
-    """(k,): standard error of that mean."""
+    """(k,): standard error of that value."""
     law_abscissa: FloatArray
     """(q,): abscissa of the law's points."""
     law: FloatArray
@@ -85,7 +86,7 @@ class BlackBox:
     test_error: float
     """Error on the test samples, relative to the signal, as in `document.Errors`."""
     physics_error: float
-    """Error of the model with the named effects on the same samples, relative to the signal."""
+    """Error of the model with the named effects (without any, re-tuned) on the same samples, relative to the signal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +100,7 @@ class BalanceErrors:
     named_error: float
     """With the named laws in addition."""
     ceiling: float
-    """With all candidate laws together: the best that laws achieve here."""
+    """With all candidate laws together: a bound that a few laws can hardly reach."""
     has_named_law: bool
     """Whether a law is named on this axis."""
     tested: bool = True
@@ -134,16 +135,16 @@ class Findings(SummaryDisplay):
     named: tuple[PlacedEffect, ...]
     """The named effects with axes and fitted parameters."""
     evidence: tuple[Evidence, ...]
-    """Motion, commands and residuals of the re-tuned model, per recording."""
+    """Motion, commands and residuals of the re-tuned model, per record."""
     time_series: tuple[TimeSeries, ...]
-    """Measured and predicted signals, per recording."""
+    """Measured and predicted signals, per record."""
     noise_rms: Mapping[str, float]
-    """Noise rms by channel, SI."""
+    """Noise rms by channel, in the channel's unit."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """Rms error on the test samples, in units of the noise: by stage ("before", "retuned", "after"), then by
-    channel."""
+    """Rms error on the test samples, in units of the noise (of the chance variation where band powers are compared): by
+    stage ("before", "retuned", "after"), then by channel."""
     mismatch: tuple[Mismatch, ...]
-    """All tested cells, not only the significant ones (see p_value and share)."""
+    """All tested cells of the model as given, not only the significant ones (see p_value and share)."""
     signatures: tuple[Signature, ...]
     """Curves that show the named effects."""
     black_box: BlackBox | None
@@ -157,7 +158,7 @@ class Findings(SummaryDisplay):
     fitted: bool = False
     """Whether the program fitted `given` to these recordings, so that its parameters have no calibration."""
     floor: NoiseFloor | None = None
-    """Noise of the first recording: how it was measured, and its spectrum."""
+    """Noise of the first record: how it was measured, and its spectrum."""
     is_timed: bool = True
     """Whether the time axis is known: if not, frequencies are in cycles per sample."""
     tuning: Tuning | None = None
@@ -176,11 +177,10 @@ class Findings(SummaryDisplay):
     retuned: MechanicalModel | None = None
     """The re-tuned model without new physics; its inputs are those of `improved`."""
     own_errors: FloatArray | None = None
-    """(t,): standard errors of the deviations of the model's own parameters, as `tuning` counts them; NaN = not
-    computed."""
+    """(t,): standard errors of the model's own parameters, in `tuning.units`; NaN = not computed."""
 
     def summary(self) -> Summary:
-        """Verdict, missing effects, the first three candidates and the held-out errors."""
+        """Verdict, missing effects, the first three candidates, and the held-out errors with that of noise alone."""
         errors = self.diagnosis.fit.test
         held_out_errors = {"as given": errors.before, "re-tuned": errors.retuned, "with the effects": errors.after}
         return Summary(

@@ -96,7 +96,7 @@ def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Lab
 
 
 def find_axis_letter(claim: Claim, labels: Labels) -> str | None:
-    """Find the axis letter of an effect's site; None where all axes share the effect, or it has no single site."""
+    """Find the axis letter of an effect's site; None where it is at several sites, or can have no single site."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
     is_sensor_effect = find_place(claim.effect) == "sensor"

@@ -1,4 +1,4 @@
-"""Find the model parameters that re-tuning moved beyond their calibration, and describe doubtful values in sentences.
+"""Find the model parameters that re-tuning moved by a standard deviation or more, and describe doubtful ones.
 
 Called by `wording`, `diagnosis_tables` and `diagnosis_report`.
 """
@@ -25,7 +25,7 @@ class MovedParameter:
     change: float
     """Change of the parameter, in `unit`."""
     unit: str
-    """SI; "1" for a relative change."""
+    """As in `Tuning.units`; "1" for a relative change."""
     deviations: float
     """Change in standard deviations of the calibration."""
     at_bound: bool = False

@@ -1,7 +1,8 @@
 """Write the sentences of a diagnosis, the same in the report, in the terminal and on the screen.
 
-`write_summary_lines` returns all of them in order, the verdict first; errors are relative to the signal, on held-out
-data. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis` and `make_real_answer`.
+`write_summary_lines` returns those of the terminal in order, the verdict first. Errors are on held-out data, relative
+to the signal or, in a force balance, to the force. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis`
+and `make_real_answer`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -71,8 +72,8 @@ def describe_effect(effect: NamedEffect, signature: str = "", is_single_axis: bo
 def describe_verdict(
     diagnosis: Diagnosis, moved_parameters: Sequence[MovedParameter] = (), device: DeviceWording | None = None
 ) -> str:
-    """Describe the verdict, with which every output begins, with named effects and held-out errors; where nothing is
-    named, with the best candidate. moved_parameters: re-tuned by a standard deviation or more, for the verdict
+    """Describe the verdict, with which every output begins, with named effects and held-out errors; where it is
+    "unexplained", with the best candidate. moved_parameters: re-tuned by a standard deviation or more, for the verdict
     "parameters". device: None = several axes and no statement on the noise."""
     is_single_axis = device is not None and device.is_single_axis
     errors = diagnosis.fit.test
@@ -209,7 +210,8 @@ def describe_next_experiment(diagnosis: Diagnosis) -> str:
 
 
 def describe_share(effect: NamedEffect) -> str:
-    """Describe an effect's share of the mismatch after re-tuning, its probability, and its held-out gain."""
+    """Describe an effect's share of the mismatch after re-tuning, its probability, and its held-out gain where that is
+    known."""
     return (
         f"It accounts for {100 * effect.share:.3g} % of the mismatch after re-tuning; the probability that this "
         f"effect is the cause is {format_probability(effect.probability)}.{describe_gain(effect)}"

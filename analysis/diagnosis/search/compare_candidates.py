@@ -3,11 +3,11 @@
 A Gauss-Newton fit converges about geometrically: after relative reductions g1 and g2 of the cost by two fits, the next
 is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end when that is below a tolerance. The
 sensitivity (Jacobian) to the model's own parameters takes one simulation for each of them. It is therefore kept from
-fit to fit, and recomputed only where a parameter has moved far; only fits near the best are refined. With forces that
-depend on the motion, a sensitivity that was computed without these forces, or on one period, leads to a point short of
-the minimum: refined fits are then continued with the sensitivity of all parameters on all samples (`_polish`). Called
-by the steps of the search (`next_effect`, `explain`, `revise_selection`, `identifiability`), by `confirm_laws`,
-`discovery` and `reference.search_with_reference`.
+fit to fit, and recomputed once after the first fit, then only where a parameter has moved far; only fits near the best
+are refined. With forces that depend on the motion, a sensitivity that was computed without these forces, or on one
+period, leads to a point short of the minimum: refined fits are then continued with the sensitivity of all parameters on
+all samples (`_polish`). Called by `search` and its steps (`next_effect`, `explain`, `revise_selection`,
+`identifiability`), by `confirm_laws`, `discovery` and `reference.search_with_reference`.
 """
 
 from collections.abc import Sequence

@@ -13,12 +13,13 @@ Fits are compared by the log error power, a log-likelihood in which each channel
    free (`screening`); where the drive repeats, on one period of each segment (`short_recordings`).
 4. The most promising are fitted, the best of them until convergence (`compare_candidates`).
 5. Of candidates equal within the errors, the most parsimonious is taken (`parsimony`).
-6. It is added if it lowers L by at least `ADDED_SHARE` of its excess above the noise; where the error is as small as
-   right laws leave on a real device (`EXPLAINED_ERROR`), the worst channel's ln(error) must also fall by half. Then the
-   next effect is looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where the best effect alone
-   lowers L by less, it is added together with a second one if both lower L by twice that share.
+6. It is added if it lowers L by more than `ADDED_SHARE` of its excess above the noise and `ADDED_GAIN`; where the
+   error is as small as right laws leave on a real device (`EXPLAINED_ERROR`), the worst channel's ln(error) must also
+   fall by half. Then the next effect is looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where
+   the best one lowers L by less, it is added with a second one if both lower L by more than twice `ADDED_SHARE`.
 
-Samples to fit, to choose by and to test are disjoint: the test samples are evaluated once, at the end (`verdict`).
+Samples to fit, to choose by and to test are disjoint. In these steps the test samples only decide whether a first
+effect is looked for although no other sample requires it (`is_worth_searching`); `verdict` judges the result by them.
 
 References: Miller, Subset Selection in Regression (2002), chapter 3; Ljung, System Identification (1999), chapter 16.
 """

@@ -1,4 +1,4 @@
-"""Remove effects that the data do not identify: an effect is named only if the interval of a parameter excludes zero.
+"""Remove effects that the data do not identify: one stays only if a parameter's interval excludes its null value.
 
 Linearised intervals are computed first. Where an effect has one such parameter, and its interval contains zero by a
 small margin, the likelihood profile decides: with correlated parameters or a nonlinear law the linearised interval is

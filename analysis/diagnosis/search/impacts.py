@@ -74,7 +74,7 @@ def explain_impacts(
     not explain it, where the model without play differs by chance alone, where the time ends before that is known,
     where play is not in the catalogue, or where the error measure is no free simulation.
 
-    explanation: result of the search by waveforms. floors: noise of each recording. time_left: called before each
+    explanation: result of the search by waveforms. floors: noise of each record. time_left: called before each
     refinement, and between its linearisations.
     """
     effects_by_name = {effect.name: effect for effect in catalogue}

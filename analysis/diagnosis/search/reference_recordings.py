@@ -54,7 +54,7 @@ class ReferenceRecording:
     jacobian: Sensitivity
     """Sensitivity to the model's parameters at `base`."""
     evidence: Evidence
-    """Signals and residuals of `base`, from which starting values are estimated."""
+    """Signals and residuals of `base` in the first record, from which starting values are estimated."""
 
     def compute_clean_gain(self, tested_hypothesis: Hypothesis) -> FloatArray:
         """Compute (c,): reduction of the logarithm of the rms error by the hypothesis, both models fitted to this
@@ -109,7 +109,8 @@ class ReferenceRecordings:
     """Factor on the largest gain among the clean recordings, which a gain on the recordings under test must exceed; the
     fewer the clean recordings, the larger the factor."""
     gains_by_key: dict[object, FloatArray] = field(default_factory=dict)
-    """Gains computed so far, by `Hypothesis.key`."""
+    """Results of `compute_clean_gain` so far, by `Hypothesis.key`: hypotheses that differ in parameters alone share
+    one."""
 
     def compute_clean_gain(self, hypothesis: Hypothesis) -> FloatArray:
         """Compute (c,): the gain that is counted against the hypothesis, `gain_factor` times the largest gain on the

@@ -33,8 +33,9 @@ from equalizer.effects.effect import Effect
 
 
 def remove_effect(context: SearchContext, explanation: Explanation, effect_index: int) -> Explanation:
-    """Remove one effect from the explanation and refit the effects found after it. effect_index: in the order in which
-    they were found. After the removal of its only effect, the explanation is the re-tuned model."""
+    """Remove one effect from the explanation. Where effects were found after it, the others are refitted together in
+    the last step; the steps before keep their values. effect_index: in the order in which they were found. After the
+    removal of its only effect, the explanation is the re-tuned model."""
     if len(explanation.steps) == 1:
         return replace(explanation, after=explanation.retuned, steps=())
     earlier_steps, later_steps = explanation.steps[:effect_index], list(explanation.steps[effect_index + 1 :])
@@ -95,10 +96,10 @@ def _omit_effect(context: SearchContext, candidate: FittedCandidate, effect_inde
 
 def drop_unnecessary_effects(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
     """Drop one of at least two effects by backward elimination: in the order of the search, the first without which the
-    others fit as well (not `is_worthwhile`), because later effects replace it; repeated until every effect is needed or
-    one remains. Where there is none, but three or more effects and no reference recordings: drop the one without which
-    the error is smallest, if that is near the noise (`is_near_noise`), because laws are inexact and a third effect may
-    only fit the remaining error. Unchanged where every effect is needed or no time is left."""
+    others fit as well (not `is_worthwhile`), because later effects replace it; repeated until every effect is needed,
+    one remains or no time is left. Where there is none, but three or more effects and no reference recordings: drop the
+    one of those tried without which the error is smallest, if that is near the noise (`is_near_noise`), because laws
+    are inexact and a third effect may only fit the remaining error. Unchanged where neither is found."""
     sufficient_explanations, last_index = [], len(explanation.steps) - 1
     for effect_index in range(len(explanation.steps) if time_left() else 0):
         reduced = (
@@ -155,8 +156,8 @@ def exchange_first_effects(
     time_left: TimeBudget,
 ) -> Explanation:
     """Exchange the first effect for one of the catalogue that fits better with the others, at most as often as there
-    are effects. Unchanged where the error is small (`has_small_error`), where effects may not be changed
-    (`_can_exchange`), where no other effect fits better, or where the comparison crashes."""
+    are effects. Ends where the error is small (`has_small_error`), where effects may not be changed (`_can_exchange`),
+    or where `_exchange_first` finds no replacement."""
     limited_context = replace(context, map_=limit_map(context.map_, time_left))
     for _ in explanation.steps:
         if not _can_exchange(context, explanation, time_left) or has_small_error(
@@ -198,8 +199,7 @@ def exchange_first_for_relatives(
     The candidates start from the explanation without the first effect, the other values unchanged; only a candidate
     with a smaller cost than the explanation is fitted further. The first effect is among the candidates, so that a
     refinement must reduce the error by as much as in any step. Unchanged where effects may not be changed
-    (`_can_exchange`), the first effect has no relatives in the catalogue, none of them fits better, or the comparison
-    crashes.
+    (`_can_exchange`), the first effect has no relatives in the catalogue, or `_exchange_first` finds no replacement.
     """
     related_effects = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
     if len(related_effects) < 2 or not _can_exchange(context, explanation, time_left):
@@ -255,8 +255,9 @@ def _exchange_first(
     explanation: Explanation,
     compare_replacements: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
 ) -> Explanation | None:
-    """Replace the first effect by the preferred candidate, which becomes the last in the order. None where that
-    candidate is excluded or not worthwhile (`is_worthwhile`), the time is over, or the comparison crashes.
+    """Replace the first effect by the preferred candidate, which becomes the last in the order. None without
+    candidates, where that one is excluded or not worthwhile (`is_worthwhile`), the time is over, or the comparison
+    crashes.
     compare_replacements: returns the explanation without the first effect, and the candidates in its place, the
     preferred one first."""
 

@@ -4,17 +4,17 @@ Called by `search_by_simulation`; with reference recordings of the intact device
 
 1. Forward selection (`add_effects`) uses the samples to fit and to choose by. After a second effect, the first may be
    exchanged for another of its family; after the last, for any effect that fits better (`revise_selection`).
-2. Backward elimination (`prune`) removes effects without which the others, refitted, fit as well; effects that remove
-   too little of the mismatch; and effects whose parameters the data do not determine (`identifiability`: the interval,
-   or the profile likelihood, of the only amplitude contains zero).
+2. Backward elimination (`prune`) removes effects without which the others, refitted, fit as well; those that remove
+   too little of the mismatch, or none of the held-out error where it was small; and those that the data do not
+   determine (`identifiability`: no interval, or profile likelihood of an only amplitude, excludes the null value).
 3. `verdict.judge` compares the errors, in units of the noise, with limits. The errors on held-out samples, which
    neither fitted nor chose anything, can only withdraw names or the verdict "explained".
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), a part
    of them is opened, that is, used to fit and to choose by, and the search repeated: all but the loudest segments; else
    the first half of each stretch, or every other of more parts. The part still held out must confirm what this finds.
-5. Where the catalogue leaves a mismatch, `FurtherSearches` is called (rattling play, `impacts`, then laws outside the
-   catalogue, `discovery`): before a second effect, because one law that explains everything is a shorter description
-   than two; before a third, which takes longer than laws; and at the end (`_choose_early_or_full`).
+5. Where the catalogue leaves a mismatch, `FurtherSearches` look beyond it: before a second effect for laws outside the
+   catalogue (`discovery`), because one law that explains everything is a shorter description than two; before a third,
+   which takes longer, for rattling play (`impacts`), then laws; and at the end for laws (`_choose_early_or_full`).
 6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
    repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device has absorbed missing
    physics as a bias. The new result is used if it explains what the first does not, or with fewer effects.
@@ -132,8 +132,8 @@ def repeat_with_wider_bound(
     time_left: TimeBudget = grant_time,
 ) -> SearchResult:
     """Repeat the search with a wider bound of the model's own parameters (step 6), where the result leaves a mismatch
-    or needs three effects, and a parameter is at its bound. Returns `result` unless the repeated search explains more
-    or with fewer effects (`is_simpler`). context: of the search that gave `result`."""
+    or needs three effects, and a parameter is at its bound. Returns `result`, with a remark where time ran out, unless
+    the new one explains more or with fewer effects (`is_simpler`). context: of the search that gave `result`."""
     if not catalogue or not is_wider_bound_needed(result) or not time_left():
         return result
     progress("searching again, with a model that may move further", 0.1)

@@ -1,9 +1,10 @@
 """Shared state of all fits of a search for missing effects, and the first fits of the screened hypotheses.
 
 Samples have three roles: to fit parameters, to choose between hypotheses, and held out to test. A `SearchContext`
-contains the error measure on the first two and on all samples; its methods return copies in which a part of the
-held-out samples is opened (used to fit and to choose by), where these alone show a mismatch. Created by
-`search_by_simulation`, passed to the modules of this package and to those that test and report its result.
+contains the error measure on the first two and on all samples; some of its methods return copies in which a part of
+the held-out samples is opened (used to fit and to choose by), where these alone show a mismatch. Created by
+`search_by_simulation` and `learn_model_error`, passed to this package and to the modules that test and report its
+result.
 """
 
 from collections.abc import Sequence
@@ -33,7 +34,8 @@ from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
 FIRST_FIT_STEPS = 3
-"""Gauss-Newton steps of a first fit, which only ranks the hypotheses. Chosen by hand."""
+"""Most Gauss-Newton steps of a first fit, which only ranks the hypotheses, and of a law with rounded exponents. Chosen
+by hand."""
 STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
 """Names of the steps of the search in the messages of `Guard` about an effect that crashes."""
 LEAST_SENSITIVITY_SHARE = 0.06
@@ -93,15 +95,16 @@ class SearchContext:
     has_opened_samples: bool = False
     """Whether a part of the held-out samples is used to fit and to choose by."""
     least_remaining_error: float = NOISE_ALONE
-    """Error of the worst channel, in units of the noise, above which a further effect is searched for."""
+    """Error of the worst channel, in units of the noise, above which a second or third effect is searched for."""
 
     def open_alternate_parts(
         self, mismatch_fit: FittedCandidate, least_parts: int = HALVES
     ) -> "tuple[SearchContext, int]":
         """Return a copy of the context in which every other part of each held-out stretch is opened, and the number of
         parts per stretch: the first number, from least_parts on, with which opened and held-out parts both show the
-        mismatch (two parts do not in a sweep, for example), else least_parts. Parts are at least `LEAST_PART_SAMPLES`
-        samples of the longest stretch. mismatch_fit: see `open_quieter_segments`."""
+        mismatch (two parts do not in a sweep, for example), else least_parts. Numbers with parts below
+        `LEAST_PART_SAMPLES` samples, of the longest stretch, are not tried. mismatch_fit: see
+        `open_quieter_segments`."""
         longest_samples = max(record.compute_longest_test_stretch() for record in self.full_measure.records)
         part_counts = [part_count for part_count in (HALVES, *FINER_PARTS) if part_count >= least_parts]
         for part_count in (
@@ -184,8 +187,9 @@ def has_held_out_mismatch(errors: FloatArray, candidate: FittedCandidate) -> boo
 def fit_first(
     context: SearchContext, base: Fitted, jacobian: Sensitivity, screened: Sequence[ScreenedHypothesis]
 ) -> list[Fitted]:
-    """Fit the hypotheses with the largest predicted gains, `FIRST_FIT_STEPS` steps each; the smallest cost first.
-    Hypotheses whose fit crashes are omitted. base: the fit without the further effect; jacobian: its sensitivity."""
+    """Fit the hypotheses with the largest predicted gains, at most `FIRST_FIT_STEPS` steps each; the smallest cost
+    first. Hypotheses whose fit crashes are omitted. base: the fit without the further effect; jacobian: its
+    sensitivity."""
     measure, tuning = context.measure, context.tuning
 
     def make_first_fit(candidate: ScreenedHypothesis) -> Fitted:

@@ -2,9 +2,9 @@
 
 Starting values come from the residual waveform, which impacts make chaotic: the estimated strength may be wrong by an
 order of magnitude, by about the same factor at every axis. Each effect of the catalogue is therefore evaluated at
-several strengths (a line search in the logarithm of its main parameter), without a fit; those with the least cost are
-fitted, and the best of these refined with the model's parameters. All costs are those of `band_power_fit`, about 1 for
-chance variation alone. Called by `impacts`.
+several strengths (a line search in the logarithm of its main parameter, where it can be scaled), without a fit; those
+with the least cost are fitted, and the best of these refined with the model's parameters. All costs are those of
+`band_power_fit`, about 1 for chance variation alone. Called by `impacts`.
 """
 
 from collections.abc import Sequence
@@ -86,9 +86,10 @@ def search_second_effects(
 def _suggest_second_effects(
     context: SearchContext, explanation: Explanation, play_fit: BandPowerFit, catalogue: Sequence[Effect]
 ) -> list[Hypothesis]:
-    """List hypotheses of a second effect: each effect of the catalogue with starting values from the residuals of play,
-    and the candidates of the first round of the search by waveforms, as fitted there. Effects that contain an excluded
-    effect (`SearchContext.excluded`) as a special case are left out, because they would replace it."""
+    """List hypotheses of a second effect: each effect of the catalogue other than play and a loose joint, with starting
+    values from the residuals of play, and the candidates of the first round of the search by waveforms, as fitted
+    there. Effects that contain an excluded effect (`SearchContext.excluded`) as a special case are left out, because
+    they would replace it."""
     waveform_fit = evaluate_fit(context.measure, context.tuning, play_fit.deviations, play_fit.hypothesis)
     evidence = gather_evidence(context.measure, context.tuning, waveform_fit)[0]
     allowed_effects = [

@@ -1,7 +1,7 @@
 """Shorten recordings with periodic excitation to one settled period per segment, on which hypotheses are fitted first.
 
-All settled periods of a segment are equal except for noise. The kept samples are joined end to end and simulated as one
-recording; a run-in before each kept stretch lets the transients of the initial state decay (Pintelon and Schoukens,
+All settled periods of a segment are equal except for noise. The kept samples are joined and simulated as one recording
+(compared forces: each stretch is one); a run-in before each stretch lets transients decay (Pintelon and Schoukens,
 System Identification, 2012, ch. 2). Called by `next_effect`, `compare_candidates`, `identifiability`, `fit_laws`.
 """
 
@@ -120,11 +120,11 @@ class ShortRecordings:
 
 def shorten_recordings(context: SearchContext, base_fit: Fitted) -> ShortRecordings | None:
     """Shorten the recordings of a context; None for windows, with references, with effects that depend on time, where
-    no run-in suffices or too few samples are saved, or without samples of the first record. base_fit: on all samples.
+    no run-in suffices, or where `_keep_periods` returns None. base_fit: on all samples.
 
     A force with memory (dry friction, play) may depend on earlier samples for longer than the linear model's transients
-    last. Each piece therefore begins with the positions and velocities of the simulation of all samples (states of the
-    forces continue from the previous piece), and the run-in is doubled until the errors agree (`has_same_errors`).
+    last. Each piece of a free simulation therefore begins with the motion of the simulation of all samples (states of
+    the forces continue from the previous piece), and the run-in is doubled until the errors agree (`has_same_errors`).
     """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
@@ -204,7 +204,7 @@ def _compute_run_in_s(measure: FreeSimulation | PredictedForce, model: Mechanica
 
 
 def _select_last_periods(record: Observed) -> tuple[Mask, Indices]:
-    """Select `fit` and `repeat_of` of `_KeptSamples`: in each settled segment, only the last period is fitted."""
+    """Select `fit` and `repeat_of` of `_KeptSamples`: a settled segment keeps only its last period, if to be fitted."""
     fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording):
         segment = slice(periods.segment.start, periods.segment.stop)
@@ -260,9 +260,9 @@ def fit_on_short_recordings(
     invariant: Sequence[Hypothesis],
     varying: Sequence[Hypothesis],
 ) -> list[Fitted]:
-    """Fit hypotheses first on short, then on all samples; returns the finite fits, the best first. invariant, varying:
-    hypotheses without and with dependence on time; the latter cannot be compared on short recordings, and are fitted
-    only where their predicted gain is not far below that of the former (`_keep_promising`)."""
+    """Fit hypotheses on short recordings, then by at most one step on all samples; returns the finite fits, the best
+    first. invariant, varying: without and with dependence on time; the latter cannot be compared on short recordings,
+    so all samples are used, only where the predicted gain is not far below the former's (`_keep_promising`)."""
     short, guard = replace(short_form.context, measure=coarsen_steps(short_form.context.measure)), context.guard
     short_base = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     jacobian = compute_sensitivity(short, base.deviations, base.hypothesis, with_forces=True)

@@ -66,8 +66,8 @@ def is_newest_within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
 
 
 def is_within_data(hypothesis: Hypothesis, claim_index: int, evidence: Evidence, least_pitches: float = 1.0) -> bool:
-    """Whether the parameters of the claim with this index lie within the recorded range (`is_newest_within_data`).
-    least_pitches: number of pitches of a ripple that the travel must cover."""
+    """Whether the parameters of the claim with this index lie within the recorded range (`is_newest_within_data`);
+    True where that range is unknown or 0. least_pitches: number of pitches of a ripple that the travel must cover."""
     limits, is_used = RANGE_LIMITS.get(hypothesis.claims[claim_index].effect.name, {}), evidence.used > 0
     for placed_effect in hypothesis.list_effects_of(claim_index):
         for name, range_name in limits.items():
@@ -105,8 +105,8 @@ def _make_separate_hypotheses(
 
 
 def _weaken_start(effect: Effect, values: Values) -> Values:
-    """Make starting values for an axis at which the estimator finds none: those of another axis, with a tenth (chosen)
-    of the main parameter if the effect vanishes at 0."""
+    """Make starting values for an axis or channel at which the estimator finds none: those of another, with a tenth
+    (chosen) of the main parameter if the effect vanishes at 0."""
     main_parameter = effect.parameters[0]
     return {
         **values,
@@ -119,7 +119,7 @@ def _weaken_start(effect: Effect, values: Values) -> Values:
 def search_clock_drift(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
     """Find starting values of clock drift by grid search, for recordings too short for the effect's estimator; returns
     two hypotheses, without and with interpolation. Empty where that estimator finds starting values, where clock drift
-    is not in the catalogue, or where no trial fits better than no drift."""
+    is not in the catalogue, or where no trial fits enough better than no drift (`_find_best_drift`)."""
     effect = next((entry for entry in catalogue if entry.name == CLOCK_DRIFT), None)
     if effect is None or effect.starts(evidence, ALL_SITES):
         return ()

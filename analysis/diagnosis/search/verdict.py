@@ -74,7 +74,8 @@ class UnconfirmedEffect:
 
     hypothesis: Hypothesis
     gain: float
-    """Share of the held-out error power that the effect removes."""
+    """Share of the held-out error power that the effect removes, alone or with others of the hypothesis; 0 where it is
+    not known or not positive."""
     why_not: str
     """Reason why it is not named, in words."""
     claim: int = -1
@@ -189,9 +190,9 @@ def is_wider_bound_needed(result: SearchResult) -> bool:
 
 
 def is_simpler(wider_result: SearchResult, result: SearchResult) -> bool:
-    """Whether the search with a wider bound explains the recordings, by effects or by parameters alone, and the first
-    search does not or needs more effects; False where the model then is physically impossible (`Tuning.is_physical`)
-    or at the wider bound."""
+    """Whether the search with a wider bound explains the recordings, by effects or by parameters alone (with a held-out
+    error up to `HELD_OUT_SURPRISE`), and the first search does not or needs more effects; False where the model then is
+    physically impossible (`Tuning.is_physical`) or at the wider bound."""
     explanation, tuning = wider_result.found, wider_result.context.tuning
     if result.judgement.verdict == "explained" and len(explanation.steps) >= len(result.found.steps):
         return False

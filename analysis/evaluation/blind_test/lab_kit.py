@@ -4,7 +4,8 @@ A change is right where the diagnosis returns one of the effects that it may sho
 loose joint, depending on its slack. The control, a change that changes nothing, counts against a diagnosis that names
 anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter; a
 value of a change without a unit is kept in the table and compared with nothing. Called by
-`study.evaluation.kit.lab_kit`, which draws and reads the labels, and `study.evaluation.kit.score_kit`.
+`study.evaluation.kit.lab_kit`, which draws and reads the labels, and `study.evaluation.kit.score_kit`; `study.cli.kit`
+lists the changes.
 """
 
 from collections.abc import Sequence
@@ -27,8 +28,8 @@ class Change:
     effects: tuple[str, ...]
     """Effects of which any is a right answer; empty for the control. The value is a parameter of the first of them."""
     unit: str
-    """Unit of the value that the lab writes down for this change, the same as of the effect's first parameter; empty
-    where there is none."""
+    """Unit of the value that the lab writes down for this change, the same as of the effect's first parameter in a
+    linear SI model; empty where there is none."""
 
 
 CHANGES: tuple[Change, ...] = (

@@ -2,8 +2,8 @@
 
 Detection and naming of single effects and of pairs, false alarms on devices without a missing effect, behaviour where
 the true effect is outside the catalogue (open set), and error and interval coverage of the parameters. Cases count only
-where the mismatch is detectable (`outcome.DETECTABLE_ERROR`), except where a figure states otherwise. Intervals:
-`confidence_intervals`. Called by `study.evaluation.bank.prove`.
+where the mismatch is detectable (`outcome.DETECTABLE_ERROR`), except in false alarms and run times, and where a figure
+states otherwise. Intervals: `confidence_intervals`. Called by `study.evaluation.bank.prove` and `write_proof`.
 """
 
 import math
@@ -47,8 +47,8 @@ ADMITTING_VERDICTS = ("unexplained", "partly_explained")
 
 def is_wrong_answer(outcome: Outcome) -> bool:
     """Whether an answer is wrong. A failed diagnosis and a wrong name always count, even where nothing was detectable.
-    For a detectable effect, so do a missing name, a wrong axis and, outside the catalogue, a verdict that claims to
-    explain it. Where the true effect was excluded from the catalogue, any name is wrong."""
+    For a detectable effect of the catalogue, so do a missing name and a wrong axis; outside the catalogue, a verdict
+    other than `ADMITTING_VERDICTS`. Where the true effect was excluded from the catalogue, any name is wrong."""
     if outcome.diagnosis is None or has_wrong_name(outcome):
         return True
     if outcome.kind in ("nothing", "without") or not outcome.detectable:
@@ -115,7 +115,7 @@ def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
 
 def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Compute rates on cases with a single concealed effect: its name, place and axis, and the returned set of
-    names."""
+    names; at last the rate of wrong names on undetectable cases of every kind."""
     bank_suffixes = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         detectable = _select_detectable(_select_kind(outcomes, "single", bank))

@@ -1,9 +1,9 @@
 """Findings on the published figure 5: frequency response of the simulated device with and without the equalizer.
 
 The paper reports that equalization removes the resonance near 11 Hz, reduces coupling peaks by up to a factor of ten,
-and keeps the response fairly flat near the edge of the workspace. Each finding compares a figure of our simulation with
-one of these statements. `equalizer.tracking.feedforward.quality` defines flatness and coupling. Called by
-`write_reproduction`; `reproduce_equalized` measures the rows.
+and keeps the response fairly flat near the edge of the workspace. Findings compare figures of our simulation with these
+statements; those on which the paper reports nothing compare nothing. `equalizer.tracking.feedforward.quality` defines
+flatness and coupling. Called by `write_reproduction`; `reproduce_equalized` measures the rows.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Findings on the published figures 4 and 1, from the transfer functions of the simulated device.
+"""Findings on the published figures 4 and 1, from the simulated device's transfer functions; on 1 also from thresholds.
 
 Figure 4 shows the transfer functions from every force to every acceleration, figure 1 the frequency bands that follow
 from the onset of coupling and from the limit of direction perception. Frequencies are compared within `TOLERANCE`.

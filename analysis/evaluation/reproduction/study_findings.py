@@ -1,8 +1,8 @@
 """Findings on the published figure 2: thresholds of direction discrimination by frequency, from simulated participants.
 
 Group means are compared pairwise with simultaneous p-values (Tukey-Kramer, `PairDifference`). Thresholds are force
-amplitudes in N, and those at the cap are censored. The limit of direction perception follows `LIMIT_RULE`. Called by
-`study.evaluation.reproduction.write_reproduction`; `response_findings` quotes `LIMIT_RULE`.
+amplitudes in N, and those that the cap cut are censored. The limit of direction perception follows `LIMIT_RULE`. Called
+by `study.evaluation.reproduction.write_reproduction`; `response_findings` quotes `LIMIT_RULE`.
 """
 
 from dataclasses import dataclass

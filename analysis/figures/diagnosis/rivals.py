@@ -66,14 +66,14 @@ def make_rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple
     retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
     tested_rounds = [round_number for round_number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
-    for round_number in tested_rounds[: len(_ORDINALS)]:
+    for round_number in (number for number in tested_rounds if number <= len(_ORDINALS)):
         round_ = explanation.rounds[round_number - 1]
         explanations, is_accepted = list_explanations(round_, axes), round_number <= len(explanation.steps)
         if explanations:
             pictures.append(
                 Picture(
                     name=f"rivals-{round_number}",
-                    title=f"What was tried for the {_ORDINALS[tested_rounds.index(round_number)]} effect"
+                    title=f"What was tried for the {_ORDINALS[round_number - 1]} effect"
                     + ("" if is_accepted else "; none was accepted"),
                     caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
                     "in addition to the effects found before. "

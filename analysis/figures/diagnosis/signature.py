@@ -1,7 +1,8 @@
 """Figures of the signatures of named effects: the data that identify an effect, with its fitted law.
 
 A signature is the residual of the model without the effect (or the missing force) against the variable that the effect
-depends on, such as friction against velocity: means per bin with two standard errors. Called by `diagnosis_pictures`.
+depends on, such as friction against velocity: means per bin (of some effects running rms or amplitude densities) with
+two standard errors. Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Sequence
@@ -94,7 +95,8 @@ def draw_signature(signature: Signature) -> Figure:
 
 def _rescale_label(text: str, values: FloatArray) -> tuple[str, float]:
     """Choose the unit prefix of an axis label by the largest value: "velocity of x (m/s)" becomes "Velocity of x
-    (mm/s)". Returns the label and the factor to multiply the values with; spectra keep their unit (factor 1)."""
+    (mm/s)". Returns the label and the factor to multiply the values with; for spectra, and without a unit, the factor
+    is 1."""
     words, bracket, unit_text = text.rpartition(" (")
     if not bracket or "/√" in unit_text or unit_text.startswith("Hz"):
         return capitalise(text), 1.0

@@ -5,8 +5,9 @@ Reports print these counts beside each interval (`coverage_words`). Each row: an
 where the analysis gives no size in dB), 95 % intervals that contain the true value (one-way: studies with a significant
 difference although there is none), and all intervals.
 
-Counted in simulated studies of ten people with known thresholds under the published staircase and cap, and written by
-`make coverage` (tests/references/coverage_of_analyses.py), never by hand; docs/statistics.md has the same table.
+Counted in simulated studies of ten people ("single": of one) with known thresholds under the published staircase and
+cap (one-way: thresholds of equal median). Tobit gives no interval where all runs of a frequency are censored. Written
+by `make coverage` (tests/references/coverage_of_analyses.py), never by hand; docs/statistics.md has the same table.
 """
 
 from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage

@@ -43,7 +43,7 @@ class MedianThreshold:
     """Estimate."""
     lower_db: float | None
     """Lower bound; None: the answers do not contradict a median `LONGEST_SEARCH_DB` below the estimate, or too few
-    people have enough answers (two or fewer for a median below the cap, one or none for a median above it)."""
+    people have enough answers (two or fewer for a median up to the cap, one or none for a median above it)."""
     upper_db: float | None
     """Upper bound; None where the median is above the cap: lower_db is then a one-sided bound, and the estimate itself
     is an extrapolation. Also None where two people or fewer have enough answers."""
@@ -71,8 +71,8 @@ class DirectionLimit:
     """Frequency at which the median participant's threshold reaches the cap."""
 
     frequency_hz: float | None
-    """None where the median is above the cap from the lowest frequency on, never reaches it, or crosses it upwards more
-    than once."""
+    """None where the median reaches the cap already at the lowest frequency, never reaches it, or crosses it upwards
+    more than once."""
     lower_hz: float | None
     """Lower bound; None: at or below the lowest frequency played, or no interval of the median contains the cap."""
     upper_hz: float | None

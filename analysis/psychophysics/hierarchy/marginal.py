@@ -15,7 +15,8 @@ Adaptive levels need no correction: each level follows from the answers before i
 ignorable (D. B. Rubin, Biometrika 63 (1976), 581-592). Answers at the cap count as answers at that level, uncensored.
 
 Source: L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986), 82-86; the gradient by implicit differentiation of the
-mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709. Called by `objective`.
+mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709. Called by `objective`;
+`fit` and `quadrature_search` call `find_modes`.
 """
 
 import math
@@ -127,8 +128,8 @@ class MarginalLikelihood:
 
     def _maximise_posterior(self, precision: FloatArray, prior_mean: FloatArray, lapse: float) -> Derivatives:
         """Find the modes by Newton's method for all persons at once, from `latent`, which they replace. A step that
-        lowers a person's log posterior (by more than rounding, 1e-10) is divided by 3, at most 11 times. Returns the
-        derivatives at the modes. precision: (k + 2, k + 2); prior_mean: (k + 2,); lapse: lapse rate."""
+        lowers a person's log posterior (by more than rounding, 1e-10 of it) is divided by 3, at most 11 times. Returns
+        the derivatives at the modes. precision: (k + 2, k + 2); prior_mean: (k + 2,); lapse: lapse rate."""
         latent = self.latent.copy()
         current = self.likelihood.evaluate(latent, lapse)
         log_posterior = _compute_log_posterior(current, latent - prior_mean, precision)

@@ -1,5 +1,6 @@
 """Primary analysis of a study by the hierarchical psychometric model: from all answers to median thresholds, contrasts
-between frequencies, standard deviations between persons, and the direction limit. Called by `study_analysis`.
+between frequencies, standard deviations between persons, and the direction limit. Called by `study_analysis`;
+`single_persons` uses the estimates of persons.
 
 The cap is the largest force that the staircase may play. n: persons, k: frequencies.
 """
@@ -30,15 +31,16 @@ from protocols.procedure.staircase import to_db
 CONFIDENCE = 0.95
 """Default confidence of all intervals."""
 FAR_ABOVE_DB = 6.0
-"""Distance of a median above the cap (dB) from which it counts as far above. Between two such medians no difference is
-reported: correct answers are hardly above chance at all levels, so that both are extrapolated with an unknown error."""
+"""Distance of a median above the cap (dB) beyond which it counts as far above. Between two such medians no difference
+is reported: correct answers are hardly above chance at all levels, so that both are extrapolated with an unknown
+error."""
 FAR_ABOVE_NOTE = "Two medians or more lie at more than twice the cap: their differences are not known."
 
 
 @dataclass(frozen=True, slots=True)
 class PersonEstimate:
-    """One person's parameters. Each is a posterior estimate, shrunk towards the population's where the person's own
-    answers carry little information; see `estimate_persons`."""
+    """One person's parameters. Each is a posterior estimate, shrunk towards the population's (in `single_persons`, a
+    fixed prior's) where the person's own answers carry little information; see `estimate_persons`."""
 
     subject: str
     thresholds_n: tuple[float, ...]
@@ -68,7 +70,7 @@ class PrimaryAnalysis:
     overall: RepeatedMeasures
     """Analysis of variance over the pseudo-thresholds in dB."""
     contrasts: tuple[Contrast, ...]
-    """Each frequency against the lowest."""
+    """Each frequency against the lowest, where that can be tested."""
     limit: DirectionLimit
     """Frequency at which the median threshold reaches the cap."""
     persons: tuple[PersonEstimate, ...]

@@ -2,7 +2,8 @@
 
 Order: `pack_rule` converts the rule to numbers, `simulate_staircase` plays trials; in each, `simulate_answer` draws an
 answer from the psychometric function. The rule is that of `protocols.procedure.staircase.step`; tests check that both
-give identical runs. Levels are in dB re 1 N. Called by `simulated_study`, parts also by `psi_kernel`.
+give identical runs. Levels are in dB re 1 N. Called by `simulated_study`, parts also by `psi_kernel` and
+`compare_rules`.
 """
 
 import math
@@ -42,8 +43,8 @@ class PackedRule(NamedTuple):
     """Step size (dB) by the number of reversals that count towards the schedule; as long as the schedule's phases have
     reversals, plus 3."""
     step_change: int
-    """Which reversals count towards the schedule at a reversal. 0: all, including the present one. 1: all but one. 2:
-    the earlier ones only."""
+    """Which reversals count towards the schedule at a step. 0: all, including one at this step. 1: all but the last. 2:
+    those before this step."""
     reversals: int
     """Number of reversals at which the run ends."""
     averaged: int

@@ -46,7 +46,7 @@ class Bodies:
 
 def build_bodies(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
     """Build the bodies of a model with those of the effects that change the structure or add a motion-dependent force;
-    other effects are ignored. Raises ValueError for an axis that is not there."""
+    other effects are ignored. Raises ValueError for an axis that is not there, and as the `pack` of an action does."""
     structure = model
     for placed_effect in effects:
         for site in (
@@ -98,9 +98,9 @@ def simulate_bodies(
     """Simulate the bodies, from rest or from the states of `restarts`.
 
     Returns two arrays: (n, 3 r + 2 p), the positions, velocities and accelerations of the ports, the response, and the
-    positions of the response's rows; and (n, r), the forces at the ports. Without `with_motion` (n, 2 p) and (n, 0).
-    actuator_force: one row per sample, or per step. counts: number of samples n, and of steps per sample. step_s:
-    length of a step.
+    positions of the response's rows; and (n, r), the forces at the ports (0 where none acts). Without `with_motion` (n,
+    2 p) and (n, 0). actuator_force: one row per sample, or per step. counts: number of samples n, and of steps per
+    sample. step_s: length of a step. Raises ValueError as `pack_kernel_forces` does.
     """
     discrete_model, stepping, port_ids = _prepare_steps(bodies, actuator_force, counts, step_s)
     stride = len(actuator_force.mean) // counts[0]

@@ -104,7 +104,7 @@ def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> Actuator
             for step_fraction in step_fractions
         )
         return ActuatorForce(mean, end)
-    # Imported here: SciPy takes longer to import than a diagnosis that does not need it.
+    # Imported here: only a band-limited hold needs it.
     from scipy.signal import resample_poly
 
     half_steps = resample_poly(commands, 2 * steps, 1, axis=0)

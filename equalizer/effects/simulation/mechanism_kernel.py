@@ -74,8 +74,8 @@ _LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-unt
 _COUNTS = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
 _NOW_X, _NOW_V, _NEXT_X, _NEXT_V, _A, _FORCE, _FORCE_END = range(7)
 PORT_ROWS = 7
-"""Rows of the port table: position and velocity at a step's start and, predicted, at its end; acceleration at its start
-without forces; forces over the step and at its end."""
+"""Rows of the port table: position and velocity at a step's start and, predicted, at its end; acceleration at its
+start, to which the forces add; forces over the step and at its end."""
 
 
 def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:

@@ -3,7 +3,7 @@
 Main function: `simulate_mechanism`. Variants: `simulate_response` without the motion of the axes, faster;
 `simulate_windows` with restarts from given states, for multiple shooting; `simulate_states_before` for these states.
 Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants. Called by
-`analysis.diagnosis`: output errors, evidence, signature curves, next experiment."""
+`analysis.diagnosis`: first model, output errors, evidence, signature curves, next experiment."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -67,7 +67,8 @@ def simulate_mechanism(
     which `equalizer.effects.placing` converts. measurement: random effects are conditioned on it; without one they are
     drawn at random.
 
-    Raises ValueError where an effect acts on an axis that is not there, and for too many different force laws.
+    Raises ValueError where an effect acts on an axis that is not there, for too many different force laws, and for a
+    discovered law that does not fit the model or lacks conditions.
     """
     return _apply_sensor(
         model, _simulate_motion(model, commands, (sample_rate_hz, hold), effects), sample_rate_hz, effects, measurement
@@ -179,7 +180,8 @@ def _apply_sensor(
     measurement: Measurement | None,
 ) -> SimulationResult:
     """Apply the sensor: low pass of each channel, effects in the order of their stages, limits of the range. Positions
-    change only by effects on the clock and by lost samples."""
+    change only by effects with `on_position` (clock drift) or, under a measurement, `conditioned_position` (lost
+    samples)."""
     response_effects = [
         (placed.effect.action, placed) for placed in effects if isinstance(placed.effect.action, OnResponse)
     ]

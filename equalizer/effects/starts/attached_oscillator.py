@@ -27,7 +27,8 @@ WINDOW_S = 2.0
 LEAST_POWER_SHARE = 1e-4
 """Least power of a line that is used, relative to the largest line. Chosen."""
 CHANCE_SHARE = 0.02
-"""Share of the missing force's power that the best of all trials explains by chance. Chosen."""
+"""Share of the missing force's power, less what the model's linear parameters explain, that the best of all trials
+explains by chance. Chosen."""
 RANK_TOLERANCE = 1e-9
 """Relative singular value, or norm, below which vectors count as linearly dependent (rounding)."""
 
@@ -108,7 +109,8 @@ class AttachedOscillator:
     mass: float
     """kg; kg m² on a rotational axis."""
     explained_share: float
-    """Share, 0 to 1, of the missing force's power on its axis that it explains beyond the model's linear parameters."""
+    """Share, 0 to 1, that it explains of the missing force's power on its axis which the model's linear parameters
+    leave."""
     by_axis: FloatArray
     """(m,): its force on each axis relative to that on its own axis."""
 

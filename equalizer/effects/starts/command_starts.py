@@ -2,8 +2,9 @@
 
 An effect changes the command u to the force f(u, p). The parameter p is sought for which f(u, p) - u leaves the least
 of the missing force, in the sense of least squares; terms that a re-tuned linear model may have absorbed are projected
-out. Search: grid, then golden section on the logarithm of p. Called by the effects at the command: `amplifier_lag`,
-`transport_delay`, `force_deadband`, `force_saturation`, `force_nonlinearity`, `slew_limit`.
+out where the effect asks for it. Search: grid, then golden section on the logarithm of p. Called by the effects at the
+command: `amplifier_lag`, `transport_delay`, `force_deadband`, `force_saturation`, `force_nonlinearity`, `slew_limit`;
+`response_starts` uses `minimise_on_grid`.
 """
 
 from collections.abc import Callable, Sequence
@@ -67,7 +68,7 @@ def find_command_parameter(
 def fit_square_law(evidence: Evidence, site: int) -> tuple[float, float] | None:
     """Fit (square, reference in N) of `force_nonlinearity.apply_square_law` by regression of the missing force on u and
     u |u|; None where the quadratic term explains too little, the force at the strongest command is not positive, or
-    |square| exceeds 1. Coefficients are averaged over the axes of the site."""
+    |square| is 0 or exceeds 1. Coefficients are averaged over the axes of the site."""
     axes = range(evidence.command.shape[1]) if site == ALL_SITES else (site,)
     used_indices, linear_gains, square_gains, explained_share = np.flatnonzero(evidence.used > 0), [], [], 0.0
     for axis in axes:

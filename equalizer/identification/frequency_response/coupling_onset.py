@@ -51,12 +51,13 @@ class CouplingOnset:
     """Coupling onset of a frequency response with its confidence interval; result of `find_coupling_onset`."""
 
     frequency_hz: float | None
-    """Onset; None: the coupling does not exceed the threshold at any line above the noise."""
+    """Onset; None: the averaged coupling does not exceed the threshold at any line above the noise."""
     interval_hz: tuple[float, float] | None
     """95 % interval, from resampled noise plus half a line on either side for the line spacing; None without an onset,
     or where the noise is not known."""
     from_the_start: bool
-    """Whether the coupling exceeds the threshold at the lowest line above the noise: the onset may lie below."""
+    """Whether the averaged coupling exceeds the threshold at the lowest line above the noise: the onset may lie
+    below."""
     threshold: float
     """Threshold of the coupling: off-axis over on-axis response."""
     rule: str
@@ -65,8 +66,8 @@ class CouplingOnset:
 
 def find_coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -> CouplingOnset:
     """Find the frequency from which driving one axis moves the others. response: as estimated, not smoothed yet, with
-    inputs and outputs in one frame. rule: None = the default. Raises ValueError if the response is not square, or has
-    no reliable line at which the noise is small compared with the threshold."""
+    inputs and outputs in one frame. rule: None = the default. Raises ValueError if the response is not square, has too
+    few reliable lines for the smoothing, or none at which the noise is small compared with the threshold."""
     rule = rule or OnsetRule()
     require_square_response(response.response)
     lines = response.select_lines(response.reliable)

@@ -43,7 +43,7 @@ class Resonance:
     frequency_hz: float
     """Natural frequency of the fitted mode."""
     frequency_interval_hz: tuple[float, float]
-    """95 % interval, from refits with added noise."""
+    """95 % interval, from refits with added noise; of no width where the noise is not known."""
     damping_ratio: float
     damping_interval: tuple[float, float]
     """95 % interval of the damping ratio, from the same refits."""

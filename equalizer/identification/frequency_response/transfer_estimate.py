@@ -49,9 +49,9 @@ class EstimateSettings:
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
-    is no recording, the recordings differ in rate, channels or units, no segment for the fit yields a whole period or
-    window without missing samples, an output is constant, or there are fewer independent experiments than inputs at
-    every line."""
+    is no recording, the recordings differ in rate (to six digits), channels or units, no segment for the fit yields a
+    whole period or window without missing samples, an output is constant, or there are fewer independent experiments
+    than inputs at every line."""
     settings = settings or EstimateSettings()
     _check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
@@ -160,8 +160,8 @@ def _join_groups(
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
-    """Check the recordings: raises TransferEstimateError without any, and where sample rate, channels or units
-    differ."""
+    """Check the recordings: raises TransferEstimateError without any, and where sample rate (to six digits), channels
+    or units differ."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first_recording = recordings[0]

@@ -73,9 +73,9 @@ def choose_structure(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
-    """Choose oscillators on the driven axes if they explain the lines, else modes with free shapes at the sensors if
-    these explain more. `settings.joint` requires an elastic joint, and `settings.noncollocated_sensors` one of the two
-    kinds.
+    """Choose oscillators on the driven axes if they explain the lines, else a structure for sensors elsewhere
+    (`_fit_noncollocated_sensors`) if it explains more. `settings.joint` requires an elastic joint, and
+    `settings.noncollocated_sensors` one of the two kinds.
 
     groups: lines of the segments to fit. starts: fits of the driven axes alone up to the first of `compute_stage_ends`,
     from several initial values. on_progress: called with the share done, 0 to 1.

@@ -1,9 +1,9 @@
 """Spectra of commands and responses, segment by segment, with their noise: the data of a mechanical fit.
 
 A periodic segment gives the mean spectrum of its periods: noise, including noise that a feedback adds to the command,
-averages out, as with the excitation as an instrument. Any other segment gives the spectrum of its whole length; the
-transient from the states at its ends is fitted with the model. Spectra are rfft / length, in the signals' units. Called
-by `mechanical_fit`, `mechanical_free_simulation` and `choose_structure`.
+averages out, as with the excitation as an instrument. Any other segment gives the spectrum of its longest run without
+gaps; the transient from the states at its ends is fitted with the model. Spectra are rfft / length, in the signals'
+units. Called by `mechanical_fit`, `mechanical_misfit` and `analysis.diagnosis.first_model.choose_structure`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -96,8 +96,8 @@ class SegmentLines:
 
 def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
     """Compute the spectra of a segment with their noise; None where its longest run without gaps has fewer than eight
-    samples (chosen), where a sample of the excitation is missing, or where it is not excited: the spectrum without the
-    mean is rounding error (at most 1e-9 of the largest sample)."""
+    samples (chosen), or where it is not excited: the spectrum without the mean is rounding error (at most 1e-9 of the
+    largest sample)."""
     starts, length = _find_whole_periods(recording, segment)
     if not starts or length < 8:
         return None

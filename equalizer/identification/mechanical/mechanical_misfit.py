@@ -2,7 +2,8 @@
 
 Residual of an output at a line:  r = w (Y - G U),  with  w = 1 / sqrt(noise variance + (floor |Y|)²),  so that E|r|² is
 about 1; for segments with a transient, less the best fit of the free response of the states at both ends. |Y|² is
-averaged over neighbouring lines. Called by `mechanical_fit`, `mechanical_refinement` and the searches for modes.
+averaged over neighbouring lines. Called by `mechanical_fit`, `mechanical_refinement`, `physical_model` and the searches
+for modes.
 """
 
 from collections.abc import Callable, Sequence
@@ -179,8 +180,8 @@ def compute_misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list
 
 
 def compute_transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
-    """Compute the weighted spectra of the free response to each state, (lines, p, columns). form: pole-residue form of
-    the model."""
+    """Compute the weighted spectra of the free response to each state and, of accelerations, of the last command's
+    direct effect on each output, (lines, p, columns). form: pole-residue form of the model."""
     free_response = compute_free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
@@ -215,7 +216,8 @@ def compute_numerical_jacobian(
 
 def _compute_line_weights(segment: SegmentLines, floor: float) -> FloatArray:
     """Compute the weights (lines, p), 1 / sqrt(noise + floor² |response|²), with |response|² averaged over five lines
-    (chosen); 0 at lines that are not excited. Noise that is not known (NaN) counts as 0."""
+    (chosen); 0 at lines that are not excited. Noise that is not known (NaN) counts as 0; a small constant avoids a
+    division by zero."""
     power = np.abs(segment.response) ** 2
     smoothed_power = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)

@@ -37,7 +37,8 @@ TARGET_REACHED = (
     "The residual on held-out lines is no larger than the noise, the variation between levels, and the share that no "
     "linear model is expected to explain."
 )
-"""Reason for the end of growth where the error on held-out lines is below `TARGET_ERROR`."""
+"""Reason for the end of growth where the error on held-out lines is below `TARGET_ERROR` (in `modal_order`: below
+1)."""
 JOINT_START_RATIOS = (1.1, 1.6)
 """Starting frequencies of the joint's resonance, relative to the band's upper end."""
 
@@ -221,7 +222,8 @@ def improves_enough(current: RefinedFit[Structure], extended_fit: RefinedFit[Str
 def _fit_extensions(
     groups: Sequence[LineGroup], current: RefinedFit[Structure], band_hz: tuple[float, float], limits: _Limits
 ) -> Iterator[tuple[str, RefinedFit[Structure]]]:
-    """Fit structures with one further extension each, each with its description: modes first, then the others."""
+    """Fit extended structures, each with its description: with a further mode, then with another extension, last with a
+    mode and shared sensors together."""
     structure = current.structure
     starts = estimate_mode_starts(groups, current, band_hz) if structure.modes < limits.most_modes else ()
     for start in starts:
@@ -250,5 +252,6 @@ def _fit_extensions(
 
 
 def _record_trial(description: str, fit: RefinedFit[Structure], structure: Structure, accepted: bool) -> OrderCandidate:
-    """Record a trial as an entry of the result. accepted: whether the structure was adopted."""
+    """Record a trial as an entry of the result. accepted: whether the structure was adopted; true for both starts of a
+    joint."""
     return OrderCandidate(description, structure.coordinates, structure.parameters, fit.error, accepted)

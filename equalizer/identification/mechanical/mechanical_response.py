@@ -12,7 +12,8 @@ For the last two, a delay multiplies by e^(-s delay). `response[k]` is taken jus
 `signals.recording`.
 
 Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6. Called by
-`mechanical_misfit`, `modal_search`, `mechanical_free_simulation` and the computation of starting values.
+`mechanical_misfit`, `modal_search`, `mechanical_free_simulation`, `mechanical_refusals` and the computation of starting
+values.
 """
 
 from dataclasses import dataclass
@@ -24,8 +25,8 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LARGEST_INTEGRATOR_STEP = 1e-9
-"""Magnitude of a pole times the sample period below which the pole counts as an integrator (numerically zero).
-Chosen."""
+"""Magnitude of a pole times the duration of an integral below which the pole counts as an integrator (numerically
+zero). Chosen."""
 _LARGEST_GROWTH_EXPONENT = 200.0
 """Upper limit of the real part of a pole times the sample period. Chosen: its exponential is a finite number."""
 

@@ -5,9 +5,9 @@ At each spectral line s = j w the command's force u and the motion x of the m dr
     u = (M s² + D s + K) x + transient
 
 which is linear in the entries of the symmetric matrices M (mass), D (damping) and K (stiffness). The sensor's low pass,
-the hold and a trial delay are removed from the measured motion first; the delay with the least residual is kept. The
-matrices are then made positive definite, as the nonlinear fit needs. Called by `mechanical_fit` and
-`mechanical_mode_start`.
+the hold and the delay are removed from the measured motion first; of the trial delays, where the delay is to be
+estimated, that with the least residual is kept. The matrices are then made positive definite, as the nonlinear fit
+needs. Called by `mechanical_fit` and `mechanical_mode_start`.
 """
 
 from collections.abc import Sequence

@@ -175,8 +175,8 @@ class Structure:
         return units[0] * lower @ lower.T, units[1] * _unpack_square(unknowns[slices["damping"]], m), stiffness
 
     def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Compute lower and upper bounds (parameters,): no negative damper or spring on the diagonals, modes near the
-        band, damping ratios 1e-4 to 3, the joint's damping over its stiffness 1e-4 to 1 over speed_scale."""
+        """Compute lower and upper bounds (parameters,), such as: no negative diagonal in the factors of damping and
+        stiffness, damping ratios 1e-4 to 3, the joint's damping over its stiffness 1e-4 to 1 over speed_scale."""
         lower, upper = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
         slices, diagonal = self.slices, find_diagonal_indices(self.inputs)
         for name in ("damping", "stiffness"):

@@ -131,7 +131,8 @@ def _split_into_rank_one_modes(estimate: ModeEstimate, structure: Structure) -> 
 
 
 def _record_trial(estimate: ModeEstimate, structure: Structure, accepted: bool) -> OrderCandidate:
-    """Record an estimate as an entry of the result. accepted: whether it was adopted."""
+    """Record an estimate as an entry of the result. accepted: whether it was adopted in its series of trials (without
+    or with a delay)."""
     mode_count = len(estimate.logs) // 2
     parameter_count = mode_count * (2 + structure.inputs * structure.outputs)
     return OrderCandidate(

@@ -59,7 +59,8 @@ class _Solution:
 
 class ModalSearch:
     """Adds modes one at a time to a modal model of line groups, none of which may contain a transient. structure: gives
-    numbers of axes and responses, quantity, sensor and actuator; fit_delay: whether the delay is estimated."""
+    numbers of axes and responses, quantity, step, sensor and the actuator's delay (its bandwidth is not used);
+    fit_delay: whether the delay is estimated."""
 
     def __init__(
         self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool

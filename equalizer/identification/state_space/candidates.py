@@ -76,7 +76,8 @@ class Candidate:
 
     @property
     def has_acceptable_gain(self) -> bool:
-        """Whether the gain outside the band is at most `LARGEST_OUTSIDE_GAIN` times that on the fitted lines."""
+        """Whether the largest gain at any frequency is at most `LARGEST_OUTSIDE_GAIN` times that on the fitted
+        lines."""
         return self.outside_gain <= LARGEST_OUTSIDE_GAIN
 
 

@@ -118,8 +118,8 @@ def _count_run_in_samples(model: IdentifiedModel) -> int:
 
 
 def _find_first_compared_sample(segment: Segment) -> int:
-    """Find the first compared sample: start of the last complete period, when the transient has decayed; without
-    periods, start of the segment."""
+    """Find the first compared sample: one period before the segment's end, when the transient has decayed; without a
+    whole period, start of the segment."""
     period_count = (segment.stop - segment.start) // segment.period if segment.period else 0
     return segment.stop - segment.period if period_count >= 1 else segment.start
 

@@ -81,7 +81,7 @@ class IdentificationResult(SummaryDisplay):
     lines: int
     """Number of lines within the band, without its margins."""
     candidates: tuple[Candidate, ...]
-    """All refined models of the search, the chosen one included."""
+    """All refined models of the first search, and the chosen one; with `initial`, the chosen one alone."""
     chosen: Candidate
     relaxed: tuple[SlowPole, ...]
     """Poles with a longer decay than the ordinary bound, which the data require; slowest first."""

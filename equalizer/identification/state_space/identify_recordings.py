@@ -22,8 +22,8 @@ from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.recording import Recording
 
 DISTURBING_DECAY_S = 1.0
-"""Time constant (s) above which the transient at the start of an excitation disturbs the estimate, which leaves out the
-first 5 s (`experiments.TRANSIENT_S`). Chosen: after five time constants less than 1 % remains."""
+"""Time constant (s) above which the transient at the start of an excitation disturbs the estimate. Chosen: a transient
+is taken to last 5 s (`experiments.TRANSIENT_S`), and after five time constants less than 1 % remains."""
 MAX_ROUNDS = 8
 """Largest number of repetitions in which slow transients are subtracted and the model is refined. Chosen."""
 SETTLED_DECAY_CHANGE = 1e-4
@@ -40,7 +40,8 @@ class RecordingsIdentification:
     """Result of `identify_recordings`: frequency response of the recordings, and the state-space model fitted to it."""
 
     estimate: FrequencyResponse
-    """Frequency response of the recordings, free decays of slow poles subtracted."""
+    """Frequency response of the recordings, free decays of slow poles subtracted, unless local averages alone were
+    fitted."""
     fitted: FrequencyResponse
     """The frequency response that the model was fitted to: the estimate, or its local averages."""
     identified: IdentificationResult
@@ -55,9 +56,9 @@ def identify_recordings(
     """Identify a state-space model of the recorded device, and state how well it fits.
 
     smooth: whether to fit local averages over neighbouring lines, taken about the model where a pole was relaxed,
-    because they would blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes
-    the share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does, and IdentificationError as
-    `identify` does.
+    because they would blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes the
+    share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does, IdentificationError as `identify`
+    does, and ValueError where there are too few lines for local averages.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or IdentificationSettings()
@@ -106,7 +107,7 @@ def _add_misfit_causes(
 
 
 def _has_repeats(recordings: Sequence[Recording]) -> bool:
-    """Whether every experiment has two counted periods.
+    """Whether there is a periodic experiment, and every one has at least two counted periods.
 
     In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
     relaxed on their evidence. Noise estimated from the scatter of the lines does not reveal the cause of a misfit

@@ -31,7 +31,7 @@ line spacing still determine its decay, up to the point where they equal those o
 SIGNIFICANCE_LEVEL = 1e-3
 """Significance level of the test: probability that noise alone relaxes a pole. Chosen."""
 RELAXED_SUFFIX = ", poles relaxed"
-"""Suffix of the name of a candidate whose poles were relaxed."""
+"""Suffix of the name of a candidate from `_tighten_poles`, also where none of its poles is still relaxed."""
 
 CandidateSearch = Callable[[IdentificationSettings], Sequence[Candidate]]
 """Search for candidates from new starting models, under the given settings."""
@@ -50,10 +50,11 @@ class SlowPole:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelaxedFit:
-    """Candidate after the likelihood-ratio test of the decay bound; result of `relax_poles`."""
+    """Candidate after the likelihood-ratio test of the decay bound; result of `relax_poles`, and made by `identify` for
+    the argument `initial`."""
 
     candidate: Candidate
-    """The candidate with its poles relaxed; the given candidate where no pole needs a longer decay."""
+    """The candidate with its poles relaxed; else the given candidate."""
     is_bound_binding: bool
     """Whether the bound is a binding constraint: a pole is at the bound although the fit would improve by more than
     noise explains without it."""
@@ -182,7 +183,8 @@ def _tighten_poles(
         increase = entry_count * (trial.cost - relaxed.cost)
         if trial.has_acceptable_gain and not _exceeds_noise(increase, entry_count * relaxed.cost, lines, len(lines)):
             tightened = trial
-    return tightened
+    is_relaxed = bool(np.any(tightened.radius > ordinary_radius))
+    return tightened if is_relaxed else replace(tightened, name=relaxed.name.removesuffix(RELAXED_SUFFIX))
 
 
 def _lowers_cost(tightened: Candidate, chosen: Candidate, lines: WeightedLines) -> bool:

@@ -86,8 +86,9 @@ class CapPolicy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedEqualizer:
-    """The equalizer of a device. Raises ValueError if the split and the models disagree on bands or sample rate, for a
-    force weight outside its allowed range, and for a stylus actuator with a causal split."""
+    """The equalizer of a device. Raises ValueError if the split and the models disagree on bands, or the split and the
+    middle model on the sample rate, for a force weight outside its allowed range, and for a stylus actuator with a
+    causal split."""
 
     middle: IdentifiedModel
     """Identified model of the middle band."""
@@ -243,7 +244,8 @@ class BandedEqualizer:
         self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, middle_response: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Predict the acceleration (N, p), m/s², of each band: by the high band's frequency response if there is a high
-        band, because it covers all frequencies; else by each band's model. middle_response: that of the middle model.
+        band, because it is defined at all frequencies; else by each band's model. middle_response: that of the middle
+        model.
         """
         if self.high is not None:
             low_acceleration, middle_acceleration, high_acceleration = (

@@ -162,10 +162,10 @@ def fit_rigid_part(model: IdentifiedModel) -> RigidModel:
 def compute_level_error(
     reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]
 ) -> float | None:
-    """Compute the relative error of the level (root of the power of all axes together) by sixths of an octave, for a
-    band in which people perceive the level of a vibration but not its direction: |L_delivered - L_reference| /
-    |L_reference|, with L (bins,) from the DFT, zero-padded to twice the length. reference, delivered: (n, axes). None
-    where the reference has at most `LEAKAGE_SHARE` of its level in the band."""
+    """Compute the relative error of the level (root of the power of all axes together) in bins of about a sixth of an
+    octave, for a band in which people perceive the level of a vibration but not its direction: |L_delivered -
+    L_reference| / |L_reference|, with L (bins,) from the DFT, zero-padded to twice the length. reference, delivered:
+    (n, axes). None where the reference has at most `LEAKAGE_SHARE` of its level in the band."""
     length = 2 * len(reference)
     lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
     bin_count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))

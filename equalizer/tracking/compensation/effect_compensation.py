@@ -38,10 +38,10 @@ from equalizer.tracking.feedforward.planned_motion import PlannedMotion, integra
 from equalizer.tracking.learning.iteration import find_largest_share
 
 SMOOTHING_SHARE = 0.05
-"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity; for an effect on
-the command, the force below which the correction changes sign smoothly, relative to the rms force. A smaller share
-would let errors of the planned velocity near zero switch the force back and forth; a larger one would compensate too
-little. Chosen by hand."""
+"""Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity (in its describing
+function, to the velocity amplitude); for an effect on the command, the force below which the correction changes sign
+smoothly, relative to the rms force. A smaller share would let errors of the planned velocity near zero switch the force
+back and forth; a larger one would compensate too little. Chosen by hand."""
 
 MIN_SPEED_AMPLITUDE_MPS = 1e-9
 """Least velocity amplitude (m/s) in the identification, assumed for an axis that did not move: keeps the describing
@@ -75,8 +75,8 @@ def compensate(
 
     identified_with_n: amplitude (N) of the sinusoidal forces (sweeps of one axis after the other) with which the model
     was identified on the device with the effects; None = the model does not contain them. cap_n: cap (N) on the norm of
-    the force vector; None = no cap. Raises ValueError for shapes that differ, an amplitude that is not above zero, and
-    an axis that the model does not have.
+    the force vector; None = no cap. Raises ValueError for shapes that differ, an amplitude that is not above zero, an
+    axis that the model does not have, and a command map without an inverse (`invert_command_map`).
     """
     if forces.shape != reference.shape:
         raise ValueError(f"forces of shape {forces.shape} do not match the reference accelerations, {reference.shape}")

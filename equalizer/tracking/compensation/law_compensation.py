@@ -121,7 +121,7 @@ def invert_command_map(law: Law, intended_forces: FloatArray, slip_n: float) -> 
 
     By linear interpolation in a table, whose range is doubled until the map reaches all intended forces. Where the map
     does not reach them (saturation), the command is that of the nearest force in the first range. Raises ValueError
-    where the map decreases somewhere in the first range.
+    where the map decreases or is not finite somewhere in the first range.
     """
     commands, forces = _tabulate_to(law, intended_forces)
     table_commands = np.interp(intended_forces, forces, commands)
@@ -141,7 +141,7 @@ def invert_command_map(law: Law, intended_forces: FloatArray, slip_n: float) -> 
 def _tabulate_to(law: Law, intended_forces: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tabulate commands and forces, (TABLE_SIZE,) each, over the smallest of the doubled ranges in which the map
     reaches the intended forces; over the first range where it reaches them in none. Raises ValueError where the map
-    decreases in the first range."""
+    decreases or is not finite in the first range."""
     first_range = FIRST_RANGE_RATIO * max(float(np.abs(intended_forces).max()), np.finfo(np.float64).tiny)
     tables = (_tabulate(law, first_range * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
     first_table = next(tables)

@@ -61,13 +61,15 @@ class Feedforward(SummaryDisplay):
     forces: Signal
     """(N, m), N."""
     reference: FloatArray
-    """(N, p), m/s²: the part of the reference acceleration within the band, which is played."""
+    """(N, p), m/s²: the part of the reference acceleration within the band (of two models: within all their bands),
+    which is played."""
     predicted: FloatArray
-    """(N, p), m/s²: the model's response to the forces, from rest."""
+    """(N, p), m/s²: the model's response to the forces, from rest; of two models, that of the narrow one."""
     error: float
-    """Rms error of the predicted acceleration in the band, relative to the rms of `reference`."""
+    """Rms error of the predicted acceleration in the band (of two models: of the narrow one), relative to the rms of
+    the reference acceleration in that band."""
     out_of_band_share: float
-    """Rms of the part outside the band, over the rms of the whole reference acceleration."""
+    """Rms of the part that is not in `reference`, over the rms of the whole reference acceleration."""
     peaks: ForcePeaks
     """Largest force and its row, against the cap."""
     loss: TrackingLoss | None = None
@@ -95,7 +97,8 @@ def compute_feedforward_forces(
     Finite-horizon LQR tracking from rest, which equals least squares with the block-Toeplitz matrix of the impulse
     response and a weight on the forces. reference: (N, p), m/s²; settings: None = defaults. Raises ForceLimitError for
     forces above the cap (with `constrain` off), TrackingError where the reference has no content in the band or the cap
-    cannot be kept, ValueError where sample rate, number of channels or unit are not the model's.
+    cannot be kept, or for an invalid weight, ValueError where sample rate, number of channels or unit are not the
+    model's.
     """
     settings = settings or FeedforwardSettings()
     check_reference(model, reference)

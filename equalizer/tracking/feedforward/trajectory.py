@@ -92,8 +92,8 @@ def parse_trajectory(text: str) -> Trajectory:
 
 
 def format_trajectory_csv(trajectory: Trajectory) -> str:
-    """Format a trajectory as CSV text, from which `parse_trajectory` reads the same samples. Raises TableError for NaN
-    or infinite samples."""
+    """Format a trajectory as CSV text, from which `parse_trajectory` reads the same samples, if there are two rows or
+    more. Raises TableError for NaN or infinite samples."""
     samples = trajectory.signal.samples
     if not np.isfinite(samples).all():
         raise TableError((f"a table of {trajectory.kind.name} cannot hold missing or infinite values",))

@@ -1,4 +1,4 @@
-"""Iterative learning control: play forces, measure the response, correct the forces, until the error is noise only.
+"""Iterative learning control: play forces, measure the response, correct the forces, until a `Verdict` ends it.
 
     u <- u + beta L(band(r - y)),        beta = min(beta_0 / (1 + setbacks), 1 - (noise / residual)²)
 
@@ -160,7 +160,7 @@ class IterationState:
 def start_iteration(settings: IterationSettings, initial_forces: FloatArray | None = None) -> IterationState:
     """Make the state before the first play. initial_forces: (N, m), N; None = the model's inverse of the reference
     motion. Raises ValueError where the initial forces exceed the cap, or the reference motion has no part in the
-    band."""
+    band over the judged rows."""
     if settings.level == 0:
         low_hz, high_hz = settings.band_hz
         raise ValueError(

@@ -21,7 +21,7 @@ from equalizer.tracking.lqr.lqr_kernel import simulate
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 OVER_RELAXATION = 1.7
-"""Over-relaxation of ADMM; 1.5 to 1.8 converges fastest (Boyd et al. 2011, section 3.4.3)."""
+"""Over-relaxation of ADMM; 1.5 to 1.8 can improve the convergence (Boyd et al. 2011, section 3.4.3)."""
 ROUNDS_BETWEEN_TUNING = 25
 """Number of iterations between changes of the penalty of ADMM; each change costs a Riccati recursion. Chosen."""
 
@@ -29,7 +29,7 @@ ROUNDS_BETWEEN_TUNING = 25
 @dataclass(frozen=True, slots=True)
 class TrackingLoss:
     """Tracking error and cost without and with the cap. Errors are rms of (predicted - reference) over rms of the
-    reference."""
+    reference; for a reference of zeros, the norm of the predicted acceleration."""
 
     error_free: float
     """Error of the optimal forces free of a cap."""
@@ -42,7 +42,7 @@ class TrackingLoss:
     cost_capped: float
     """Value of the cost for the returned forces."""
     gap: float
-    """Relative duality gap: bound of the relative excess of the cost over the optimum; 0 = optimal."""
+    """Relative duality gap: bound of the excess of the cost over the optimum, relative to the cost; 0 = optimal."""
     rounds: int
     """Iterations of ADMM; 0 where the forces without a cap were under it."""
 

@@ -109,8 +109,8 @@ class TrackingProblem:
 
     @cached_property
     def linear_cost(self) -> FloatArray:
-        """(p, n + m): rows of Q [C D] of the tracked outputs; r' times it is the linear term of the cost in [x, u] for
-        a reference sample r."""
+        """(p, n + m): rows of Q [C D] of the tracked outputs; -2 r' times it is the linear term of the cost in [x, u]
+        for a reference sample r."""
         return copy_read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
 
     def make_state(self, x0: FloatArray | None) -> FloatArray:
@@ -170,8 +170,8 @@ def copy_read_only(values: FloatArray) -> FloatArray:
 
 
 def _require_output_weight(Q: FloatArray) -> FloatArray:
-    """Return a read-only copy of Q. Raises TrackingError unless it is square, finite, symmetric and positive
-    semidefinite (to within rounding, 1e-12)."""
+    """Return a read-only copy of Q. Raises TrackingError unless it is square, finite, symmetric (to within 1e-8) and
+    positive semidefinite (to within 1e-12 of its largest entry)."""
     Q = copy_read_only(Q)
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all() or not np.allclose(Q, Q.T, rtol=1e-12):
         raise TrackingError("output_weight must be a square symmetric matrix of finite numbers")

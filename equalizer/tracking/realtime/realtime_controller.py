@@ -82,7 +82,8 @@ class RealtimeController:
         """Simulate the tracking of a stream from rest: the bands of the stream, and the forces for the middle band.
 
         reference: (N, p), m/s². Row k of the forces is played at the tick at which row k of `reference` arrives; it
-        tracks an earlier row, by the preview less one sample. The force limit `cap_n` is not applied.
+        tracks an earlier row, by the preview less one sample. The force limit `cap_n` is not applied. The final state
+        is that after the end of the delayed stream: by this delay later than the last row of the forces.
         """
         bands = self.split.split(reference)
         delay_rows = len(self.tracker) - 1
@@ -100,8 +101,8 @@ def make_realtime_controller(
     """Make both controllers of a model. transient: accelerations (N, p), m/s², before rotation; None =
     `make_default_transient`. Rows of zeros are appended to it, during which the device comes to rest.
 
-    Raises TrackingError for a model without states or without stationary gains, a negative weight, and a transient
-    whose number of columns is not the number of the model's outputs.
+    Raises TrackingError for a model without states or without stationary gains, a weight that is negative or not
+    finite, and a transient that is not finite or has another number of columns than the model has outputs.
     """
     settings = settings or RealtimeSettings()
     if not model.order:

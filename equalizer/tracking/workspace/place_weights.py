@@ -1,10 +1,10 @@
 """Interpolation weights of scattered points at a place between them: for models identified at points of the workspace.
 
 Two sets of weights are computed: barycentric coordinates on the Delaunay triangulation (piecewise linear, never
-negative), used by `blended_inverse` for forces, and cardinal functions of multiquadric radial basis functions (smooth),
-used by `modal_interpolation` for the parameters of resonances. A place outside the convex hull of the points is
-replaced by the nearest place inside. Also called by `interpolation_choice` and
-`study.workflows.equalizer.playback_models`, which check how far a place lies outside.
+negative), used by `blended_inverse` for forces and by `modal_interpolation` for smooth remainders, and cardinal
+functions of multiquadric radial basis functions (smooth), used by `modal_interpolation` for the parameters of
+resonances. A place outside the convex hull of the points is replaced by the nearest place inside. Also called by
+`interpolation_choice` and `study.workflows.equalizer.playback_models`, which check how far a place lies outside.
 """
 
 from dataclasses import dataclass

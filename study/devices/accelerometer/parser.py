@@ -105,7 +105,7 @@ class _CandidatePacket(NamedTuple):
 
 class PacketParser:
     """Parser of a board's byte stream: `feed` takes the bytes as they arrive, and returns the samples of the packets
-    that are accepted. Bytes of other packets are skipped and counted as spoiled."""
+    that are accepted. Other bytes are skipped and counted as spoiled."""
 
     def __init__(self) -> None:
         self._remainder: Bytes = np.zeros(0, dtype=np.uint8)
@@ -151,9 +151,9 @@ class PacketParser:
 
     def _choose_packets(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64]]:
         """Accept packets one by one, and keep the doubtful ones. Returns the accepted packets, (m,), and (m,): 1 where
-        the firmware restarted before the packet, else 0. An expected packet may share bytes with its predecessor: if
-        the last bytes of the predecessor were lost and the next packet begins with the same values, its checksum is
-        still correct."""
+        another clock begins with the packet (a restart, or a silence of `LONGEST_SILENCE_US`), else 0. An expected
+        packet may share bytes with its predecessor: if the last bytes of the predecessor were lost and the next packet
+        begins with the same values, its checksum is still correct."""
         accepted_blocks, restarted, last_packet = [packets[:0]], [0] * 0, self._last_packet
         for packet_index, start in enumerate(starts.tolist()):
             candidate = _CandidatePacket(packets[packet_index : packet_index + 1].copy(), start)
@@ -254,7 +254,7 @@ def _compute_increments(last_packet: Packets, packets: Packets) -> tuple[npt.NDA
 
 def _can_follow(last_packet: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
     """(n,): whether each packet may be a later one of the same clock as its predecessor. A time stamp may be late by
-    less than a period, so that for consecutive numbers only the order of the times is tested."""
+    less than a period, so that for consecutive numbers only the order of the times and the silence are tested."""
     steps, steps_us = _compute_increments(last_packet, packets)
     return (
         (steps > 0) & (steps < 2**15) & (steps_us > SHORTEST_PERIOD_US * (steps - 1)) & (steps_us < LONGEST_SILENCE_US)

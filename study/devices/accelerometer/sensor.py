@@ -148,7 +148,7 @@ def make_silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
 
 
 def _make_sensor_facts(counts: PacketCounts, resampled: FloatArray, clock_fit: ClockFit | None) -> SensorFacts:
-    """Make the facts for the log. counts: of the source; resampled: accelerations at the ticks, (k, 3), NaN where
+    """Make the facts for the log. counts: of the interval; resampled: accelerations at the ticks, (k, 3), NaN where
     unknown; clock_fit: fit of the sensor's clock, None where none was possible."""
     return SensorFacts(
         packets=counts.packets,

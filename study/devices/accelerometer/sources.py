@@ -1,8 +1,8 @@
 """Sources of accelerometer samples by the name of the port: a board on a serial line, or a data-acquisition device.
 
 `ni:Dev1` reads ai0 to ai2 of a National Instruments device, `labjack:ANY` AIN0 to AIN2 of a LabJack T-series device (a
-serial number in place of ANY selects a device), in volts. The time of a sample is its number divided by the sample
-rate. **Tested with fakes of the vendors' packages only**, never with a driver or a device. Called by
+serial number or name in place of ANY selects a device), in volts. The time of a sample is its number divided by the
+sample rate. **Tested with fakes of the vendors' packages only**, never with a driver or a device. Called by
 `study.devices.force_dimension.lab` and by `six_positions`.
 """
 
@@ -22,8 +22,8 @@ NI_PREFIX, LABJACK_PREFIX = "ni:", "labjack:"
 """Prefixes of a port that names a data-acquisition device instead of a serial line."""
 
 SCAN_HZ = 4000.0
-"""Requested sample rate of each channel (Hz): twice the rate of 2 kHz that the sensor needs at least
-(`sensor_findings.MIN_RATE_HZ`), within the range of both vendors' devices."""
+"""Requested sample rate of each channel (Hz): about twice the least accepted rate (`sensor_findings.MIN_RATE_HZ`),
+within the range of both vendors' devices."""
 READ_INTERVAL_S = 0.01
 """Interval between two reads (s); the scans of an interval are read together. Chosen: short against the age at which a
 sample counts as missing (`newest_sample.MAX_AGE_S`)."""

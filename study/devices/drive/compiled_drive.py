@@ -35,11 +35,13 @@ from study.devices.rig import READING_SIZE
     # Readings of this call so far, of which `readings` holds the newest; size of the array.
     READING_COUNT, LOOP_STATE_SIZE,
 ) = range(13)  # fmt: skip
-"""Cells of `loop_state`. STARTED_S to LONGEST_GAP_S are shared with `realtime_drive`."""
+"""Cells of `loop_state`. THREAD_NEEDED to LONGEST_GAP_S are shared with `realtime_drive`, the other flags with
+`stepped_runner`."""
 
 RUNNING, FINISHED, GAP = 0, -1, -2
 """Return codes; a code above zero is the driver's own error. RUNNING: more ticks may follow. FINISHED: that tick was
-the last, or the rig is gone. GAP: no tick was run, because the previous one was longer ago than LONGEST_GAP_S."""
+the last, no force acts any more, or the rig is gone. GAP: no tick was run, because the previous one was longer ago than
+LONGEST_GAP_S."""
 
 SPIN_S = 0.00015
 """Time (s) before a tick at which the sleep ends and polling of the clock begins, because a sleep ends late. Chosen: a

@@ -71,8 +71,8 @@ class GrantedRights:
 
 
 class _SettingsUsers:
-    """Reference counter for settings of the whole program (switch interval, memory lock, timer): the first user changes
-    them, the last to end restores them."""
+    """Reference counter for settings of the whole program (switch interval, memory lock, timer): users change them, the
+    last to end restores them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -1,8 +1,8 @@
 """Runner of a device that is driven tick by tick (`Rig`), with timeouts for a driver that hangs or fails. Made by
 `study.devices.safe`; called by the drives (`realtime_drive`, `virtual_drive`).
 
-Ticks of rigs with compiled input and output run in compiled code (`compiled_drive`), others from Python, with equal
-results.
+Ticks of rigs with compiled input and output run in compiled code (`compiled_drive`) where it can read the clock, others
+from Python, with equal results.
 
 A call into a driver cannot be interrupted. A caller that stops waiting for it therefore marks the rig as gone
 (RIG_GONE) and lets a separate thread write zero force. When the call of the loop returns later, the loop writes zero
@@ -129,8 +129,8 @@ class SteppedRunner:
             self._last_reading = None
 
     def run(self, ticks: int) -> None:
-        """Run at most this many ticks, in compiled code where the rig has compiled functions (`CompiledIo`), else
-        from Python; fewer if the stimulus ends within them. Never raises for a failing rig."""
+        """Run at most this many ticks, in compiled code where that is possible (see the module), else from Python;
+        fewer if the stimulus ends within them. Never raises for a failing rig."""
         if self._is_rig_gone:
             self._governor.abandon(Fault.LOST)
             return

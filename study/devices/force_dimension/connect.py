@@ -75,7 +75,8 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:
     """Enable forces up to cap_n (N), starting with zero. Returns the watchdog's timeout (s): how long the device holds
-    a force without commands; 0: without limit. effector_mass_kg: for the gravity compensation, None = the model's.
+    a force without commands; 0: without limit. effector_mass_kg: for the gravity compensation, None = the model's or,
+    where that is None, the library's.
 
     Raises `DeviceError` for a device without power or calibration, or that does not switch its forces on, and for a
     failed call of the library. The caller has to disconnect it then.
@@ -139,7 +140,7 @@ def _make_missing_device_error(
 ) -> DeviceError:
     """Error where no device of the model could be opened, with the most probable cause. other_devices: the vendor's
     name of each other device found, and the name that `--device` takes, if any; failures: of devices that did not
-    open."""
+    open or answer."""
     title = f"There is no {model.name}"
     if any(failure.code == DEVICE_IN_USE for failure in failures):
         return DeviceError(title, "A device is there, and another program has it.", "Close the other program.")

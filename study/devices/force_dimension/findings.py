@@ -2,7 +2,7 @@
 --calibrate`). Commands only zero forces.
 
 In this order: library, USB, real-time rights, accelerometer, connection, power, calibration, watchdog, masses, gravity
-compensation. Each finding that is not fine states a remedy. Called by `study.devices.opening`.
+compensation, velocity. Each finding that is not fine states a remedy. Called by `study.devices.opening`.
 """
 
 import contextlib

@@ -82,8 +82,8 @@ class Status:
 
 
 class Handle:
-    """An open device: the vendor's functions with values in place of pointers. Every method but `disconnect` raises
-    `LibraryError` where the library reports a failure."""
+    """An open device: the vendor's functions with values in place of pointers. Methods raise `LibraryError` where the
+    library reports a failure, except `disconnect`, `read_system_name` and, for a missing watchdog, `arm_watchdog`."""
 
     def __init__(self, library: Library, number: int) -> None:
         self.library = library

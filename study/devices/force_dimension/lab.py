@@ -1,5 +1,5 @@
-"""The laboratory's settings of its device (masses, accelerometer, onset pulse): reads and writes a TOML file with only
-optional keys.
+"""The laboratory's settings of its device (masses, accelerometer, onset pulse): reads and writes a TOML file whose keys
+and tables are all optional at the top level.
 
 Read at every opening of a real device; `hapteq doctor` writes the result of a sensor calibration into it. The keys are
 described in docs/hardware.md.
@@ -62,7 +62,7 @@ class SensorSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class LabSettings:
-    """Content of the lab's settings file; every key is optional."""
+    """Content of the lab's settings file; every key of this class is optional."""
 
     effector_mass_kg: float | None = Field(default=None, gt=0, le=2)
     """Mass for the gravity compensation (kg): handle and sensor. None: that of `DeviceModel.effector_mass_kg`."""
@@ -105,8 +105,8 @@ def read_lab_settings() -> LabSettings:
 
 def write_sensor_table(sensor_table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
-    previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written, or the new
-    content is not valid."""
+    previous file, if not empty, is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or
+    written, or the new content is not valid."""
     read_lab_settings()
     path = locate_lab_file()
     try:

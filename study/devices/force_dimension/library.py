@@ -1,9 +1,9 @@
 """Bindings of Force Dimension's DHD functions by ctypes: loading, signatures, version, and error handling.
 
-A negative return value becomes a `LibraryError` with the library's own text. The library keeps its last error per
-thread, so that the text must be fetched at once, in the thread whose call failed. Loaded by `connect.load_library`;
-`connect`, `handle` and `linkage` call the functions, `rig` passes the addresses of some to its compiled ticks. Names,
-types and codes are those of the vendor's `dhdc.h`."""
+A return value that is no success becomes a `LibraryError` with the library's own text, if it gives one. The library
+keeps its last error per thread, so that the text must be fetched at once, in the thread whose call failed. Loaded by
+`connect.load_library`; `connect`, `handle` and `linkage` call the functions, `rig` passes the addresses of some to its
+compiled ticks. Names, types and codes are those of the vendor's `dhdc.h`."""
 
 import ctypes
 from collections.abc import Callable
@@ -65,8 +65,8 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdSetWatchdog": (c_int, (c_ubyte, _ID)),
     "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), _ID)),
 }
-"""Types of result and arguments of each required function. The device's ID (`char`) is the last argument; C has no
-default for it."""
+"""Types of result and arguments of each required function. The device's ID (`char`), where there is one, is the last
+argument; C has no default for it."""
 
 _THREE_NUMBERS, _THREE_COUNTS = (_DOUBLE,) * 3, (c_int,) * 3
 

@@ -2,8 +2,8 @@
 
 For a position of the handle the library gives encoder counts, joint angles q, Jacobian J = dx/dq, inertia matrix and
 gravity torques tau; the force that holds the weight is pinv(J^T) tau. The device gets no force and stays braked. The
-actual position of the handle is used only in `check_frame`. Opened by `study.devices.opening.open_linkage`, for
-`study.workflows.recording.calibrate_linkage`.
+actual position of the handle is used only in `check_frame`, the present angles of a wrist for the inertia. Opened by
+`study.devices.opening.open_linkage`, for `study.workflows.recording.calibrate_linkage`.
 """
 
 import contextlib
@@ -54,7 +54,8 @@ class VendorLinkage:
         return self._call_library(self._read_linkage, position_m)
 
     def compute_angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """Compute the joint angles (3,), rad, at a position (3,), m; None out of reach. Raises `DeviceError`."""
+        """Compute the joint angles (3,), rad, at a position (3,), m; None where the library reports it as out of
+        reach. Raises `DeviceError`."""
         return self._call_library(
             lambda handle_position_m: self._compute_joint_angles(self._compute_encoder_counts(handle_position_m)),
             position_m,
@@ -63,7 +64,8 @@ class VendorLinkage:
     def check_frame(self) -> None:
         """Check that the linkage functions use the axes of the reported positions: the position of the reported joint
         angles must agree within `POSITION_TOLERANCE_M` with the reported position. Raises `DeviceError` where they
-        differ, or the handle is out of reach of the model, and `LibraryError` where the joint angles cannot be read."""
+        differ, the position cannot be read, or the handle is out of reach of the model, and `LibraryError` where the
+        joint angles cannot be read."""
         try:
             position_m = np.array(self._handle.read_position_m())
         except LibraryError as error:

@@ -291,7 +291,7 @@ def check_status(calls: Addresses, cells: FloatArray) -> int:
 @njit_inline
 def check_zero_force(calls: Addresses, cells: FloatArray) -> int:
     """Check the reported force after a zero force that was sent while nothing is played. Returns 0, or an error code
-    where the device has reported a force `MISMATCH_COUNT` times in a row."""
+    where the device has reported more than `MISMATCH_N` along x and y `MISMATCH_COUNT` times in a row."""
     address = cells.ctypes.data + 8 * REPORTED_AT_REST
     arguments = (np.int64(address), np.int64(address + 8), np.int64(address + 16), np.int32(cells[DEVICE_NUMBER]))
     is_read = is_success(call_int(calls[GET_FORCE], arguments))

@@ -78,7 +78,7 @@ class ForceDimensionRig:
         self._cells[loop_cells.DEVICE_NUMBER] = handle.number
         self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
         self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
-        # The time of the last zero is unknown, so that the first force checks the status of the device.
+        # The time of the last zero is unknown: with a watchdog, the first force then checks the status of the device.
         self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = -math.inf, 1.0
         sensor_rows: FloatArray | None = getattr(accelerometer, "samples", None)
         self._samples: FloatArray = np.zeros((1, 1)) if sensor_rows is None else sensor_rows

@@ -1,8 +1,9 @@
-"""Test of the device's watchdog at every opening: the commands are paused, and the device must switch its force off
-in time.
+"""Test of the device's watchdog at every opening: the commands are paused, and the device must report its force as off.
 
 The commanded force is zero throughout, so that the test is safe even if the watchdog fails. It passes if the device
-reports its forces as off, its brakes as on, and the watchdog as the cause. Called by `open_rig` and `findings`.
+reports its forces as off, its brakes as on, and the watchdog as the cause. It fails where a status that is read after
+the timeout and `MARGIN_S` still reports forces as on; a late release before that reading is not noticed. Called by
+`open_rig` and `findings`.
 """
 
 from collections.abc import Callable
@@ -30,7 +31,8 @@ def check_watchdog(
     (s) from the last command to this report.
 
     watchdog_timeout_s: timeout of the watchdog (s), 0 without one; now_s and sleep: clock. Raises `DeviceError` where
-    there is no watchdog, or the force stays on, goes off for another cause or without the brakes, and `LibraryError`.
+    there is no watchdog, or the force does not stay on before the pause, stays on after it, or goes off for another
+    cause or without the brakes, and `LibraryError`.
     """
     if watchdog_timeout_s <= 0:
         raise _make_watchdog_error("It has no watchdog, or none that can be set.")
@@ -69,7 +71,8 @@ def _check_release_cause(status: Status) -> None:
 
 
 def _make_watchdog_error(reason: str) -> DeviceError:
-    """Make the error for a watchdog that failed the test. reason: a sentence."""
+    """Make the error for a watchdog that failed the test. reason: a sentence; the text adds to each that the device
+    would hold its last force, which not every reason shows."""
     return DeviceError(
         "The device's watchdog failed its test",
         f"{reason} If this program died, the device would hold its last force.",

@@ -9,7 +9,8 @@ Steps of `tick`, in this order:
    number, is ever written.
 
 Machine code that is cached on disk is invalidated when any of these files changes: see `compiling`. The entry points
-`tick`, `publish` and `record_missed_ticks` are called by `governor` and by the loops of `study.devices.drive`.
+`tick`, `publish` and `record_missed_ticks` are called by the loops of `study.devices.drive`, the last also by
+`governor`.
 """
 
 import math
@@ -44,7 +45,7 @@ IMPLAUSIBLE_STIMULUS_N = 1e6
 force."""
 
 MIN_ELAPSED_TICKS = 1e-3
-"""Smallest interval between two readings (ticks), used where a time stamp did not advance or is not a number.
+"""Smallest interval between two readings (ticks), used where their time stamps are closer together or do not advance.
 Chosen."""
 
 VECTOR_TYPE, MATRIX_TYPE = types.float64[::1], types.float64[:, ::1]

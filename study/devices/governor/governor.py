@@ -39,8 +39,8 @@ class Governor:
     settings, state: cells by the indices of `cells`; loop: the stimulus (n, 3), N; buffer: the recording ring (rows,
     ROW_SIZE); ring: the telemetry ring (rows, RING_WIDTH); force: the command of the last tick (3,), N.
 
-    Requests (`request_*`, `restart_watchdog`) and queries may be made from any thread at any time, `begin_*` and
-    `copy_rows` only while nothing moves.
+    Requests (`request_*`, `restart_watchdog`) and queries may be made from any thread at any time, `begin_*`,
+    `copy_rows` and `compute_row_times` only while nothing moves.
     """
 
     def __init__(self, info: DeviceInfo, settings: DeviceSettings, ring: FloatArray | None = None) -> None:
@@ -198,7 +198,7 @@ class Governor:
 
     @property
     def steady(self) -> FloatArray:
-        """The repeated part of the stimulus, (n, 3), N, without its onset."""
+        """The repeated part of a held stimulus, (n, 3), N, without its onset; after `begin_play` all commands."""
         return self.loop[int(self.state[cells.ONSET_TICKS]) :]
 
     def _reset_run(self, stimulus_n: FloatArray, row_count: int) -> None:
@@ -250,7 +250,7 @@ def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
 
 def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
     """Write the bounds of plausible position readings (`protocols.definition.plausibility`) into the array `packed`,
-    converted to ticks."""
+    with times in ticks and the speed in m per tick, and the coefficients of the low-passes of these checks."""
     packed[cells.WORKSPACE_RADIUS] = bounds.workspace_m
     packed[cells.LONGEST_JUMP] = bounds.longest_jump_m
     packed[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz

@@ -1,9 +1,10 @@
-"""Plausibility of position readings at every tick: workspace, step length, acceleration, and stale (frozen) readings.
+"""Plausibility of position readings: workspace, step length, acceleration, and stale (frozen) readings.
 
 Spring and damper turn a false position into force, so that an implausible reading releases the force. A reading is
 stale if it does not change although the force must have moved even a firmly gripped handle, which is simulated as
 m a + b v + k x = F after dry friction. Bounds and their reasons: `protocols.definition.plausibility`. A false reading
-within them causes at most the feedback's force limit. Called by `govern` at every tick.
+within them causes at most the feedback's force limit. Called by `govern` at every tick of a stimulus and of its
+fade-out.
 """
 
 import math
@@ -120,7 +121,7 @@ def _update_expected_motion(state: FloatArray, settings: FloatArray) -> None:
 @njit_inline
 def _update_reference(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Make the reading the new reference, and restart the expected range, if it differs by half the resolution or more
-    from the reference, the last reading that had changed, or the reference is NaN. Returns whether this is so."""
+    from the reference, the last reading that had changed (at first the origin). Returns whether this is so."""
     distance_m = compute_norm(
         reading[0] - state[REFERENCE_POSITION],
         reading[1] - state[REFERENCE_POSITION + 1],

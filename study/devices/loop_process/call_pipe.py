@@ -24,8 +24,9 @@ else:
     PipeEnd = Connection
 
 PIPE_NAMES = ("work", "signs", "look", "stop", "close")
-"""Names of the pipes, one per group of methods: `hold`, `release` and `play`; `keep_alive`, `fault` and `health`;
-`look`; `stop`; `close`. So neither a long call nor a reading that hangs delays a keep-alive or a stop."""
+"""Names of the pipes, one per group of methods: `hold`, `release` and `play`, after the first message (`open`);
+`keep_alive`, `fault` and `health`; `look`; `stop`; `close`. So neither a long call nor a reading that hangs delays a
+keep-alive or a stop."""
 
 VALUE, ERROR, PROGRESS = range(3)
 """Kinds of messages from the process: result of the method, exception that it raised, share done (0 to 1). After
@@ -41,8 +42,8 @@ Chosen."""
 
 
 class LoopGoneError(Exception):
-    """The loop's process ended, or hangs (`hangs`: it did not answer within the timeout). reason: a clause whose
-    subject is the process."""
+    """The loop's process ended, was given up, hangs (`hangs`: it did not answer within the timeout), or sent an answer
+    that cannot be read. reason: a clause on the process."""
 
     def __init__(self, reason: str, hangs: bool) -> None:
         super().__init__(reason)
@@ -68,7 +69,7 @@ class Call:
 
     def receive(self, message: tuple[int, Any]) -> None:
         """Store a message of the process: progress, or the answer that ends the call. Called by the thread of the
-        pipe."""
+        pipe, or by `queue_call` once that has ended."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
         else:

@@ -194,7 +194,7 @@ class RemoteDevice:
             self._mark_lost(loop_error)
 
     def close(self) -> None:
-        """Close device and process, within the fade and twice `CLOSE_TIMEOUT_S`; a process that runs on is killed."""
+        """Close device and process, within about the fade and twice `CLOSE_TIMEOUT_S`; else the process is killed."""
         if self._ended:
             return
         self._closing = True
@@ -224,7 +224,7 @@ class RemoteDevice:
                 continue
 
     def _get_timeout_s(self, recorded_s: float) -> float:
-        """Return the timeout (s) of a call that returns a recording of this length (s; 0: none) after a fade."""
+        """Return the timeout (s) of a call that ends with a fade, with time to send a recording of this length (s)."""
         return self._fade_s + ANSWER_TIMEOUT_S + SENT_S_PER_RECORDED_S * recorded_s
 
     def _call_remote(self, pipe: CallPipe, name: str, *arguments: Any, timeout_s: float | None = None) -> Any:

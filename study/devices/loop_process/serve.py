@@ -150,7 +150,8 @@ class CallerWatchdog:
         """Time (s) that the main thread may take to end the process, from the moment at which `must_exit` is True."""
 
     def must_exit(self) -> bool:
-        """Whether a SIGTERM was received, or the process that started this one is gone."""
+        """Whether a SIGTERM was received, or the process that started this one is gone (not recognised on Windows,
+        where `os.getppid` does not change)."""
         return bool(self._received_signals) or os.getppid() != self._caller_pid
 
     def watch(self) -> None:
@@ -214,7 +215,8 @@ def _call_function(function: Callable[..., Any], arguments: tuple[Any, ...]) -> 
 
 
 def _make_sendable(error: BaseException) -> Exception:
-    """Return the exception itself if it can be pickled and restored, else a RuntimeError with its type and text."""
+    """Return the exception itself if it is an `Exception` that can be pickled and restored, else a RuntimeError with
+    its type and text."""
     if isinstance(error, Exception):
         with contextlib.suppress(Exception):
             restored_error = pickle.loads(pickle.dumps(error))

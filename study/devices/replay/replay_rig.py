@@ -2,8 +2,9 @@
 
 Before each stimulus, the stretch is searched whose recorded excitation is nearest to the stimulus (least squares over
 the whole stretch), and its motion is replayed: exactly for commands that were recorded, else that of the nearest ones.
-A stimulus that is repeated repeats its stretch, with a cross-fade from its end to its beginning. Between stimuli the
-handle is at rest, and its sensor has noise. Made by `study.devices.rigs_by_name` for the device `replay:FILE`.
+A stimulus that is repeated repeats its stretch, with a cross-fade from its end to its beginning where the recording is
+longer than the stretch. Between stimuli the handle is at rest, and its sensor has noise. Made by
+`study.devices.rigs_by_name` for the device `replay:FILE`.
 """
 
 from pathlib import Path

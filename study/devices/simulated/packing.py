@@ -32,7 +32,8 @@ def compute_isotropic_depth_m(linkage: Linkage) -> float:
 
 def pack_parameters(parameters: Omega3Parameters, has_hand: bool, place_m: Vector) -> FloatArray:
     """Pack the parameters into an array (layout.PARAMETERS_SIZE,). has_hand: whether a hand holds the handle. place_m:
-    position at which the hand's spring is relaxed. Raises ValueError as `compute_isotropic_depth_m`."""
+    position at which the hand's spring is relaxed. Without a given depth, raises ValueError as
+    `compute_isotropic_depth_m`."""
     packed = np.zeros(layout.PARAMETERS_SIZE)
     _pack_linkage(packed, parameters)
     _pack_drives(packed, parameters)
@@ -58,8 +59,9 @@ def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
 
 def compute_effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float:
     """Compute the effective mass at the origin without a hand, averaged over directions: m + I trace(J^T J) / 3, with
-    the mass m of handle and forearms, the inertia I of an arm with its drive, and the Jacobian J from velocity to joint
-    speeds. At the isotropic point it is the same in all directions."""
+    the mass m of the handle and a third of each forearm, the inertia I of an arm with its drive and the rest of its
+    forearm, and the Jacobian J from velocity to joint speeds. At the isotropic point it is the same in all
+    directions."""
     jacobian = np.empty((3, 3))
     solve_pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses

@@ -109,7 +109,7 @@ def is_challenge_loaded() -> bool:
     """Whether the challenge package has been imported. A blocked import leaves None in sys.modules, which does not
     count."""
     return any(
-        name.split(".")[:2] == CHALLENGE_PACKAGE.split(".")
+        f"{name}.".startswith(f"{CHALLENGE_PACKAGE}.")
         for name, module in vars(sys)["modules"].items()
         if module is not None
     )

@@ -1,8 +1,8 @@
 """Run the diagnosis of a bank's unanswered cases in worker processes (`answer_cases`), each for many cases. Called by
 `prove`, `follow_up`, `run_controls`, `laws.prove_laws` and, for real recordings, `study.evaluation.real.inject_real`.
 
-The processes run on this computer, or on the workers of an executor. A case is tried `MAX_ATTEMPTS` times, with a new
-process where the last died or exceeded `CASE_TIMEOUT_S`; then it counts as failed.
+The processes run on this computer, or on the workers of an executor. A case is tried up to `MAX_ATTEMPTS` times, with a
+new process where the last died or exceeded `CASE_TIMEOUT_S`; then it counts as failed.
 """
 
 import json
@@ -143,7 +143,8 @@ def diagnose_cases(
     folder: ProofFolder, case_names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]
 ) -> None:
     """Diagnose the cases `case_names` that have no answer yet; blocks until done. `on_answered(case name)` is called in
-    this thread after each case, also after a failed one. Raises StudyError if all worker threads ended early."""
+    this thread after each case, also after a failed one. Raises StudyError if all worker threads ended early; with an
+    executor, its exceptions."""
     pending_names, answered_names = SimpleQueue[str](), SimpleQueue[str]()
     unanswered_names = [case_name for case_name in case_names if not is_answered(folder.open / case_name)]
     if isinstance(workers, Executor):
@@ -267,7 +268,7 @@ def _write_failed_answer(case_folder: Path) -> None:
 
 def delete_answered_recordings(case_folder: Path) -> None:
     """Delete the recordings of an answered case to save disk space, and ignore errors; nothing for an unanswered one.
-    The label has their hash, and the seed reproduces them."""
+    The label, where there is one, has their hash, and the seed reproduces them."""
     if is_answered(case_folder):
         for path in (case_folder / RECORDING_FILE, *case_folder.glob(FURTHER_RECORDING_FILE.format("*"))):
             with suppress(OSError):

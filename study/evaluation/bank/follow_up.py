@@ -101,7 +101,7 @@ def _seal_follow_up_cases(
         model = read_mechanical_model(first_folder / MODEL_FILE)
         menu = list_experiments(model, RATE_HZ, proposal["axis"], proposal["level"])
         best_words = proposal["best"]
-        # A single text in answers of older versions, None without a proposed experiment.
+        # A list; in answers of older versions a single text, or None without a proposed experiment.
         proposed_words = [best_words] if isinstance(best_words, str) else best_words or ()
         proposed_experiments = [experiment for experiment in menu if experiment.words in proposed_words]
         random_order = np.random.default_rng([plan.seed, undecided_case.number, NOISE_SEED]).permutation(len(menu))

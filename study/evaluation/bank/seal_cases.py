@@ -1,5 +1,6 @@
 """Draw the cases of a bank and write them: open inputs for the diagnosis, and sealed labels with the truth. Called by
-`prove` and `follow_up`; `laws.seal_laws` and `study.evaluation.real.inject_real` seal other cases by the same steps.
+`prove` and `follow_up`; `laws.seal_laws` and `study.evaluation.real.inject_real` seal other cases by the same steps,
+`laws.prove_laws` reads their names.
 
 A seal is a commitment by hash: the SHA-256 of every label is written, and can be published, before any case is
 diagnosed, so that truth and answers cannot be changed to suit each other. Labels hold a random salt; without it, the
@@ -49,7 +50,7 @@ class BankPlan:
     cases: int
     """Number of cases; they are numbered from 0."""
     brief: bool = False
-    """One axis and short periods: for tests, and for a quick try."""
+    """Short periods (`draw_case_plan`, `draw_law`): for tests, and for a quick try."""
 
 
 def list_drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
@@ -123,8 +124,8 @@ def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -
 
 
 def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str, Any]:
-    """Make the label of a case: its draw, the truth, and the hashes of its files. Without the random salt, the content
-    could be guessed from the hash, because there are few effects."""
+    """Make the label of a case: its draw, the truth, and the hashes of recording and model. Without the random salt,
+    the content could be guessed from the hash, because there are few effects."""
     draw_fields = asdict(case_draw)
     return {
         "name": case_folder.name,

@@ -1,8 +1,8 @@
-"""Control inputs: recordings and models altered such that the correct answer changes in a known way, or not at all.
+"""Control inputs: recordings, models or hypotheses such that the correct answer is known, or how it changes.
 
-Negative controls (shuffled, silent, model of another device) must not be explained by an effect. Symmetry controls
-(axes exchanged, signs mirrored, names changed) must give the corresponding answer. The claims are judged in
-`analysis.evaluation.blind_test.control_claims`. Called by `study.evaluation.bank.run_controls`.
+Negative controls (shuffled, silent, model of another device, wrong hypothesis) must not be explained by an effect.
+Symmetry controls (axes exchanged, signs mirrored, names changed) must give the corresponding answer. The claims are
+judged in `analysis.evaluation.blind_test.control_claims`. Called by `study.evaluation.bank.run_controls`.
 """
 
 from collections.abc import Callable

@@ -5,7 +5,8 @@ outside the catalogue, and four where the diagnosis may not name the true effect
 nuisance effects, and five come from a second physics engine. The order within a block is random. All counts
 and shares are chosen. Called by `study.evaluation.bank.seal_cases`; `laws.draw_law` uses two constants.
 
-The random streams of a bank's seed have the keys 1 (order of a block), 2 (a case) and 3 (order of the effects).
+The random streams of a bank's seed have the keys 1 (order of a block), 2 (a case) and 3 (order of the effects, and
+first strength of each).
 """
 
 from dataclasses import dataclass
@@ -43,7 +44,8 @@ GOLDEN_STEP = 0.5 * (5**0.5 - 1)
 """Step between the successive strengths of an effect, modulo 1: multiples of the golden ratio 0.618 fill a range
 evenly."""
 AXIS_COUNT_SHARES = (0.72, 0.14)
-"""Fractions of the cases with one and with two driven axes; the others have three."""
+"""Fractions of the cases with one and with two driven axes; the others have three, as have all with an effect of
+`THREE_AXIS_EFFECTS`."""
 STEPS_PER_SAMPLE = 80
 """Integration steps per sample, so many that a diagnosis cannot detect the integration error."""
 THREE_AXIS_EFFECTS = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes", "extra_mode")

@@ -1,8 +1,8 @@
 """Draw a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
 
 Steps: draw bench and excitation, add nuisance effects (`nuisance_effects`), draw and build in the concealed effects,
-simulate and measure, make the model that a laboratory would have (`nominal_models`). Called by `draw_bank` and
-`controls`; the other simulations of this folder use its parts."""
+simulate and measure, make the model that a laboratory would have (`nominal_models`). Called by `draw_bank`,
+`controls` and `laws.draw_law`; the other simulations of this folder use its parts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -62,7 +62,8 @@ noise seed."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A recording with a model that lacks some physics, and the truth, which is empty where nothing is concealed."""
+    """A recording with a model that lacks some physics, and the truth, which is empty where no effect is concealed (a
+    concealed law has a label of its own, `laws.draw_law.LawCase`)."""
 
     recording: Recording
     model: MechanicalModel
@@ -86,9 +87,9 @@ def draw_case(
     name: str = "",
     settings: CaseSettings = DEFAULT_SETTINGS,
 ) -> Case:
-    """Draw a case. effects: names from EFFECTS or DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, a
-    single value for all or a value each; None draws it uniformly. name: of the device; empty for one with the seed. The
-    same arguments give the same case.
+    """Draw a case. effects: names from EFFECTS or DECOYS; none: only nuisance effects are missing. strength: 0
+    (weakest) to 1, a single value for all or a value each; None draws it uniformly. name: of the device; empty for one
+    with the seed. The same arguments give the same case.
 
     Raises ValueError for an unknown name, a strength outside 0..1, a wrong number of strengths, or a hand with a
     re-tuned model, which would absorb the hand into the device.

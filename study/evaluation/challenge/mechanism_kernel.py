@@ -71,7 +71,7 @@ class Motion(NamedTuple):
     velocity: FloatArray
     """m/s, extrapolated by half a step to the time of the position."""
     law_force: FloatArray
-    """N, force of the laws (`law_kernel`) alone, at the start of the sample."""
+    """N, force of the laws (`law_kernel`) alone, under the drive force of the integration step that begins there."""
 
 
 @njit(cache=True, nogil=True)

@@ -3,8 +3,8 @@
 Calibrated model: mass, damping and stiffness of the bench without the effect, at each of the driven axes, with
 independent normal errors whose standard deviation is the stated tolerance (a few per cent). Re-tuned model: these
 parameters are fitted by `retune` to the response of the true device at 1.5 N, so that they absorb as much of the
-concealed effect as they can; the stated tolerances are wide. Off-diagonal elements and modes are exact in both. Called
-by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`.
+concealed effect as they can; the stated tolerances are wide. Off-diagonal elements and modes are exact in both, but for
+rounding. Called by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`.
 """
 
 from dataclasses import replace
@@ -53,7 +53,7 @@ def retune(
     """Fit the diagonals of mass, damping and stiffness at these axes to the response to the multisines at 1.5 N;
     returns the fitted bench and `RETUNED_TOLERANCE`. response: (samples, 3), m/s^2; its residuals are divided by the
     sensor noise. Gauss-Newton with forward differences, at most `MAX_ITERATIONS` steps, until every change is below a
-    twentieth of its difference step (chosen); every step is limited by `_limit_shift`."""
+    twentieth of its difference step (chosen); after each step `_limit_shift` limits the sum of the changes."""
     fit_segments = [segment for segment in plan.segments if segment.role == "fit" and segment.amplitude == LEVELS_N[1]]
     commands = [plan.command[segment.start : segment.stop] for segment in fit_segments]
     channels, axes_mask = list(axes), _make_axes_mask(axes)

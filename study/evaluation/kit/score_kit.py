@@ -48,7 +48,8 @@ def score_kit(table_path: Path, diagnoses_folder: Path, scores_path: Path, seal:
     """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `scores_path` as CSV.
     diagnoses_folder: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed
     over before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError where
-    the hashes differ, the table is invalid, no diagnosis is found, one is unusable, or the scores cannot be written."""
+    the hashes differ or there is no seal, the table is invalid, no diagnosis is found, one is unusable, or the scores
+    cannot be written."""
     table_hash = compute_sha256(table_path)
     compared_with = _require_sealed_hash(table_path, table_hash, seal)
     labels = read_labels(table_path)
@@ -69,7 +70,7 @@ def format_score_lines(score: KitScore) -> tuple[str, ...]:
 
 
 def _format_figure(figure: IntervalEstimate) -> str:
-    """Format a rate in percent, with its 95 % confidence interval in brackets; "none" without a case."""
+    """Format a rate: counts, percent, and 95 % confidence interval in brackets; "none" without a case."""
     if figure.value is None or figure.low is None or figure.high is None:
         return f"{figure.name}: none"
     interval = f"[{100 * figure.low:.0f}, {100 * figure.high:.0f}]"

@@ -80,8 +80,9 @@ def make_crash_result(real_recording: RealRecording, crash: Exception) -> RealDi
 def diagnose_real(
     real_recording: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress
 ) -> RealDiagnosis:
-    """Diagnose one recording. One that cannot be diagnosed, by any StudyError, is returned as refused, with the reason.
-    Any other exception but KeyboardInterrupt is a fault of the program, see `make_crash_result`."""
+    """Diagnose one recording. One that cannot be diagnosed, by any StudyError or because the fits break down, is
+    returned as refused, with the reason. Any other exception but KeyboardInterrupt is a fault of the program, see
+    `make_crash_result`."""
     parents = real_recording.parents
     try:
         case = _import_case(real_recording, (time_left, guard), on_progress)

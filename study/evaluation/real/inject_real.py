@@ -1,8 +1,8 @@
 """Blind test of the diagnosis with faults injected into real recordings: inject, seal, diagnose, reveal.
 
-Each case contains an intact stretch of a recording, given to the diagnosis as clean, and another stretch with up to two
-simulated faults. The labels (the injected faults) are hashed before any diagnosis, so that later changes would show
-(`proof_seals`); the diagnoses run in separate processes. `run_injections` is called by `real_recordings` for
+Each case contains an intact half of a recording (`injected_halves`), given to the diagnosis as clean, and another with
+up to two simulated faults. The labels (the injected faults) are hashed before any diagnosis, so that later changes
+would show (`proof_seals`); the diagnoses run in separate processes. `run_injections` is called by `real_recordings` for
 `hapteq real --inject`.
 """
 
@@ -89,7 +89,8 @@ def seal_injections(
     folder: ProofFolder, injectable_recordings: Sequence[InjectableRecording], count: int, seed: int
 ) -> tuple[str, ...]:
     """Draw, write and seal the cases that do not exist yet; returns the names of all `count` cases in order. The
-    recordings are used in turn. Raises StudyError where there is none."""
+    recordings are used in turn. Raises StudyError where there is none, a file cannot be written, or a sealed
+    label has changed."""
     if not injectable_recordings:
         raise StudyError(
             "There is nothing to inject faults into",
@@ -117,7 +118,9 @@ def _write_injection(folder: ProofFolder, recordings: Sequence[InjectableRecordi
     faulty, values = faultless, dict[str, float]()
     for effect in effects:
         injected = inject(faulty, effect, strength, generator)
-        faulty, values = injected.recording, values | injected.values
+        faulty = injected.recording
+        # Two faults may have a parameter of one name: the second then has its fault's name before it.
+        values |= {name if name not in values else f"{effect}.{name}": value for name, value in injected.values.items()}
     clean, faultless, faulty = (_remove_origin(blank_lead_responses(half)) for half in (clean, faultless, faulty))
     change = compute_held_out_change(clean, faultless, faulty) if effects else 1.0
     case_folder = begin_case(folder)

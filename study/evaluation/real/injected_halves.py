@@ -27,8 +27,8 @@ MIN_PARTS = 4
 
 def draw_halves(recording: Recording, random: np.random.Generator) -> tuple[Recording, Recording]:
     """Draw two adjoining stretches of the recording, or, with probability 1/2 from `MIN_PARTS` parts on, two random
-    sets of its parts, each in their order of time. Returns the half that stays intact and the half for the fault, in
-    random order. Both are without roles: the fit samples are drawn anew in each."""
+    sets of its parts, each in their order of time. Returns them in random order: the first stays intact, the
+    second is for the fault. Both are without roles: the fit samples are drawn anew in each."""
     recording_without_roles = replace(
         recording, segments=tuple(replace(segment, role="") for segment in recording.segments)
     )

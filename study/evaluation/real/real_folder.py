@@ -1,4 +1,4 @@
-"""Inventory of a folder of real recordings: sub-folders of recordings with import maps.
+"""Inventory of a folder of real recordings: sub-folders of recordings with import maps, or headers in place of these.
 
 A map may also state that a recording only tests the diagnosis of another one (`tests`), and that two were made before
 and after a change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`;
@@ -38,14 +38,14 @@ class RealRecording:
         return self.found_map.name
 
     def read_model(self) -> MechanicalModel | None:
-        """Read the model that the map names; None where it names none, so that a linear one is to be fitted. Raises
-        StudyError."""
+        """Read the model that the map names; None where it names none and one is to be fitted. Raises StudyError."""
         path = self._find_model_path()
         return None if path is None else read_mechanical_model(path)
 
     @property
     def parents(self) -> tuple[Path, ...]:
-        """Input files of the diagnosis: recordings, map, and the model if the map names one that exists."""
+        """Input files of the diagnosis: the recording, its reference, its map, and the model if the map names one that
+        exists; those of `tests` are in `tested_on`."""
         reference_files = () if self.reference is None else self.reference.files
         try:
             model_path = self._find_model_path()
@@ -77,7 +77,7 @@ class RealFolder:
     recordings: tuple[RealRecording, ...]
     """Recordings to diagnose."""
     troubles: tuple[UnusableInput, ...]
-    """Sub-folders that could not be used, with the reason."""
+    """Sub-folders (or the folder itself, where it has none) that could not be used, with the reason."""
 
 
 def read_real_folder(folder: Path) -> RealFolder:

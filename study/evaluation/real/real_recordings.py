@@ -85,7 +85,7 @@ def diagnose_folder(
 ) -> WrittenReal:
     """Diagnose all recordings of a folder, and write page and table. executor: its workers, which may share no disk,
     diagnose; None: this process does, and two others diagnose the cases with injected faults. Resumable after
-    UserInterruptError. Raises StudyError; WrongUseError for an executor together with `plan.seconds`."""
+    UserInterruptError. Raises StudyError; WrongUseError for `plan.seconds` with an executor or not finite."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
             "--seconds counts this computer's processor time",

@@ -1,5 +1,5 @@
 """Write the results of `hapteq real`, the diagnosis of a folder of recordings of real devices: an HTML page, tables
-(CSV) and figures. Called by `real_recordings`."""
+(CSV) and figures. Called by `real_recordings`; `real_summary` uses its result."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,8 +54,8 @@ class RealRow:
 
 @dataclass(frozen=True, slots=True)
 class InjectedRow:
-    """A row of the table of injected faults; the fields are those of `InjectedOutcome`, with lists as texts separated
-    by spaces. injected: the faults joined by " + ", "nothing" without any; judged: `InjectedOutcome.answer_class`."""
+    """A row of the table of injected faults; each field is as in `InjectedOutcome`, with lists as texts separated by
+    spaces. injected: the faults joined by " + ", "nothing" without any; judged: `InjectedOutcome.answer_class`."""
 
     recording: str
     injected: str

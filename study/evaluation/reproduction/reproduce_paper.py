@@ -57,9 +57,9 @@ class ReproducedModel:
 def identify_or_load(
     plan: ReproductionPlan, cached_recording: CachedRecording, on_share: Callable[[float], None]
 ) -> ReproducedModel:
-    """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
-    quality, is replaced. on_share: called with the fraction done, 0 to 1. Raises StudyError where the identification
-    fails."""
+    """Load the cached model, or identify it; a cached file that is unusable, of another recording, order or band,
+    or without its quality, is replaced. on_share: called with the fraction done, 0 to 1. Raises StudyError where the
+    identification fails."""
     path = plan.models / cached_recording.path.name
     model = _load_cached_model(path, plan, cached_recording.path)
     if model is None:
@@ -104,7 +104,7 @@ CENTRE_NAME, FRICTIONLESS_NAME, HAND_NAME = "centre", "frictionless", "hand"
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
     """Reproduce all figures. on_progress: called with the fraction done, 0 to 1. Raises StudyError where a step fails,
-    and UserInterruptError, after which the next call reuses the steps that were finished."""
+    and UserInterruptError, after which the next call reuses the finished sessions, recordings and models."""
     requests = _list_requests(plan)
     model_names = _list_model_names()
     steps = StepProgress(_estimate_step_durations_s(plan, requests, model_names), on_progress)

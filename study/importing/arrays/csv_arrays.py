@@ -36,7 +36,7 @@ _MAX_QUOTED_CHARACTERS = 60
 _NUMBER_FIELD = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 """Matches a line with a field that is a number, with any delimiter between its fields."""
 _GROUPED_NUMBER = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
-"""Matches a number with thousands separators, which is not read."""
+"""Matches a number that may have thousands separators, with which it is not read."""
 _MISSING_FIELDS = [*MISSING, *(word.upper() for word in MISSING), "NaN", "None", "Null"]
 """Fields that stand for a missing sample."""
 
@@ -130,7 +130,7 @@ def _reduce_to_scalar(column: npt.NDArray[np.float64]) -> npt.NDArray[np.float64
 
 
 def _make_seconds_name(name: str, used_names: Iterable[str]) -> str:
-    """Make the name of a column of time stamps that was converted to seconds, different from all `used_names`."""
+    """Make the name of a column of stamps that was converted to seconds; with "stamp" where it is in `used_names`."""
     stem = split_bracketed_unit(name)[0]
     return f"{stem} [s]" if f"{stem} [s]" not in used_names else f"{stem} stamp [s]"
 

@@ -41,7 +41,7 @@ _VALUE_KEYS = ("values", "value", "data", "samples")
 
 def read_json_arrays(path: Path) -> dict[str, Array]:
     """Read the arrays of a JSON file, by name. Raises OSError; ValueError, with the problem as text, where the file is
-    no JSON, a document of hapteq, or too large."""
+    no JSON, a document of hapteq, too large, or states a number next to values with a unit."""
     try:
         text = read_regular(path, MAX_JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as problem:
@@ -128,7 +128,8 @@ def _find_arrays_in_object(
 
 def _make_sibling_placeholder(entry: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Make the placeholder for an entry in the same object as values and their unit, such as a description. Raises
-    ValueError unless the entry is a text or null: a number, such as a scale, may change the values."""
+    ValueError unless the entry is null or a text that is no number: a number, such as a scale, may change the
+    values."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
         name = "/".join(key_path[:-1])
         raise ValueError(

@@ -2,9 +2,9 @@
 `header_map`, `map_skeleton` and `expressions.namespace` take from here the advice on arrays that are not read.
 
 The files are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
-memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; texts, objects, functions
-and sparse matrices are replaced by placeholders with their kind, a complex array by 0j. Format: MAT-File Level 5,
-MathWorks, 2010.
+memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; other cells, texts, objects,
+functions and sparse matrices are replaced by placeholders with their kind, a complex array by 0j. Format: MAT-File
+Level 5, MathWorks, 2010.
 """
 
 import math
@@ -141,8 +141,8 @@ def _decompress(compressed: _ElementReader, size_limit: SizeLimit) -> _ElementRe
 
 
 def _read_matrix(element: _ElementReader, depth: int) -> tuple[str, Any]:
-    """Read name and value of a miMATRIX element: an array, a dict of arrays for a structure, or the arrays of a cell.
-    depth: level of nesting, 0 for a variable. Raises ValueError where it is damaged or too deep."""
+    """Read name and value of a miMATRIX element: an array or placeholder, a dict for a structure, or the arrays of a
+    cell. depth: level of nesting, 0 for a variable. Raises ValueError where it is damaged or too deep."""
     if depth > MAX_STRUCTURE_DEPTH:
         raise ValueError(f"its structures are nested more than {MAX_STRUCTURE_DEPTH} levels deep")
     if not element.remaining:
@@ -206,8 +206,8 @@ def _read_structures(element: _ElementReader, structure_count: int, depth: int) 
 
 
 def _read_cells(element: _ElementReader, cell_count: int, depth: int) -> Any:
-    """Read the arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side;
-    otherwise a placeholder. Raises ValueError where it is damaged."""
+    """Read the arrays of a cell, if all hold numbers and, without dimensions of length 1, have the same number of
+    dimensions and the same shorter side; otherwise a placeholder. Raises ValueError where it is damaged."""
     if cell_count * 8 > element.remaining:
         raise ValueError(f"a cell of {cell_count} arrays is longer than the rest of the file")
     arrays = [_read_field(element, f"{number}", depth) for number in range(1, cell_count + 1)]

@@ -1,8 +1,7 @@
 """Detect the layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
 
-The rows of numbers are found first, because every table has them. The row above them is the header, or a row of units
-with the header above it; rows further up are remarks. Called by `csv_arrays`; `json_arrays` calls
-`append_units`.
+The rows of numbers are found first, because nearly every table has them. The row above them is the header, or a row of
+units with the header above it; rows further up are remarks. Called by `csv_arrays`; `json_arrays` calls `append_units`.
 """
 
 import re
@@ -100,8 +99,8 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
 
 
 def _make_named_layout(rows: Sequence[Line], first_row: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
-    """Make the layout of a table whose map names its columns, or that has no row of numbers. In the latter case the
-    header is the first row as wide as the last."""
+    """Make the layout of a table whose map names its columns, or that has no row of numbers. Where the map names none,
+    the header is the first row as wide as the last."""
     width = len(split_row(rows[-1][1], marks.delimiter))
     wide_rows = [index for index, (_, text) in enumerate(rows) if len(split_row(text, marks.delimiter)) == width]
     rows = rows[0 if settings.names else wide_rows[0] :]
@@ -231,7 +230,8 @@ def _split_header_and_units(
 
 
 def _are_units(fields: Sequence[str]) -> bool:
-    """Whether each field is a known unit, in brackets or not, or empty; or whether all texts are in brackets."""
+    """Whether the fields that are not in `_UNITLESS` are known units, in brackets or not, or are all in brackets; False
+    without any."""
     unit_texts = [field for field in fields if field.lower() not in _UNITLESS]
     return bool(unit_texts) and (
         all(is_unit(_strip_brackets(field)) for field in unit_texts)
@@ -251,8 +251,8 @@ def _name_columns(header: Sequence[str]) -> list[str]:
 
 
 def append_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
-    """Append to each name its unit in brackets; units None: no row of units. Raises ValueError where a name states
-    another unit."""
+    """Append to each name its unit in brackets, unless the name states it; units None: no row of units. Raises
+    ValueError where a name states another unit."""
     if units is None:
         return list(header)
     names = []

@@ -44,8 +44,8 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
     """Find delimiter and decimal sign. Pairs are ranked by these criteria in turn: as many columns as the map names;
     most rows of numbers; tabs before blanks in a table with tabs; a line above the numbers that has as many fields;
     most columns. Columns of words are assumed where more rows consist of numbers with them. If no row consists of
-    numbers, the delimiter is taken that splits most rows alike. Raises ValueError where a comma or point is
-    ambiguous."""
+    numbers, the delimiter of the map is taken, else that which splits most rows alike. Raises ValueError where a comma
+    or point is ambiguous."""
     sample = rows[:: max(len(rows) // _SAMPLE_ROWS, 1)]
     has_tabs = all("\t" in text for _, text in sample[len(sample) // 2 :])
     best_rank, marks = (False, 0, False, False, 0), None
@@ -107,8 +107,8 @@ def _has_delimiter_comma(header: str, decimal: str, column_count: int) -> bool:
 
 
 def _find_marks_with_text_columns(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
-    """Find the marks with the most columns of numbers where other columns hold words; None if there are none. Only the
-    lower half of the rows is used, which is below any header."""
+    """Find the marks with the most columns of numbers, where other columns may hold words; None if no marks fit. Only
+    the lower half of the rows is used, which is below any header."""
     max_number_columns, marks = 0, None
     for delimiter, decimal in _list_mark_pairs(sample, settings):
         rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]

@@ -52,8 +52,9 @@ class _PercentNumber(float):
 
 
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
-    """Read the arrays of a workbook; only the sheet that `settings.sheet` names, if any. Raises OSError; ValueError,
-    with the sheet and the problem, where it is no workbook, too large, or has no rows of numbers."""
+    """Read the arrays of a workbook; only the sheet that `settings.sheet` names, if any. Raises OSError; ValueError
+    with the problem, and with the sheet if it lies in one, where the file is no workbook or too large, the sheet is
+    missing, or there are no rows of numbers that can be read."""
     workbook = _open_workbook(read_regular(path))
     try:
         hidden_names = [
@@ -187,7 +188,7 @@ def _make_table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: 
         for column, cell in enumerate(cells)
         if isinstance(cell, str) and _PERCENT_PATTERN.search(cell)
     }
-    # The numbers of a sheet are written with a point here; texts that are numbers may have point or comma.
+    # Numbers are written here with the decimal sign of the map, else a point; texts that are numbers may have a comma.
     has_fraction = any(isinstance(cell, float) and cell % 1 for _, cells in rows for cell in cells)
     decimal = settings.decimal or ("." if has_fraction else "")
     sheet_hint = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"

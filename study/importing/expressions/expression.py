@@ -87,7 +87,7 @@ def parse_expression(text: str) -> ast.expr:
 
 
 class _Evaluation:
-    """Evaluation of one expression. All methods raise ImportProblemError."""
+    """Evaluation of one expression. Its methods may raise ImportProblemError."""
 
     def __init__(self, text: str, lookup: Lookup, clock: Clock, budget: Budget) -> None:
         self.text = text
@@ -118,7 +118,8 @@ class _Evaluation:
             raise self._make_not_allowed_error(node)
 
     def _evaluate_leaf(self, node: ast.Constant | ast.Name) -> Any:
-        """Evaluate a name, a number or a text. Booleans, and numbers from 1e300 on, are refused."""
+        """Evaluate a name, a number or a text. Other constants, such as booleans, and numbers from 1e300 on, are
+        refused."""
         self.budget.spend(0, self.text)
         match node:
             case ast.Name(id="pi"):

@@ -91,7 +91,8 @@ class Namespace:
         return ", ".join(array_texts) + (f" and {unlisted_count} more" if unlisted_count > 0 else "")
 
     def _evaluate_definition(self, name: str, clock: Clock) -> Value:
-        """Compute the value of a definition of the map. Raises ImportProblemError for a recursive definition."""
+        """Compute the value of a definition of the map. Raises ImportProblemError for a recursive definition, or where
+        it cannot be computed."""
         if name in self._open_definitions:
             raise ImportProblemError(f"the definition of '{name}' refers to itself")
         self._open_definitions.add(name)

@@ -126,7 +126,8 @@ class ComputedMap:
 
 @dataclass(frozen=True, config=TABLE_CONFIG)
 class PartMap:
-    """A part of the recording, from one file. Without any entry, each file is one part, in the given order."""
+    """A part of the recording, from one file. Without any entry, each file is one part, in the given order, or all
+    files are one part where clocks state their `file`."""
 
     file: Annotated[str, Field(description='Pattern; each file that matches is one part, in order. Default "*".')] = "*"
     prefix: Annotated[

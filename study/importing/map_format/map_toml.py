@@ -161,8 +161,8 @@ _RESAMPLE_BY_HOLD = {"zero-order": "held", "linear": "linear", "band-limited": "
 
 
 def _find_hold_contradictions(import_map: ImportMap) -> Iterator[str]:
-    """Find commands of which either `resample` or the `hold` of the recording, but not both, keeps values constant
-    between samples; yields a clause for each."""
+    """Find commands with a stated `resample` of which either this or the `hold` of the recording, but not both, keeps
+    values constant between samples; yields a clause for each."""
     for channel in import_map.channel:
         resample_hold = {"held": "zero-order"}.get(channel.resample, channel.resample)
         if (

@@ -2,7 +2,7 @@
 roles of channels (command, response, ...) from them.
 
 `parse_signal_name` interprets one name; `assign_roles`, `list_open_roles` and `propose_roles` take all names of a file.
-Called by `header_map`, `map_skeleton`, `imposed_roles`, and the readers of tables in `study.importing.arrays`.
+Called by `header_map`, `map_skeleton`, `imposed_roles`, `surplus_arrays`, `namespace` and the readers in `arrays`.
 """
 
 import re
@@ -66,8 +66,8 @@ _ROLE_BY_WORD: dict[str, SignalRole] = {
 }  # fmt: skip
 """Role that a word in a name states; the first such word counts."""
 _TEXTBOOK_ROLES: dict[str, SignalRole] = {"u": "command", "y": "response"}
-"""Role of the textbook names of input and output. They count only if both occur and no name is `x`: `y` would then be
-an axis."""
+"""Role of the textbook names of input and output. They count only if both begin names and `x` begins none: `y` would
+then be an axis."""
 _ROLE_BY_NAME: dict[str, SignalRole] = {
     **dict.fromkeys(("input", "entrada", "eingang", "entrée", "entree"), "command"),
     **dict.fromkeys(("output", "salida", "ausgang", "sortie"), "response"),
@@ -89,12 +89,12 @@ class ParsedName:
     name: str
     """Name without its unit in brackets."""
     unit: str
-    """Unit as in the file; empty if none is stated or known."""
+    """Unit in the spelling of `units`; empty if none is stated or known."""
     quantity: str
-    """Quantity; empty if neither the unit nor a word determines it."""
+    """Quantity, or the unit in SI where that has none; empty if neither the unit nor a word determines it."""
     doubt: str
-    """What is uncertain, as a clause: an unknown unit, a unit in a name without a word for its quantity (`phase_A`), or
-    a contradiction. Otherwise empty."""
+    """What is uncertain, as a clause: an unknown unit, a unit without a known quantity or without a word for it in the
+    name (`phase_A`), or a contradiction. Otherwise empty."""
 
     @property
     def is_certain(self) -> bool:
@@ -166,15 +166,15 @@ def parse_signal_name(header: str) -> ParsedName:
 
 
 def _describe_unknown_unit(unit: str) -> str:
-    """Describe an unknown unit in a clause, with the most similar known unit."""
+    """Describe an unknown unit in a clause, with a known unit that is similar, if any."""
     nearest_unit = suggest_unit(unit)
     return f"'{unit}' is not a unit known here" + (f" (did you mean '{nearest_unit}'?)" if nearest_unit else "")
 
 
 def assign_roles(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
     """Assign roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named
-    as commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
-    are conditions. None if something is open or contradicted by a name (`list_open_roles` says what)."""
+    as commands; accelerations and velocities are responses, or positions if there are no others; other known
+    quantities, except time, are conditions. None if something is open or contradicted by a name (`list_open_roles`)."""
     return (
         None
         if list_open_roles(columns)

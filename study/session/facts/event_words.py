@@ -1,4 +1,4 @@
-"""Describe the log of a session in words: one sentence per event. `study.workflows.views.view_session` calls
+"""Describe the log of a session in words: one line per event. `study.workflows.views.view_session` calls
 `describe_log`.
 
 Answers to questions about health are left out. The direction of a trial that does not count (yet) is left out, too: the
@@ -41,8 +41,8 @@ _PresentationKey = tuple[int, int, int]
 
 
 def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...]:
-    """Describe each event in a line, oldest first: time in `zone` and a sentence. A line with the date comes first, and
-    before each change of date or UTC offset."""
+    """Describe each event in a line, in the order of the log: time in `zone`, or its text where it is no time, and one
+    or more sentences. A line with the date comes first, and before each change of date or UTC offset."""
     events = tuple(events)
     measured_keys = {_get_presentation_key(event) for event in events if isinstance(event, TrialMeasured)}
     presentations = {
@@ -68,7 +68,7 @@ def describe_event(event: Event) -> str:
 
 
 def _describe_in_context(event: Event, presentations: dict[_PresentationKey, TrialPresented]) -> str:
-    """Describe an event in a sentence. presentations: those of trials that count, by run, trial and attempt."""
+    """Describe an event in sentences. presentations: those of trials that count, by run, trial and attempt."""
     match event:
         case TrialPresented():
             return _describe_presented(event, with_direction=_get_presentation_key(event) in presentations)
@@ -77,7 +77,7 @@ def _describe_in_context(event: Event, presentations: dict[_PresentationKey, Tri
         case TrialMeasured():
             return _describe_measured(event)
         case TrialSpoiled():
-            return f"{_name_trial(event)} is void and is presented again: {event.reason}."
+            return f"{_name_trial(event)} is void and is presented again: {_join_lines(event.reason)}."
         case RestTaken():
             return f"Rested {_format_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
@@ -157,7 +157,7 @@ def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted
             mended_text = " An incomplete last line, left by a crash, was removed." if event.mended else ""
             return f"The session was continued, on {_describe_device(event.device)}.{mended_text}"
         case SessionInterrupted():
-            return f"The sitting ended: {event.reason}. The session can be resumed."
+            return f"The sitting ended: {_join_lines(event.reason)}. The session can be resumed."
         case SessionClosed():
             if event.outcome != "completed":
                 return f"The session is over: {INELIGIBILITY_REASONS[event.outcome]}. The person does not take part."

@@ -116,8 +116,9 @@ def _set_probing(state: SessionState, probing: ProbeState) -> SessionState:
 
 
 def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
-    """Apply the beginning or the measurement of a probe, with its vibration dose. Raises LogContradictionError within a
-    trial, in which the hand must feel the trial's stimulus only."""
+    """Apply the beginning or the measurement of a probe; with a hand on the handle, its vibration dose is added. Raises
+    LogContradictionError within a trial, in which the hand must feel the trial's stimulus only, and as `begin_probe`
+    and `end_probe`."""
     if state.presented is not None:
         raise LogContradictionError(f"{event.event} while a trial is open")
     probing = state.sitting.probing

@@ -1,8 +1,8 @@
 """Application of a trial's events (presented, answered, measured or void) to the state of a session; called by `fold`.
 
-A trial is open from its presentation until it is measured or void. A measured trial moves the staircase and the place
-in the run; a void one is due again with the next attempt number. Each adds its vibration to the dose. An event that
-does not fit the state raises LogContradictionError.
+A trial is open from its presentation until it is measured or void. A measured trial moves the place in the run and,
+unless it is a practice or catch trial, the staircase; a void one is due again with the next attempt number. Each adds
+its vibration to the dose. An event that does not fit the state raises LogContradictionError.
 """
 
 import math
@@ -134,8 +134,8 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
 
 
 def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
-    """Close the open trial as void, so that it is due again. Raises LogContradictionError where it is not open, or
-    where the participant asked for a repeat and none is left in this run."""
+    """Close the open trial as void, so that it is due again. Raises LogContradictionError where the trial is not open,
+    or where the participant asked for a repeat and none is left in this run."""
     presented = _require_open_trial(state, event)
     if event.cause is VoidCause.ASKED and count_repeats_left(state) == 0:
         raise LogContradictionError(
@@ -221,7 +221,7 @@ def _add_vibration(
     state: SessionState, presented: TrialPresented, amplitude_mps2: float | None, duration_s: float | None
 ) -> SessionState:
     """Add the vibration of a presentation to the dose, whether or not the trial counts. amplitude_mps2: None where it
-    was not measured, and is estimated; duration_s: of the vibration; None where it was not logged."""
+    was not measured, and is estimated if possible; duration_s: of the vibration; None where it was not logged."""
     if amplitude_mps2 is None:
         amplitude_mps2 = estimate_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
     sitting = add_exposure(state.sitting, presented.frequency_hz, amplitude_mps2, duration_s)

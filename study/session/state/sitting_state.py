@@ -1,13 +1,14 @@
 """State of a sitting apart from its trials: forms, device check, demonstration, and the vibration dose of the day.
 
 Part of the session's state, `SessionState.sitting`, with a function per logged event that returns the next state;
-called by `fold`, `fold_trial` and `daily_dose`. `machine` and `make_watch_view` read durations and dose. The dose is
-that of the daily exposure A(8) (`vibration_dose`); a rest of `DAILY_REST_H` without movement of the handle starts a new
-day.
+called by `fold`, `fold_trial`, `daily_dose` and, for the present time, `make_watch_view`. `machine` and
+`make_watch_view` read durations and dose. The dose is that of the daily exposure A(8) (`vibration_dose`); a rest of
+`DAILY_REST_H` without movement of the handle starts a new day.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -197,9 +198,10 @@ def add_exposure(
 
 def estimate_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
     """Estimate the acceleration amplitude (m/s²) of a stimulus that was not measured: its level (N) times the largest
-    ratio of amplitude to level measured at this frequency; None without such a measurement."""
+    ratio of amplitude, along and across the direction, to level measured at this frequency; None without such a
+    measurement."""
     ratios = [
-        trial.delivered_mps2 / trial.level_n
+        math.hypot(trial.delivered_mps2, trial.off_axis_mps2 or 0.0) / trial.level_n
         for trial in trials
         if trial.frequency_hz == frequency_hz and trial.delivered_mps2 is not None
     ]

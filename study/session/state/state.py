@@ -2,7 +2,7 @@
 
 The state depends on the log alone, so that the same log always gives the same state (event sourcing); an interrupted
 session is resumed from its log. `fold` and `fold_trial` compute the states, `machine` the next action from a state;
-`study.workflows` reads the states.
+`study.workflows` and `study.session.watching` read the states.
 """
 
 from dataclasses import dataclass, field, replace
@@ -71,7 +71,7 @@ class SessionState:
 
     @property
     def answers(self) -> int:
-        """Number of answers that count."""
+        """Number of answers that count, that of the open trial included."""
         return sum(trial.is_valid for trial in self.trials)
 
 

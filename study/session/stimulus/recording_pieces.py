@@ -3,9 +3,10 @@ realisation.
 
     rest | fade in and settling | evaluated part | fade out | rest
 
-An analysis uses only the evaluated part: whole periods at constant amplitude (the first period of a sweep contains its
-transient). `workflows.recording.record_device` makes the pieces; `workflows.recording.play_pieces` plays each
-separately, and again with less force where the accelerometer clipped (`RecordingPiece.scale_to`).
+A sweep has no settling and no fade-out, and is evaluated from its beginning. An analysis uses only the evaluated part:
+whole periods at constant amplitude (except the first period of a sweep, which is faded in where others follow, and
+contains the transient). `workflows.recording.record_device` makes the pieces; `workflows.recording.play_pieces` plays
+each separately, and again with less force where the accelerometer clipped (`RecordingPiece.scale_to`).
 """
 
 from dataclasses import dataclass, replace

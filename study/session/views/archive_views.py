@@ -10,7 +10,7 @@ from typing import Literal
 SessionStatus = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
 """Status of a session. `running`: a program has its log open; `refused`, `excluded`: the participant did not take
 part, see `INELIGIBILITY_REASONS`; `withdrawn`: the data were erased, and only a note of the withdrawal is kept;
-`unreadable`: the log is missing or damaged."""
+`unreadable`: the log is missing, damaged, or cannot be used for another reason."""
 
 INELIGIBILITY_REASONS = {
     "refused": "consent was not given",
@@ -33,12 +33,12 @@ class SessionLine:
     """Name of the protocol."""
     begun_utc: str
     """Time (UTC, ISO 8601) at which the session was opened; for a withdrawn session the time of the withdrawal, for an
-    unreadable one the time of the last change of its files."""
+    unreadable one the time of the last change of its folder (empty if not known)."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     answers: int
-    """Number of answers in the log; 0, like the next two numbers, for a withdrawn session and for one of which no
-    number can be read."""
+    """Number of answers in the log that count; 0, like the next two numbers, for a withdrawn session and for one of
+    which no number can be read."""
     runs_done: int
     """Number of completed runs."""
     runs: int
@@ -87,17 +87,18 @@ class HomeView:
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
-    """One run of a staircase, for a plot. Its tuples have one entry per trial that counts, in order."""
+    """One run of a staircase, for a plot. Its tuples have one entry per trial that counts, in order, without catch
+    trials."""
 
     title: str
     levels_n: tuple[float, ...]
-    """Level of each trial (N)."""
+    """Level of the staircase at each trial (N), before roving."""
     correct: tuple[bool, ...]
     """Whether the answer was right."""
     reversals: tuple[bool, ...]
     """Whether the staircase reversed at that trial."""
     threshold_n: float | None
-    """Estimated threshold (N); None where the run is not complete."""
+    """Estimated threshold (N); None where the run is not complete or has no estimate."""
     cap_n: float
     """Highest level (N) that the protocol allows."""
 
@@ -108,15 +109,15 @@ class SessionView:
 
     line: SessionLine
     facts: tuple[tuple[str, str], ...]
-    """(label, value): participant, protocol, device, seed, dates; only participant and folder of a withdrawn or
-    unreadable session."""
+    """(label, value): participant, protocol, device, seed, dates and others; only participant and folder of a withdrawn
+    or unreadable session."""
     thresholds: tuple[tuple[str, ...], ...]
     """Rows of text, the first one the header; empty without a complete run."""
     warnings: tuple[str, ...]
     """Sentences about problems of the session, such as a log without checksums."""
     staircases: tuple[Staircase, ...]
     events: tuple[str, ...]
-    """The log in words, oldest first; the direction of an open trial is left out."""
+    """The log in words, oldest first; the direction of an open or void trial is left out."""
     report: str
     """Path of report.html; empty where none was written yet."""
     figures: tuple[str, ...]
@@ -132,10 +133,11 @@ class DiagnosisView:
     verdict: str
     """Result in one sentence."""
     sentences: tuple[str, ...]
-    """For each named effect: its parameters with intervals, and the effects that the data cannot distinguish from
-    it."""
+    """For each named effect: its parameters with intervals, its share and probability, and the effects that the data
+    cannot distinguish from it."""
     rivals: tuple[str, ...]
-    """Effects that were considered and rejected, with probability and reason, one sentence each."""
+    """For each named effect: the other effects that were considered and rejected, with probability and reason, one
+    sentence each."""
     mismatch: tuple[tuple[str, ...], ...]
     """Differences of model and recording, as rows of text, the first one the header; empty without any."""
     fit: tuple[tuple[str, ...], ...]

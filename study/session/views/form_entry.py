@@ -1,9 +1,9 @@
 """State machine of a form while it is filled in: each key, click or paste gives the next state from the previous one.
 
 States are immutable, and nothing is drawn here: `study.tui.screens.form` calls these functions and draws the state;
-`study.tui.widgets.choice_row` uses the functions of a single row of choices. Keys are applied in the order
-of arrival, so that an answer belongs to the question at which the cursor was when the key arrived, however fast the
-keys are pressed.
+`study.tui.widgets.choice_row` uses the functions of a single row of choices, `form_question` and line mode
+(`plain_forms`) other names of this module. Keys are applied in the order of arrival, so that an answer belongs to the
+question at which the cursor was when the key arrived, however fast the keys are pressed.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ class FieldEntry:
     answer: str = ""
     """The answer in the language shown; empty without one."""
     marked: int | None = None
-    """Index of the choice that Space or Enter would choose; None before the first move."""
+    """Index of the choice that Space or Enter would choose; None before the first move or choice."""
     caret: int = 0
     """Position of the caret in free text, from 0 to the number of characters."""
 
@@ -43,11 +43,11 @@ class FormEntry:
     replaced: frozenset[int] = frozenset()
     """Indices of fields whose choice was changed and not yet shown for confirmation; only in `CONFIRMED_KINDS`."""
     missing: tuple[int, ...] = ()
-    """Indices of the fields without a valid answer at the last attempt to send the form; empty after the next
-    answer."""
+    """Indices of the fields without a valid answer at the last attempt to send the form; empty after the next change of
+    an answer."""
     unconfirmed: tuple[int, ...] = ()
     """Indices of the fields whose changed choices are shown for confirmation, after an attempt to send the form; empty
-    after the next answer."""
+    after the next change of an answer."""
     is_sent: bool = False
     """Whether the form is complete and was sent; no key changes it then."""
 

@@ -38,7 +38,8 @@ class FormOutcome:
     kept: dict[str, str]
     """Answers that go into the log, in codes that do not depend on the language."""
     reminder: str = ""
-    """Differences between set-up and protocol, as an English sentence for the log; empty if they agree."""
+    """Differences between set-up and requirements, as an English sentence for the log (`_describe_deviations`); empty
+    without any."""
 
 
 def make_words(protocol: StudyProtocol) -> Words:
@@ -122,8 +123,8 @@ def _make_choice_field(key: str, label: str, choices: dict[str, str], words: Wor
 
 
 def _make_consent_form(protocol: StudyProtocol, words: Words) -> Form:
-    """Make the consent form: the statements of the protocol, and a statement on probes, which no protocol can leave
-    out."""
+    """Make the consent form: the statements of the protocol and, where it has probes, a statement on these, which no
+    protocol can leave out."""
     settings = protocol.consent
     statements = (*settings.statements, *list_probe_statements(protocol.probes, words))
     fields = tuple(
@@ -194,7 +195,8 @@ def _make_setup_form(settings: SetupSettings, words: Words) -> Form:
 
 
 def _describe_deviations(setup: SetupSettings, answers: dict[str, str]) -> str:
-    """Describe differences between set-up and protocol in an English sentence for the log; empty if they agree."""
+    """Describe differences between set-up and requirements (hearing, hidden hand, supported arm; not grip and hand) in
+    an English sentence for the log; empty without any."""
     checked_requirements = (
         (setup.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
         (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),

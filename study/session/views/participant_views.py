@@ -2,8 +2,9 @@
 
 No value reveals level, frequency or correctness of a trial, so that the display cannot give hints. The module is quick
 to import, because a screen shows its first frame before numerical libraries are loaded. `study.workflows` makes the
-values; the displays (`study.tui`, simulated participants) show them and give the replies. The findings of device checks
-(`DeviceFinding`) are also made by `study.devices` and printed by `hapteq doctor`.
+values, with `Progress` from `study.session.state.progress`; the displays (`study.tui`, simulated participants) show
+them and give the replies. The findings of device checks (`DeviceFinding`) are also made by `study.devices` and
+`study.session.stimulus.timing_verdict`, and printed by `hapteq doctor`.
 """
 
 from __future__ import annotations
@@ -45,13 +46,13 @@ class Welcome:
     """Title of the study."""
     picture: DirectionPicture
     runs: int
-    """Number of runs in the session, without those of training."""
+    """Number of runs in the session, without training and practice."""
     training_runs: int
-    """Number of training runs."""
+    """Number of runs of training, practice included."""
     device: str
     """Name of the device."""
     device_moves: bool
-    """Whether a real device moves; otherwise the answers are practice."""
+    """Whether a real device moves, so that the answers are not only practice; true for a simulated participant."""
     resumed_after: int
     """Number of answers from earlier sittings."""
 
@@ -119,7 +120,7 @@ class DemoMenu:
     played_pairs: tuple[tuple[int, int], ...]
     """Pairs (vibration, direction number) that were already played."""
     handle_moves: bool
-    """Whether a real handle moves; False with a simulated device."""
+    """Whether a real handle moves; False with a simulated device, but true for a simulated participant."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,8 @@
 
 The state is computed from the log event by event, as in the running session (`study.session.state.fold`). What the
 state does not keep of them is kept in addition: notes, forms with their times, remarks on trials, recordings of probes,
-and why the sitting ended. `watch_session`
-(for `hapteq watch`) and `session_references` apply the events; `make_watch_view`, `followed_trials` and `watch_alarms`
-read the result.
+and why the sitting ended. `watch_session` and `session_references` apply the events; `make_watch_view`,
+`followed_trials` and `watch_alarms` read the result, and `session_drift` the probes.
 """
 
 from dataclasses import dataclass, replace
@@ -64,7 +63,7 @@ class FollowedSession:
     notes: tuple[NoteRecord, ...]
     """Notes of the log, oldest first."""
     end_reason: str
-    """Reason why the sitting was ended; empty while it has not ended."""
+    """Logged reason why the present sitting was interrupted; empty without one."""
     sitting_utc: str
     """Time at which the present sitting was opened (UTC, ISO 8601)."""
     notes_before: int

@@ -60,7 +60,8 @@ def find_next_level_n(state: SessionState, shown_run: int | None) -> float | Non
 
 
 def make_watched_run(state: SessionState, run: Run) -> WatchedRun:
-    """Summarise a run of the schedule: its status, and the numbers of its trials that count and of their reversals."""
+    """Summarise a run of the schedule: phase, frequency, status, and the numbers of its trials that count and of their
+    reversals."""
     counted_trials, staircase_rule = _select_counted_trials(state, run.index), state.protocol.staircase
     return WatchedRun(
         run=run.index,

@@ -1,8 +1,8 @@
 """Alarms for the experimenter who follows a session: faults of device, sensor, computer or program, limits that are
 reached, trials that go wrong, and adverse events. `make_watch_view` calls `find_alarms`.
 
-Each alarm is one function of the situation (`Situation`), listed in order of urgency in `_RUNNING_CHECKS` and
-`_ENDED_CHECKS`; it returns None where there is no reason for an alarm."""
+Each check is a function of the situation (`Situation`), listed in order of urgency in `_RUNNING_CHECKS` and
+`_ENDED_CHECKS`; it returns one alarm, or None where there is no reason for one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ LIVE_TIMEOUT_S = 3.0
 """Age of the live state (s) above which it is out of date. Chosen: `live.json` is written about four times a second,
 and a slow disk may delay it by a second or two."""
 _LIVE_ACTIVITIES = ("demo", "waiting for the handle", "rest", "probe", "reference")
-"""Activities during which the session writes `live.json` continuously; it does not while a form or a notice is read."""
+"""Activities, besides an open trial, in which `live.json` is written continuously; it is not while a form is read."""
 HANDLE_AWAY_LIMIT_S = 2.0
 """Time (s) outside the gate before a trial above which there is an alarm. Chosen: short excursions raise none."""
 ANSWER_ALARM_S = 60.0

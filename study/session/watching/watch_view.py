@@ -49,7 +49,7 @@ class StaircasePoint:
     trial: int
     """Index of the trial in its run."""
     level_n: float
-    """Level of the trial (N)."""
+    """Level of the staircase (N), before roving."""
     correct: bool
     """Whether the answer was right."""
     reversal: bool
@@ -107,7 +107,7 @@ class Exposure:
     """Duration of the sitting (min) and vibration dose of the hand (m/s²), with their limits."""
 
     elapsed_min: float
-    """Time since the handle first moved in the sitting (min)."""
+    """Time since the handle first moved in the sitting (min); 0 before."""
     limit_min: float
     """Longest sitting of the protocol (min)."""
     dose_a8_mps2: float

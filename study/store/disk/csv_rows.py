@@ -1,6 +1,7 @@
 """CSV tables whose columns are the fields of a frozen dataclass, in declared order: conversion to and from text.
 
-All tables of a session (`study.store.sessions`, `study.store.formats`) are written and read by this module.
+The tables of sessions, exports and proofs (`study.store.formats`, `study.workflows.results`, `study.evaluation`) are
+written and read by this module.
 
 Booleans are `true` and `false`, None is an empty field, enumerations are their values, and floats have all digits that
 are needed to read the same number again (`repr`).
@@ -27,7 +28,7 @@ _LISTED_PROBLEM_LIMIT = 8
 
 
 class CsvError(ListedProblemsError):
-    """A table that cannot be used. `problems`: one sentence for each, with line and column where they apply."""
+    """A table that cannot be used. `problems`: a clause for each, with line and column where they apply."""
 
 
 def list_columns(row_type: type[Any]) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Errors for files that cannot be read, used or written, each with cause and remedy.
 
-They are shown to the user without further text. Raised by all readers and writers of files in `study`.
+They are shown to the user without further text. Raised by the readers and writers of files in `study`; the session log
+has errors of its own (`event_log`).
 """
 
 import csv

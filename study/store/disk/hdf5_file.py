@@ -1,5 +1,5 @@
-"""Read and write HDF5 files: checksum, contents, format and version are checked in this order when a file is opened;
-files are written atomically.
+"""Read and write HDF5 files: checksum, contents, format and version are checked in this order when a file of a known
+format is opened (`open_hdf5`); files are written atomically.
 
 A sealed file begins with a user block (bytes that the HDF5 library ignores), which states the SHA-256 checksum and the
 size of all bytes after it. The checksum is verified before the HDF5 library opens the file, because the library may
@@ -94,9 +94,9 @@ def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: 
 
 
 def read_float_dataset(file: Any, name: str, shape_text: str) -> FloatArray:
-    """Read a dataset of float32 or float64 numbers as float64. shape_text: names of the dimensions for messages, as in
-    "(samples, channels)"; their number is checked. Raises ValueError, with a sentence fragment, where the dataset is
-    missing or has another type or number of dimensions."""
+    """Read a dataset of floating-point numbers, such as float32, as float64. shape_text: names of the dimensions for
+    messages, as in "(samples, channels)"; their number is checked. Raises ValueError, with a sentence fragment, where
+    the dataset is missing or has another type or number of dimensions."""
     dataset = file.get(name)
     if not isinstance(dataset, h5py.Dataset):
         raise ValueError(f"the dataset '{name}' is missing")

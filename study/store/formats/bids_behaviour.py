@@ -1,4 +1,4 @@
-"""Trials as BIDS behaviour: per participant and session a TSV with its JSON, and the tables of the dataset.
+"""Trials as BIDS behaviour: per participant and session a TSV, one JSON for all of them, and the dataset's other files.
 
 Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recordings)". Missing values are n/a. Called
 by `study.workflows.results.export_study`.
@@ -29,7 +29,8 @@ PARTICIPANT_COLUMNS: dict[str, tuple[str, ...]] = {
     "sex": ("male", "female", "other"),
     "handedness": ("left", "right", "ambidextrous"),
 }
-"""Columns of participants.tsv that BIDS defines, with their permitted values; an empty tuple permits numbers."""
+"""Columns of participants.tsv that are written, of those that BIDS defines, with the accepted values; an empty tuple
+accepts numbers."""
 
 TASK_DESCRIPTION = (
     "Each trial plays a sinusoidal vibration at the hand, along one of two orthogonal directions (a detection trial: "
@@ -95,9 +96,8 @@ def write_bids(
 
 
 def _write_participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -> list[Path]:
-    """Write participants.tsv and its JSON: the code, and the questions before the trials for which BIDS defines a
-    column. A question with any answer that BIDS does not permit is left out. Of several sessions, the first answer
-    counts."""
+    """Write participants.tsv and its JSON: the code, and the questions before the trials in `PARTICIPANT_COLUMNS`. A
+    question with any answer that is not accepted there is left out. Of several sessions, the first answer counts."""
     participant_columns = [
         (column_index, column)
         for column_index, column in enumerate(answers.columns)
@@ -129,7 +129,8 @@ def _write_participants(folder: Path, subjects: Sequence[str], answers: AnswerTa
 
 
 def _is_valid_value(key: str, value: str) -> bool:
-    """Whether BIDS allows the value in the column `key`: n/a, one of its listed values, or a number."""
+    """Whether the value is accepted in the column `key`: n/a, one of its listed values, or a number where none are
+    listed."""
     if value == "n/a":
         return True
     return value in PARTICIPANT_COLUMNS[key] if PARTICIPANT_COLUMNS[key] else parse_number(value) is not None
@@ -178,10 +179,11 @@ def _read_title(protocol_text: str) -> str:
 
 
 def _describe_target(protocol_text: str) -> str:
-    """Describe the convergence level of an n-down, 1-up staircase, the n-th root of 1/2 (Levitt 1971); empty where the
-    protocol states no `down_after_right`, or not 1 for `up_after_wrong`."""
+    """Describe the convergence level of an n-down, 1-up staircase, the n-th root of 1/2 (Levitt 1971); empty for
+    the Psi method, and where the protocol states no `down_after_right`, or not 1 for `up_after_wrong`."""
     staircase_rule = tomllib.loads(protocol_text).get("staircase", {})
-    if staircase_rule.get("up_after_wrong") != 1 or "down_after_right" not in staircase_rule:
+    is_psi = staircase_rule.get("bayesian", {}).get("trials", 0) > 0
+    if is_psi or staircase_rule.get("up_after_wrong") != 1 or "down_after_right" not in staircase_rule:
         return ""
     p_correct = 0.5 ** (1 / staircase_rule["down_after_right"])
     return f"A staircase over the amplitude seeks the level at which {100 * p_correct:.2f} % of the answers are right."

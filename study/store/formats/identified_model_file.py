@@ -75,7 +75,7 @@ LAYOUT = (
 
 def read_identified_model(path: Path | str) -> IdentifiedModel:
     """Read a model. Raises CannotReadError where the file cannot be read, UnusableFileError with all problems of its
-    content."""
+    attributes and arrays or, without any, with those that `IdentifiedModel` finds in their values."""
     path, problems = Path(path), ProblemCollector()
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         model_fields = _read_model_fields(file, problems)

@@ -52,7 +52,8 @@ LAYOUT = (
     Entry("tolerance.modes", "number", "relative standard deviation of modal frequencies and masses", False),
     Entry("provenance.…", "anything", "versions, command, seeds, parents", False),
 )
-"""Keys of the file, as docs/formats.md lists them; n coordinates, m commands, p responses."""
+"""Keys of the file, as docs/formats.md lists them; n coordinates, m commands, p responses. The units are those where
+`provenance.units`, which is not listed separately, states no others."""
 
 
 def read_mechanical_model(path: Path | str) -> MechanicalModel:

@@ -1,7 +1,8 @@
 """Read protocols, shipped ones by name and others by path; write and check the locks of protocols.
 
 A lock (`NAME.lock.json`) fixes a protocol before data are collected (preregistration): a protocol that differs from its
-lock is refused. Called by the commands that take a protocol (`study.cli`) and by `study.workflows`.
+lock is refused. Called by the commands that take a protocol (`study.cli`), by `study.workflows` and by
+`study.evaluation.reproduction`.
 """
 
 import os
@@ -120,7 +121,8 @@ def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, h
     of the locking (ISO 8601).
 
     Locking the same protocol again changes nothing. Raises LockedProtocolChangedError if another version is locked
-    there, CannotReadError or UnusableFileError for an unusable existing lock, CannotWriteError.
+    there, CannotReadError or UnusableFileError for an unusable existing lock, CannotWriteError; AlreadyExistsError if
+    another program writes a lock at the same time.
     """
     path = locate_lock(file.protocol, folder)
     if _read_lock(path, file.protocol) is None:

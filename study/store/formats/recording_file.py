@@ -2,7 +2,8 @@
 
 `recording_layout` defines the format. Called wherever recordings are read or written, for example by
 `study.workflows.recording` and `study.workflows.equalizer`. Helpers that read a part of the file raise ValueError with
-the problem; `read_recording` collects these, so that the user sees all of them at once.
+the problem; `read_recording` collects these, so that the user sees all of them at once, and checks the consistency of
+the recording where there are none.
 """
 
 import json
@@ -38,13 +39,13 @@ _SEGMENT_TYPE = np.dtype(
 """NumPy type of a row of the dataset `segments`; fields as in `SEGMENT_FIELDS`."""
 
 _COMPRESS_ABOVE_BYTES = 2**18
-"""Size (bytes) above which arrays are compressed. Chosen by hand: smaller arrays, of which a session has thousands, are
-written faster without compression."""
+"""Size (bytes) above which signals are compressed. Chosen by hand: smaller arrays, of which a session has thousands,
+are written faster without compression."""
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Read a recording in SI units. Raises CannotReadError where the file cannot be opened, UnusableFileError with all
-    problems where it is no valid recording."""
+    """Read a recording in SI units. Raises CannotReadError where the file cannot be opened, UnusableFileError where it
+    is no valid recording, with all problems of reading or, without any, of consistency."""
     path = Path(path)
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         problems = ProblemCollector()
@@ -115,7 +116,8 @@ def _read_rate(file: Any) -> float:
 
 def _read_signal(file: Any, name: str, rate_hz: float) -> Signal:
     """Read a signal and convert it to SI: samples times factor plus offset of each channel's unit. Raises ValueError
-    where it is missing, or a unit is unknown or not one of the channel's quantity."""
+    where it or an attribute is missing or has another type or shape, or a unit is unknown or not one of the channel's
+    quantity."""
     samples = read_float_dataset(file, name, "(samples, channels)")
     quantity, unit, channels = (read_texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
     channels = _split_channel_names(channels, samples.shape[1])

@@ -1,9 +1,9 @@
 """The log of a session: an append-only file with one JSON event per line, each with a checksum (`log_chain`).
 
-A program appends the line and syncs it to the disk (fsync) before it acts on the event (write-ahead), so that the log
-never lacks what happened. Lines are never rewritten; only an incomplete last line, which a crash leaves, is removed.
-Written by `open_session`, `resume_session`, `sitting` and `take_note`; read by the workflows that show, analyse or
-continue a session.
+A program appends the line and syncs it to the disk (fsync) before it acts on the event (write-ahead), so that no action
+follows from an event that the log lacks. Lines are never rewritten; only an incomplete last line, which a crash or a
+failed write leaves, is removed. Written by `open_session`, `resume_session`, `sitting` and `take_note`; read by the
+workflows that show, analyse or continue a session.
 """
 
 import contextlib
@@ -35,6 +35,8 @@ class EventLog:
         self._path = path
         self._descriptor = descriptor
         self._chain = chain
+        self._incomplete_from: int | None = None
+        """Position (bytes) of an incomplete last line that could not be removed; None where there is none."""
 
     @classmethod
     def create(cls, path: Path) -> "EventLog":
@@ -63,23 +65,29 @@ class EventLog:
         return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
-        """Append one line; on return it is on the disk. Raises StudyError where it cannot be written; the log is then
-        unchanged."""
-        previous_size = os.fstat(self._descriptor).st_size
+        """Append one line; on return it is on the disk. Raises StudyError where it cannot be written or the existing
+        lines are unusable; the log is then unchanged, unless an incomplete line cannot be removed either: that is done
+        before the next line is written."""
+        incomplete_from = self._incomplete_from
+        previous_size = os.fstat(self._descriptor).st_size if incomplete_from is None else incomplete_from
         if self._chain is None:
             self._chain = read_log(self._path).chain
         extended_chain, line = append_checksum(self._chain, encode_event(event).removesuffix(b"\n"))
         try:
+            if incomplete_from is not None:
+                os.ftruncate(self._descriptor, incomplete_from)
             _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
         except BaseException as problem:
             # Also on Ctrl-C: an incomplete line would corrupt the next line.
+            self._incomplete_from = previous_size
             with contextlib.suppress(OSError):
                 os.ftruncate(self._descriptor, previous_size)
+                self._incomplete_from = None
             if isinstance(problem, OSError):
                 raise _make_save_error(self._path, event, problem) from problem
             raise
-        self._chain = extended_chain
+        self._chain, self._incomplete_from = extended_chain, None
 
     def close(self) -> None:
         """Close the file; all lines are on the disk already. To be called once only."""
@@ -102,7 +110,7 @@ class LogContents:
 
 
 def read_log(path: Path) -> LogContents:
-    """Read a log. Only the last line may be incomplete. Raises StudyError where the file cannot be read, or an earlier
+    """Read a log. Only the last line may be incomplete. Raises StudyError where the file cannot be read, or a complete
     line is damaged or unknown."""
     try:
         log_bytes = read_regular(path)
@@ -134,8 +142,8 @@ def read_opening(path: Path) -> Event | None:
 
 
 def read_valid_events(path: Path) -> tuple[Event, ...]:
-    """Read the events before the first damaged line, to inspect an unusable log; empty where the file cannot be
-    read."""
+    """Read the events before the first damaged or unknown line, to inspect an unusable log; empty where the file cannot
+    be read."""
     chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
@@ -191,7 +199,7 @@ def _lock_file(descriptor: int, path: Path) -> None:
 @contextlib.contextmanager
 def hold_log_lock(path: Path) -> Iterator[None]:
     """Hold the lock of a log that is to be erased; without a log, do nothing. Raises StudyError while a program writes
-    it."""
+    it, and where it cannot be opened."""
     if not path.exists():
         yield
         return

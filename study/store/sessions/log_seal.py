@@ -6,7 +6,8 @@ with its chain; the seal shows both. A seal is never rewritten: a note that is a
 no key: the replacement of both log and seal is not detected.
 
 `study.workflows.session.run_session`, `session_results` and `take_note` write seals;
-`study.workflows.results.fold_session` checks them whenever a session is read.
+`study.workflows.results.fold_session` checks them before the answers of a session are used, and `session_line` before a
+session is listed from its log without applying the events.
 """
 
 import hashlib

@@ -2,8 +2,8 @@
 
 The sender writes a file under a temporary name and renames it, so that the session never reads an incomplete request;
 the session reads and removes it. The final name is unique and begins with the kind of request, so that a stop is
-recognised even if its content cannot be read. Sent by `study.workflows.views` (`send_request`), taken by the session's
-program (`study.workflows.session.conduct_session`).
+recognised even if its content cannot be read. Sent by `study.workflows.views` (`send_request`, `watch_session`),
+`hapteq watch` and `hapteq stream`, taken by the session's program (`study.workflows.session.conduct_session`).
 """
 
 import errno
@@ -79,7 +79,7 @@ class RequestInbox:
         return name
 
     def is_unread(self, name: str) -> bool:
-        """Whether the session has not taken this request yet."""
+        """Whether the request is still in the folder: neither taken nor set aside by the session, nor taken back."""
         return (self._folder / name).exists()
 
     def take_back(self, name: str) -> bool:
@@ -103,7 +103,8 @@ class RequestInbox:
                 self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
-        """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first. Never raises."""
+        """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first; invalid ones are set
+        aside. Never raises."""
         try:
             # listdir takes half the time of Path.iterdir, twenty times a second.
             file_names = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208

@@ -1,4 +1,5 @@
-"""Full-screen terminal application of `hapteq study` (textual): draws screens, reads keys, and never blocks on work.
+"""Full-screen terminal application of `hapteq study` and `hapteq resume` (textual): draws screens, reads keys, and
+never blocks on work.
 
 A second process, the engine (`study.tui.engine`), controls the device, writes to disk and analyses; both exchange
 messages by `EngineConnection`. Run by `study.cli.screen`.
@@ -46,9 +47,10 @@ from study.tui.watch.watch_controller import WatchController
 
 
 class HapteqApp(App[None]):
-    """The application of `hapteq study`; handlers `on_...` and `action_...` are called by textual. On every screen F1
-    shows help, F9 changes the colours, Ctrl-C switches the force off, Ctrl-Q leaves; in a sitting F2 shows the
-    experimenter's view, F4 records a note (with Shift: an adverse event), F7 pauses."""
+    """The application of `hapteq study` and `hapteq resume`; handlers `on_...` and `action_...` are called by textual.
+    On every screen F1 shows help, F9 changes the colours, Ctrl-C switches the force off, Ctrl-Q leaves; in a sitting F2
+    shows the experimenter's view once the session is open, F4 records a note (with Shift: an adverse event), F7
+    pauses."""
 
     TITLE = "hapteq"
     # Notifications are at the top, because the instructions and keys of a screen are at the bottom.
@@ -185,8 +187,8 @@ class HapteqApp(App[None]):
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
-        """Switch the force off and show the screen of the stop (Ctrl-C). Without a sitting, or at a second press, leave
-        the application."""
+        """Switch the force off and show the screen of the stop (Ctrl-C, or Ctrl-Q in a sitting). Without a sitting, or
+        at a second press, leave the application."""
         if self._sitting is None or self._stop_screen is not None:
             self._leave_app(ExitCode.INTERRUPTED)
             return

@@ -2,7 +2,8 @@
 sensor.
 
 Used by `app`. Screens exchange messages with the engine, a separate process that reads files and computes
-(`study.tui.engine`). Their modules are imported when they are first shown, so that the program starts quickly.
+(`study.tui.engine`). Their modules are imported when they are first shown, or before in the background
+(`load_screens`), so that the program starts quickly.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Show the screens of one sitting in the terminal, on request of the engine, and send the replies.
 
-The engine runs the session in another process. Each of its requests (`ScreenRequest`) opens a screen above the trial's
-screen, which stays open underneath; the screen's result is sent back with the number of the request. Used by `app`.
+The engine runs the session in another process. A request (`ScreenRequest`) for a trial arms the trial's screen, which
+is opened at the first; each other request opens a screen on top. The result is sent back with the number of the
+request. Used by `app`.
 """
 
 from __future__ import annotations
@@ -143,8 +144,8 @@ class SittingScreens:
         self._send_reply(reply)
 
     async def show_preparing(self, sentence: str = "") -> None:
-        """Show that the device is being prepared, while no request is open. sentence: current step, empty before the
-        language is known."""
+        """Show that a slow step is under way (device, report), while no request is open. sentence: current step, empty
+        before the language is known."""
         self._pending_number, self._request_screen, self._trial_screen = 0, None, None
         if self._preparing_screen is None:
             self._preparing_screen = PreparingScreen(sentence)
@@ -172,7 +173,7 @@ class SittingScreens:
         self._discard_earlier_keys()
 
     async def _open_trial_screen(self) -> TrialScreen:
-        """Open the screen of all trials; it stays open until the device is prepared again."""
+        """Open the screen of all trials; it stays open until `show_preparing` removes it."""
         self._trial_screen = TrialScreen(self._keys, self.words)
         await self._app.push_screen(self._trial_screen)
         return self._trial_screen

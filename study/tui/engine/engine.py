@@ -1,9 +1,9 @@
 """Main program of the engine process, which runs sessions, drives the device, writes to disk and analyses.
 
 A separate process is used so that none of this can block the screen. It receives commands and sends results through a
-pipe, and runs as long as the pipe exists. `study.tui.engine.client`, in the screen's process, starts it.
-When the screen's process ends for any reason, the device is released, the log records that the session was
-interrupted, and the engine ends.
+pipe, and runs as long as the pipe exists. `study.tui.engine.client`, in the screen's process, starts it. When the
+screen's process ends for any reason, the device is released, the log of a running session records its interruption, and
+the engine ends.
 """
 
 import faulthandler

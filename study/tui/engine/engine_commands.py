@@ -215,7 +215,7 @@ class EngineCommands:
 
     def _calibrate(self, command: CalibrateSensor | StoreCalibration) -> None:
         """Calibrate the accelerometer with instructions on the screen, or store a calibration. Raises
-        CALIBRATION_STOPPED where the user interrupts."""
+        CALIBRATION_STOPPED where the user interrupts, KeyboardInterrupt where the screen's process has ended."""
         if isinstance(command, StoreCalibration):
             self._link.send(CalibrationStored(str(save_accelerometer_calibration(command.table))))
             return
@@ -279,7 +279,7 @@ def _read_home_view(command: ShowHome) -> HomeView:
 
 
 def _make_results_message(analysis: WrittenAnalysis) -> Results:
-    """Make the message about a written analysis, with thresholds and warnings as JSON text too."""
+    """Make the message about a written analysis, with thresholds, warnings and path of the report as JSON text too."""
     document = {
         "thresholds": [asdict(threshold) for threshold in analysis.thresholds],
         "warnings": list(analysis.warnings),

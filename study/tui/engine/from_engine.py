@@ -190,7 +190,7 @@ class Finished:
     path: str
     """Path of the session's folder."""
     answers: int
-    """Number of answers on disk."""
+    """Number of answers on disk that count."""
     results: Results
 
 

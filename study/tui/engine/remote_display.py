@@ -55,8 +55,8 @@ TIMED_OUT = Unanswered("no answer within the time limit", ends_sitting=False, ca
 
 
 class RemoteDisplay:
-    """The display port over a pipe; the docstrings of `Display` describe the methods. Any method raises
-    KeyboardInterrupt if the screen process has ended. get_load: returns the load average per processor (see
+    """The display port over a pipe; the docstrings of `Display` describe the methods. A method that sends or waits
+    raises KeyboardInterrupt if the screen process has ended. get_load: returns the load average per processor (see
     `get_load_per_processor`), None if unknown."""
 
     def __init__(
@@ -161,7 +161,7 @@ class RemoteDisplay:
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
         """Show a rest and return its duration, s (see the port). The duration is enforced here: if the screen replies
-        too early, the remaining time is waited."""
+        too early, the remaining time is waited; it ends early only where `sign_of_life` returns False."""
         request_number = self._send_request(DisplayCall.REST, notice)
         start_s = self._clock.now_s()
         has_replied = False

@@ -177,7 +177,7 @@ class HomeScreen(Screen[None]):
         self.query_one("#detail", Static).update(describe_session(event.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Show F2 or F3 in the footer only while the focus is in the other half of the screen."""
+        """Disable F2 or F3, and hide it in the footer, while the focus is in its half of the screen already."""
         selector = {"new": "#new", "past": "#past"}.get(action)
         return selector is None or not self.query_one(selector).has_focus_within
 

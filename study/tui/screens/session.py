@@ -247,7 +247,8 @@ def _compose_thresholds(view: SessionView) -> ComposeResult:
 
 
 def _make_report_text(view: SessionView) -> str:
-    """Make the text of the report page: paths of report and figures, and the warnings."""
+    """Make the text of the report page: paths of report and figures, and the warnings; without a report, how to make
+    one, where that is possible."""
     if not view.report:
         lines = ["No report was written yet."]
         if view.line.standing in ("finished", "unfinished") and view.line.answers:

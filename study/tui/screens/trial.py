@@ -46,8 +46,8 @@ NUM_LOCK_OFF_KEYS = {"end", "down", "kp_begin"}
 
 class TrialScreen(TranslatedScreen[None]):
     """Shows the question, both answers, and the progress of the session. 1 and 2 (and further answer keys) answer, p
-    pauses, r asks for the trial again, q leaves. The same screen serves a whole sitting: it is armed for each question
-    and takes no reply in between."""
+    pauses, r asks for the trial again, q leaves. The same screen serves all questions until the device is prepared
+    again: it is armed for each question and takes no answer in between."""
 
     PAGE = "help_trial"
     DEFAULT_CSS = """
@@ -141,7 +141,7 @@ class TrialScreen(TranslatedScreen[None]):
             self._show_message(self._describe_verdict() or saved_text)
 
     def show_feedback(self, correct: bool) -> None:
-        """Show whether the answer was right, now and again with the next question."""
+        """Show whether the answer was right, now and again with the next question of the same kind of run."""
         self._verdict = correct
         self._show_message(self._describe_verdict())
 
@@ -171,7 +171,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     def action_reply(self, reply_name: str) -> None:
         """Post a reply of `REPLIES`. A repetition beyond the allowed number is refused; a request to pause or leave
-        between two questions is kept for the next."""
+        between two questions is kept for `REQUEST_VALIDITY_S`."""
         reply = REPLIES[reply_name]
         if self._armed_s is not None and reply is REPEAT and self._repeats_left == 0:
             self._show_message(f"{self.words['no_repeats']} {self._describe_answer_keys()}")

@@ -2,7 +2,9 @@
 wide one.
 
 The classes `-narrow` and `-wide` depend on the width of the terminal. The key for details sets the class `details`,
-which in a narrow terminal shows the third column in place of the other two, and in a wide terminal hides it.
+which in a narrow terminal shows the third column in place of the other two, and in a wide terminal hides it. Further
+classes: `said` where the line of keys shows a reply, `any` where there are alarms, `seen` where none is new.
+`#standing` is the status line, `#aside` the third column.
 """
 
 STYLE = """

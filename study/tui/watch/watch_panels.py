@@ -1,7 +1,8 @@
 """Format the panels of the experimenter's view as styled text, for `watch_screen`: status, alarms, runs, last trials,
 exposure and device, details.
 
-Pure functions from a `WatchView` to text; numbers of runs and trials, which count from 0 in a view, are shown from 1.
+Functions from a `WatchView` or its parts to text, with times in the zone of this computer; numbers of runs and trials,
+which count from 0 in a view, are shown from 1.
 """
 
 from collections.abc import Sequence
@@ -71,8 +72,8 @@ def format_alarms(new_alarms: Sequence[Alarm], acknowledged_alarms: Sequence[Ala
 
 
 def format_runs(view: WatchView, rows: int) -> Content:
-    """Format the table of the runs: frequency (Hz), reversals and number of trials. It shows as many runs as fit into
-    `rows` lines with the header, the current run among them."""
+    """Format the table of the runs: name, frequency (Hz), reversals and number of trials. It shows as many runs as fit
+    into `rows` lines with the header, the current run among them."""
     lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
     lines += [_format_run(view, run) for run in _select_runs_near_current(view.runs, rows - 1)]
     return Content("\n").join(lines)
@@ -98,7 +99,7 @@ def format_trials(view: WatchView, rows: int, columns: int) -> Content:
 
 def format_gauges(view: WatchView) -> Content:
     """Format elapsed time (min) and vibration dose A(8) (m/s²) as bars with numbers; catch trials, handle, sensor,
-    device and drift in words."""
+    device and, with probes, drift in words."""
     exposure = view.exposure
     labelled_values: list[tuple[str, Content]] = [
         ("Time", _format_bar(exposure.time_share, describe_elapsed_time(exposure))),

@@ -1,5 +1,5 @@
-"""Screen of `hapteq watch`: the experimenter's view of a running session, without the direction of the open trial, with
-keys to request a stop or a pause and to add notes. Shown by `watch_app` and `watch_controller`."""
+"""Screen of `hapteq watch`, and of F2 and w in `hapteq study`: the experimenter's view of a running session, without
+the direction of the open trial, with keys for stop, pause and notes. Shown by `watch_app` and `watch_controller`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Texts of the experimenter's view of a running session, shared by its screen (`watch_screen`, `watch_panels`) and
 `hapteq watch --plain` (`watch_lines`).
 
-Each function formats a value of a `WatchView` as words or as a number with its unit.
+Each function but `is_unmeasured` formats a value of a `WatchView` as words or as a number with its unit.
 """
 
 from study.local_clock import convert_to_machine_zone
@@ -123,7 +123,7 @@ def describe_catch_trials(view: WatchView) -> str:
 
 def describe_handle(view: WatchView) -> str:
     """Describe the distance of the handle from its start position (mm), and the largest distance at which a trial may
-    start (mm) if there is a limit; "not read now" without a reading."""
+    start (mm) if there is a limit; away from its place, that it is; "not read now" without a reading."""
     live_state = view.live
     if live_state is None or live_state.offset_mm is None:
         return "not read now"

@@ -29,10 +29,10 @@ _NAME_TITLE, _STATUS_TITLE, _START_TITLE, _RUNS_TITLE, _ANSWERS_TITLE, _PROTOCOL
     "Answers",
     "Protocol",
 )
-"""Titles of the columns, by which their widths are looked up."""
+"""Titles of the columns, the keys of their widths; `show` adds the offset from UTC to that of the start times."""
 _FIXED_WIDTHS = {_STATUS_TITLE: 12, _RUNS_TITLE: 5, _ANSWERS_TITLE: 7}
-"""Fixed widths (character cells) of columns with short entries: measuring every entry of a long list would take time.
-The protocol's column gets the remaining width, and its entries are wrapped."""
+"""Fixed widths (character cells) of columns with short entries, which are not measured. The protocol's column gets the
+remaining width, as far as its entries need it; longer entries are wrapped."""
 _MIN_PROTOCOL_WIDTH, _CELL_PADDING = 10, 2
 """Least width of the protocol's column, chosen so that a wrapped name stays readable, and padding that the table adds
 to a column, in character cells."""
@@ -169,8 +169,8 @@ class SessionTable(DataTable[Content | str]):
             self.post_message(self.CursorMoved(self._selected_line))
 
     def _format_row(self, line: SessionLine, start_time: str, protocol: str) -> tuple[Content | str, ...]:
-        """Format the cells of a row, for the columns in `_widths`; counts only of sessions that can be read.
-        start_time: local time at which the session began; protocol: its name, wrapped into lines."""
+        """Format the cells of a row, for the columns in `_widths`; counts only of finished, unfinished and running
+        sessions. start_time: local time at which the session began; protocol: its name, wrapped into lines."""
         has_counts = line.standing in ("finished", "unfinished", "running")
         runs_cells = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS_TITLE in self._widths else ()
         answers_cells = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS_TITLE in self._widths else ()

@@ -1,8 +1,9 @@
 """Reference for the timing of a device's control loop: an empty real-time loop in C (`bare_loop.c`), run in parallel.
 
 It gives the least number of late ticks that this computer can reach under the same load. The program is compiled for
-each measurement, by the system's compiler or that of the optional dependency `compiler`; without a compiler, and on
-Windows, the finding states that no comparison was made. Called by `examine_setup` (`hapteq doctor`).
+each measurement, by the system's compiler or that of the optional dependency `compiler`; without a compiler, on
+Windows, and where compiling or running it fails, the finding states that no comparison was made. Called by
+`examine_setup` (`hapteq doctor`).
 """
 
 import contextlib
@@ -74,7 +75,8 @@ def run_bare_loop_in_parallel(duration_s: float, rate_hz: float, raised_priority
     end of the loop and stores the result in the `BareLoopRun`; after an exception in the block the loop is killed.
 
     duration_s: duration of the loop (s). rate_hz: its tick rate. raised_priority: whether to request real-time
-    priority. A missing compiler or a failed start raises no exception: `BareLoopRun.failure_reason` states it.
+    priority. A missing compiler, a failed compilation, a failed start and a missing result raise no exception:
+    `BareLoopRun.failure_reason` states them.
     """
     run = BareLoopRun()
     with tempfile.TemporaryDirectory() as folder:

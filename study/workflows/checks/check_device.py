@@ -21,8 +21,9 @@ READING_INTERVAL_S = 0.01
 """Interval between two readings (s). Chosen: ten ticks of the device's loop, so that every reading is a new one."""
 
 MIN_ANSWER_FRACTION = 0.9
-"""Smallest accepted fraction of valid readings (with a position or an acceleration). Chosen below 1, because a busy
-computer occasionally misses one."""
+"""Smallest accepted fraction of valid readings (with a position or an acceleration); also, of the valid readings, of
+those with a position and of those with an acceleration. Chosen below 1, because a busy computer occasionally misses
+one."""
 
 MAX_DISTANCE_MM = 20.0
 """Largest accepted distance of the handle from the place where trials start (mm). At this distance the centring spring

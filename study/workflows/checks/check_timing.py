@@ -1,8 +1,9 @@
 """Measure how well this computer keeps the rate of a device's loop (1 kHz): hold a stimulus of zero force in real time.
 
-Two measures: the ticks that the loop itself counts as late or missed, and the lateness of its readings or, where there
-is no telemetry, of this program's wake-ups. `study.session.stimulus.timing_verdict` holds the limits.
-`examine_setup` (`hapteq doctor`) calls `check_timing`; `prepare_sitting` calls `check_computer` before each sitting.
+Two measures: the ticks that the loop itself counts as late or missed, and the lateness of its readings or, without
+telemetry and for a simulated device, of this program's wake-ups. `study.session.stimulus.timing_verdict` holds the
+limits. `examine_setup` (`hapteq doctor`) calls `check_timing`; `prepare_sitting` calls `check_computer` before each
+sitting.
 """
 
 from collections.abc import Callable

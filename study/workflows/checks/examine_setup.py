@@ -147,8 +147,9 @@ def accept_examined_device(
     device_name: str, examination: Examination, operator: str, motion_callbacks: MotionCallbacks
 ) -> str:
     """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
-    `operator`; returns a sentence about it. Without an accelerometer no baseline is recorded. Raises DeviceError
-    without a timing or with a wrong finding other than of `OPTIONAL_FINDINGS`, WrongUseError for a simulated device."""
+    `operator`; returns a sentence about it. Without a working accelerometer no baseline is recorded. Raises DeviceError
+    without a timing, with a wrong finding other than of `OPTIONAL_FINDINGS`, and where baseline or acceptance fail,
+    WrongUseError for a simulated device."""
     if not needs_real_time(device_name):
         raise WrongUseError("There is nothing to accept", f"{device_name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing

@@ -112,7 +112,7 @@ class Engine(Protocol):
 
 def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
     """Run a diagnosis and write its folder. `on_progress(step, share)`, share 0 to 1. Raises StudyError for input that
-    cannot be diagnosed; then, and if interrupted, nothing is written."""
+    cannot be diagnosed; then, and if interrupted, no folder is written."""
     return write_result_folder(run_diagnosis(plan, on_progress, engine), on_progress)
 
 

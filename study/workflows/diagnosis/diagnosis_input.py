@@ -36,11 +36,11 @@ class DiagnosisInput:
     remarks: tuple[str, ...]
     """Sentences on what was changed or noticed while reading."""
     simulated: bool = False
-    """Whether the recordings are a session on the simulated omega.3."""
+    """Whether the recordings are trials of a session on the simulated omega.3."""
     spring_n_per_m: float = 0.0
     """Stiffness of the virtual spring that held the handle, whose force is not part of the commands (sessions only)."""
     constants: tuple[float, ...] = ()
-    """Force constants that were given, in N or N m per unit of the command; see `convert_commands_to_forces`."""
+    """Force constants by which commands were multiplied, N or N m per unit of the command; empty for a session."""
 
 
 def read_input(
@@ -143,7 +143,7 @@ def _join_sentences(problems: Sequence[str]) -> str:
 
 
 def _name_sources(sources: Sequence[Path]) -> tuple[str, ...]:
-    """Name the sources by their file names; with folder and number where two files have the same name."""
+    """Name the sources by their file names; all with folder and number where two files have the same name."""
     names = tuple(source.name for source in sources)
     if len(set(names)) == len(names):
         return names

@@ -98,8 +98,8 @@ def read_entries(paths: Sequence[Path], recordings: Sequence[Recording]) -> tupl
 
 
 def read_entry(path: Path) -> LawEntry:
-    """Load an effect file by running it. Raises StudyError if it does not exist, fails, or defines no ENTRY with a new
-    valid name."""
+    """Load an effect file by running it. Raises StudyError if it does not exist, does not end in .py, fails, or defines
+    no ENTRY with a new valid name."""
     module_spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
     if module_spec is None or module_spec.loader is None or not path.is_file():
         raise _make_effect_error(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")

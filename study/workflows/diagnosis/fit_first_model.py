@@ -1,7 +1,7 @@
 """Fit a first mechanical model (mass, damping, stiffness, modes) to recordings and write it; called by `hapteq model`.
 
 The structure is given or chosen by `analysis.diagnosis.first_model.choose_structure`. The file also states why the
-structure was chosen and its error on held-out parts.
+structure was chosen and its largest error, over the channels, on held-out parts.
 """
 
 from collections.abc import Callable

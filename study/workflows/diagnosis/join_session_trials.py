@@ -1,4 +1,4 @@
-"""Concatenate the trials of a session to a single recording for a diagnosis, sorted by frequency and level.
+"""Concatenate the trials of a session to a single recording for a diagnosis, sorted by frequency and class of levels.
 
 The recording of a trial begins in the middle of a vibration, whereas a simulation starts from rest. Therefore a lead-in
 precedes each trial: the trial's command, continued periodically and faded in, with an unknown response (NaN).
@@ -105,7 +105,8 @@ def join_session_trials(session: Path, seed: int) -> JoinedTrials:
 
 def _read_trial(path: Path, logged_hashes: Mapping[str, str | None]) -> _Trial | None:
     """Read a trial; None if samples are missing, if the recording has flags of a problem, if frequency, level or
-    segments are not stated, or if the file's hash differs from the log. logged_hashes: SHA-256 by file name."""
+    segments are not stated, or if the file's hash differs from the log. logged_hashes: SHA-256 by file name, None where
+    the log has none (the trial is then left out)."""
     logged_name = f"{path.parent.name}/{path.name}"
     if logged_name in logged_hashes and compute_sha256(path) != logged_hashes[logged_name]:
         return None

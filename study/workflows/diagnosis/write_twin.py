@@ -1,5 +1,5 @@
 """Identify a device's nominal mechanical model (digital twin) from recordings made for this purpose. Called by
-`study.cli.twin` (`hapteq twin`).
+`study.cli.twin` (`hapteq twin`) and, for a session on the simulated device, by `diagnose_recordings`.
 
 Steps: record multisines at two amplitudes well above friction; fit masses, dampings, stiffnesses and modes to the
 stronger recording; estimate the equivalent viscous damping of dry friction from the increase of damping at the lower
@@ -85,7 +85,7 @@ class WrittenTwin:
     rigid_body: RigidBody
     """The fit as a rigid body at low frequencies, with the damping that is due to friction."""
     notes: tuple[str, ...]
-    """Sentences on assumptions and on the effect of friction."""
+    """Sentences on assumptions, on the effect of friction, on the fit and, if there is one, on the calibration."""
 
 
 def write_twin(
@@ -229,7 +229,8 @@ def _gather_model_provenance(
 
 
 def _describe_assumptions(stronger: Recording, fit: MechanicalFit, rigid_body: RigidBody) -> tuple[str, ...]:
-    """Describe the assumptions of the model and the damping that was subtracted, as sentences for the user."""
+    """Describe the assumptions of the model, the damping that was subtracted and the reason of the fit, as sentences
+    for the user."""
     feedback = stronger.meta.get("feedback") or {}
     stiffness_n_per_m = float(feedback.get("stiffness_n_per_m", 0.0))
     return (

@@ -1,8 +1,8 @@
 """Summary of `hapteq equalize`: predicted accuracy of the accelerations that the computed forces produce.
 
 `study.cli.equalize` prints it, as lines of text or as plain values in JSON; `repeat_trajectory` extends it by measured
-errors. Predicted errors are rms errors relative to the rms of the reference trajectory, the accelerations that the
-device is to reproduce.
+errors. Predicted errors of accelerations are rms errors in the band, relative to the rms of the reference trajectory,
+the accelerations that the device is to reproduce, in that band.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from equalizer.tracking.feedforward.feedforward import extract_band
 from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
 
 MIN_REPORTED_SHARE = 0.01
-"""Smallest fraction (rms) of the reference trajectory, or of the forces, outside the band that is reported."""
+"""Fraction (rms) of the reference trajectory, or of the forces, outside the band above which it is reported."""
 
 
 def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:

@@ -141,7 +141,13 @@ def _combine_two_bands(
         ) from problem
     models_at_place = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
     return PlaybackModels(
-        models, models_at_place, two_bands, None, _warn_of_distance(paths[0], narrow, at_m), (), _compute_sha256(paths)
+        models,
+        models_at_place,
+        two_bands,
+        None,
+        _warn_of_distance(paths[0] if models[0] is narrow else paths[1], narrow, at_m),
+        (),
+        _compute_sha256(paths),
     )
 
 
@@ -190,7 +196,7 @@ def _describe_held_out_error(check: PlaceCheck) -> str:
 
 def _read_checked_model(path: Path) -> IdentifiedModel:
     """Read a model from fx, fy, fz (N) to ax, ay, az (m/s²) and give its channels these names; files may use others
-    that end in x, y, z, or numbers. Raises StudyError for other channels or units, an unstable model, or a gain above
+    (`_are_axes_in_order`). Raises StudyError for other channels or units, an unstable model, or a gain above
     `MAX_PLAUSIBLE_GAIN`."""
     model = read_identified_model(path)
     has_axis_order = all(_are_axes_in_order(names) for names in (model.input_channels, model.output_channels))
@@ -268,7 +274,7 @@ def _compute_sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
 
 
 def _format_place_mm(place_m: Vector | None) -> str:
-    """Format the place in millimetres: "(20, 0, 0) mm"."""
+    """Format the place in millimetres: "(20, 0, 0) mm"; "(place not known)" for None."""
     return (
         "(place not known)"
         if place_m is None

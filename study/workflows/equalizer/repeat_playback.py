@@ -62,7 +62,8 @@ def repeat_playback(
         play_results: list[PlaybackResult] = []
         states: list[IterationState] = []
         try:
-            total_s = (plan.repeats + 1) * plan.reference.signal.duration_s
+            padding_s = CAUSAL.count_rows(device.info.sample_rate_hz)[1] / device.info.sample_rate_hz
+            total_s = REST_S + (plan.repeats + 1) * (plan.reference.signal.duration_s + padding_s)
             announce_motion(device, plan.settings.limits.stimulus_cap_n, total_s, before_moving)
             _play_and_correct(plan, device, states, play_results, on_progress)
         except KeyboardInterrupt as interruption:

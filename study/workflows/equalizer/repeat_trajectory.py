@@ -78,8 +78,8 @@ def repeat_trajectory(
 ) -> RepeatedTrajectory:
     """Compute the forces, play and correct them, and write the table of forces and its document.
 
-    Raises StudyError: before anything moves where an output exists or where cap, models or convergence test do not
-    allow repeats; later where the device fails or the user interrupts.
+    Raises StudyError: before anything moves where an output exists or where cap, models, convergence test or earlier
+    forces do not allow repeats; later where the device fails or the user interrupts.
     """
     require_new_output(plan.out, get_repeats_path(plan.out))
     equalized = solve_trajectory(plan)
@@ -112,8 +112,8 @@ def repeat_trajectory(
 
 def summarise_repeats(result: RepeatedTrajectory) -> dict[str, Any]:
     """Summarise the results as plain values, for a JSON document. `errors`, `noise_floor`: rms relative to that of the
-    reference trajectory; `peak_n` in N; `surviving_error`: largest fraction of an error that remains after a
-    correction, by the convergence test."""
+    reference trajectory, both in the band; `peak_n` in N; `surviving_error`: largest fraction of an error that remains
+    after a correction, by the convergence test."""
     repeated = result.repeated
     return {
         **summarise_equalization(result.equalized),

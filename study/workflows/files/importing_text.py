@@ -1,7 +1,7 @@
 """Prose of docs/importing.md, in Markdown: how recordings of other programs are imported.
 
-`importing_docs` joins the text with the tables of keys, functions and shipped maps. The limits of size are inserted
-from the constants of the code that reads the files, so that page and code agree.
+`importing_docs` joins the text with the tables of keys, functions and shipped maps. Limits of size, except that of the
+cells of workbooks, are inserted from the constants of the code that reads the files, so that both agree.
 """
 
 from equalizer.signals.resampling import PASSBAND

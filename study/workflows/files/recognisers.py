@@ -1,7 +1,8 @@
 """Recognisers of hapteq's own file formats, one function per format. Called by `validate` (`hapteq validate`).
 
-A recogniser identifies a format by its format attribute, its top-level keys or its header, then reads the whole file
-with the reader of that format and returns a description in words. A new format adds its function to `RECOGNISERS`.
+A recogniser identifies a format by its format attribute or entry, its top-level keys or its header, then reads the
+whole file with the reader of that format and returns a description in words. A new format adds its function to
+`RECOGNISERS`.
 """
 
 from collections.abc import Callable
@@ -100,7 +101,7 @@ def recognise_calibration(content: FileContent) -> str | None:
 
 
 def recognise_mechanical_model(content: FileContent) -> str | None:
-    """Recognise a mechanical model in TOML by any of its top-level keys."""
+    """Recognise a mechanical model in TOML by any of its top-level keys except provenance."""
     if content.toml is None or not content.toml.keys() & {"model", "sensor", "actuator", "effect", "tolerance"}:
         return None
     model = read_mechanical_model(content.path)
@@ -136,7 +137,8 @@ def _find_unit_problem(channel: ChannelMap | ComputedMap) -> str:
 
 
 _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in make_protocol_schema(kind)["properties"]}
-"""Top-level keys of all kinds of protocols: a TOML file with any of them is taken for a protocol."""
+"""Top-level keys of all kinds of protocols: a TOML file with any of them is taken for a protocol, unless an earlier
+recogniser accepts it."""
 
 
 def recognise_protocol(content: FileContent) -> str | None:

@@ -1,5 +1,5 @@
-"""Recognisers of the files of a study, for `hapteq validate` (called by `validate`): sessions, JSON documents derived
-from them, locks.
+"""Recognisers of the files of a study, for `hapteq validate` (called by `validate`): sessions, JSON documents of
+sessions and studies, locks.
 
 A session folder is checked as a whole: its log is replayed against the rules, the recordings of trials are compared
 with the SHA-256 in the log, and the tables with what the log gives. Recordings of probes are not compared.
@@ -73,8 +73,8 @@ def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
 
 def recognise_document(content: FileContent) -> str | None:
     """Recognise a JSON document of `DOCUMENT_KINDS`. Returns its kind in words; None for others. Raises
-    UnusableFileError where a key is missing, for another version, an invalid seal, and a withdrawal whose erasing is
-    not finished."""
+    UnusableFileError where a key is missing, for another version, an invalid seal, and every withdrawal, because a
+    finished one leaves no such document."""
     if content.json_format not in DOCUMENT_KINDS:
         return None
     kind, required_keys = DOCUMENT_KINDS[content.json_format]

@@ -57,8 +57,8 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
 
 
 def _describe_idle_commands(validation: Validation) -> tuple[str, ...]:
-    """Describe, in one remark, the commands of a valid recording that are zero or missing in every sample; empty
-    without such commands."""
+    """Describe, in one remark, the commands of a valid recording in hapteq's format that are zero or missing in every
+    sample; empty without such commands and for other files."""
     if validation.problems or not validation.kind.startswith("recording, "):
         return ()
     command = read_recording(validation.path).command
@@ -79,7 +79,8 @@ def _is_folder(path: Path) -> bool:
 
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
-    """Validate by the recognisers, then as a foreign recording; without remarks on access rights and commands."""
+    """Validate by the recognisers, then as a foreign recording, or only as such (`_is_foreign`); without remarks on
+    access rights and commands."""
     if _is_foreign(path):
         return _validate_foreign(path)
     try:

@@ -1,4 +1,4 @@
-"""Calibrates the linkage of a delta device, that is the arms between motors and handle (`hapteq calibrate`).
+"""Calibrate the linkage of a delta device, that is the arms between motors and handle (`hapteq calibrate`).
 
 Joint angles, Jacobian, inertia and gravity are read from the device's library over a grid of handle positions, checked
 for consistency, and filled in from mirror positions where the library gives none. The result is an HDF5 file, which
@@ -203,8 +203,8 @@ def _read_centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 
 def _compute_difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
     """Compute the difference between the device's Jacobian and that of its joint angles by central differences,
-    relative to the largest entry of the latter. 0 where a neighbouring position is out of reach, or where a value is
-    not finite, which `check_reading` rejects."""
+    relative to the largest entry of the latter. 0 where a neighbouring position is out of reach, or where an angle or a
+    value of the Jacobian is not finite; `check_reading` rejects such a Jacobian."""
     positions_m = list_difference_positions(reading.position_m)
     angle_rows = [
         angle_row for position_m in positions_m if (angle_row := linkage.compute_angles_at(position_m)) is not None

@@ -75,8 +75,8 @@ def require_new_output(out_path: Path) -> None:
 
 
 def import_recording(plan: ImportPlan, on_progress: ProgressCallback = lambda share: None) -> ImportedRecording:
-    """Import a recording and write it to `plan.out`, with the files' hashes and the map in its metadata. on_progress:
-    share done, 0 to 1. Raises StudyError; nothing is written then."""
+    """Import a recording and write it to `plan.out`, with the files' hashes and the map's name and hash in its
+    metadata. on_progress: share done, 0 to 1. Raises StudyError; nothing is written then."""
     require_new_output(plan.out)
     foreign_recording = read_foreign(plan.files, plan.map, on_progress)
     provenance = gather_provenance(parents=foreign_recording.files).as_dict()
@@ -171,7 +171,7 @@ def _import_by_found_map(folder: Path, on_progress: ProgressCallback) -> Foreign
 
 def _read_hapteq_recordings(files: Sequence[Path]) -> ForeignRecording:
     """Read recordings in hapteq's own format; several are joined one after another. Raises ImportRefusedError where
-    their device, sample rate or hold differ."""
+    their device, sample rate, hold, channels or units differ."""
     recordings = [read_recording(path) for path in files]
     if len(recordings) == 1:
         return ForeignRecording(recordings[0], tuple(files), "recording", "", ())

@@ -40,7 +40,7 @@ def analyze_data(
     """Analyse all sessions in `data`; an earlier analysis in `out_folder` is replaced. data: folder of sessions, a
     single session, or an exported dataset. ellipsoid: recording whose acceleration ellipses the report shows.
     protocol_name: protocol to analyse where there are several. Raises StudyError where there is nothing to analyse,
-    where rows contradict their protocol, or where files cannot be written.
+    where rows contradict their protocol, where ellipses cannot be computed, or where files cannot be written.
     """
     data, out_folder, ellipsoid = Path(data), Path(out_folder), None if ellipsoid is None else Path(ellipsoid)
     collected_trials = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
@@ -98,8 +98,8 @@ def _format_frequency_lines(table: ThresholdTable, heading: str) -> list[str]:
 
 
 def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
-    """Format lines on the medians (N) of the hierarchical model with their 95 % intervals; empty where it was not
-    fitted."""
+    """Format lines on the medians (N) of the hierarchical model with their 95 % intervals, on the direction limit and
+    on the comparison of the analyses; empty where it was not fitted."""
     if analysis.primary is None:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]

@@ -2,7 +2,7 @@
 
 Used by `analyze_data`, `hapteq export`, `hapteq power` and the reproduction of the paper. People, simulated
 participants, and people at a device that did not move are never analysed together (`Population`). Every exclusion is
-reported as a sentence. Tables and seals of the sessions that are missing or out of date are written.
+reported as a sentence. Tables and seals of closed sessions that are missing or out of date are written.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,8 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
     """Collect the sessions in `data` (or `data` itself, a session) that belong together. Of several protocols: the
     named one (name, or first 12 digits of its hash); else, of those with test or detection runs, the one with the most
     sessions. Of several populations: the first in the order of `Population`. Missing or outdated tables and seals of
-    all usable sessions are written (`_finish_result_files`). Raises StudyError where there is nothing to analyse."""
+    all usable closed sessions are written (`_finish_result_files`). Raises StudyError where there is nothing to
+    analyse."""
     folders = _list_folders(data)
     usable_sessions, exclusions = _fold_sessions(folders)
     session_states = [(folder, session.state) for folder, session in usable_sessions]
@@ -140,8 +141,8 @@ def _fold_sessions(folders: Sequence[SessionFolder]) -> tuple[list[tuple[Session
 
 
 def _finish_result_files(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
-    """Write tables and seals that are missing or out of date; returns sentences on what was written. Errors are only
-    reported, because the analysis uses the logs alone."""
+    """Write all tables and the seal of each closed session in which one is missing or out of date; returns sentences on
+    these. Errors are only reported, because the analysis uses the logs alone."""
     sentences = []
     for folder, session in sessions:
         try:

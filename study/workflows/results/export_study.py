@@ -66,9 +66,9 @@ class ExportResult:
 def export_study(
     collected: CollectedTrials, data: Path, out_folder: Path, form: Form, free_text: bool = False
 ) -> ExportResult:
-    """Write the dataset atomically into the new folder `out_folder`. collected: the sessions of the data folder `data`
+    """Write the dataset atomically into `out_folder`, new or empty. collected: the sessions of the data folder `data`
     that belong together. free_text: include answers that participants wrote in their own words. Raises StudyError where
-    `out_folder` exists or cannot be written."""
+    `out_folder` exists and is not an empty folder, or cannot be written."""
     require_new_folder(out_folder)
     metadata, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
     with create_new_folder(out_folder) as folder:

@@ -38,7 +38,7 @@ MAX_PLACE_DISTANCE_M = 0.02
 Chosen: models identified farther away leave a coupling between the axes as large as that without an equalizer."""
 
 REQUIRED_CHANNELS = (("fx", "fy", "fz"), ("ax", "ay", "az"))
-"""Channels that a model of a study needs: forces, then accelerations, in this order."""
+"""Channels of a model of a study, forces, then accelerations: if it has these names, in this order (`_check_axes`)."""
 IDENTIFICATION_REMEDY = "Identify it again with hapteq identify."
 """Remedy for an unusable model, for messages."""
 MAX_RESPONSE_ERROR = 0.1

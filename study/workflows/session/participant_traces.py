@@ -1,9 +1,10 @@
 """Search for a participant's data in a data folder, for a withdrawal (`withdraw_participant`).
 
-Proved data, which the withdrawal erases: a session folder whose log or tombstone names the participant; an analysis
-whose tables, statistics or figures name the participant; an unfinished file or folder (of an interrupted write) that
-names one of the participant's sessions. Doubtful data are reported and kept. Symbolic links are reported and never
-followed.
+Proved data, which the withdrawal erases: a folder with the name of a session of the participant, whose log or tombstone
+confirms it or that an interrupted withdrawal emptied; an analysis whose tables, statistics or figures name the
+participant; an unfinished file or folder (of an interrupted write) that belongs to such an analysis or names one of the
+participant's sessions. Doubtful data are reported and kept. Symbolic links are never followed; those with the name of
+such a session or of an analysis are reported.
 """
 
 import csv
@@ -79,8 +80,8 @@ def find_traces(data: Path, subject: str, proved_names: Collection[str] = ()) ->
 
 
 def is_session_of(path: Path, subject: str) -> bool:
-    """Whether a real folder (no symbolic link) contains a session of this subject, by the first line of its log or by
-    its tombstone."""
+    """Whether a real folder (no symbolic link) contains a session of this subject, by the first line of its log;
+    without a readable log, whether its tombstone states the session of the folder's name."""
     if not is_real_folder(path):
         return False
     folder = SessionFolder(path)
@@ -209,7 +210,7 @@ def _is_unmanaged_file(path: Path, subject: str) -> bool:
 
 def _has_session_name(path: Path, subject: str) -> bool:
     """Whether the name of a path, its text or, for a folder, the name or text of any file in it contains the name of a
-    session of this subject."""
+    session of this subject or of the record of a withdrawal."""
     session_pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}(_\d{{3,}}|\.withdrawal\.json)(?!\d)")
     if session_pattern.search(path.name):
         return True

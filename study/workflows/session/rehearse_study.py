@@ -69,10 +69,11 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
     """Run the sessions of all participants. on_finished: called after each with the number of finished sessions.
 
     workers: a number of processes of this computer, or an executor, whose workers need not share a disk with it: they
-    return the files of whole sessions. On an interruption, running sessions are finished and no other is begun.
+    return the files of whole sessions. On an interruption no other session is begun; those that run in processes of
+    this computer are finished.
 
-    Raises StudyError where the folder holds a rehearsal of another protocol, seed, observer or model, or where a
-    simulated participant did not finish.
+    Raises StudyError where the folder holds sessions of other participants, or a rehearsal of another protocol, seed,
+    observer or model, or where a simulated participant did not finish.
     """
     _require_same_rehearsal(rehearsal)
     saved_text = "begun so far" if isinstance(workers, int) else "finished so far"

@@ -72,7 +72,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     except BaseException:
         sitting.device.stop()
         raise
-    # The session is over: Ctrl-C only ends the goodbye.
+    # The sitting is over: Ctrl-C only ends the goodbye.
     with contextlib.suppress(KeyboardInterrupt):
         ineligibility = session_end.state.sitting.ineligibility if session_end.state.closed else ""
         sitting.display.goodbye(

@@ -33,7 +33,7 @@ class Withdrawal:
     subject: str
     """Code of the participant."""
     sessions: tuple[str, ...]
-    """Names of all sessions of the participant in this data folder, earlier withdrawn ones included."""
+    """Names of the proved sessions of the participant in this data folder, earlier withdrawn ones included."""
     derived: tuple[str, ...]
     """Paths of analyses and unfinished files with the participant's data, relative to the data folder."""
     doubtful: tuple[str, ...]
@@ -67,9 +67,9 @@ def find_session_to_withdraw(session: str, data: Path) -> SessionFolder:
 
 
 def plan_withdrawal(session: SessionFolder) -> Withdrawal:
-    """Plan the withdrawal of the session's participant: all sessions, and the analyses made from them; includes the
-    plan of a withdrawal that was interrupted. Nothing is changed. Raises StudyError where no data are proved to be the
-    participant's and no withdrawal was begun."""
+    """Plan the withdrawal of the session's participant: all proved sessions, and analyses that name the participant;
+    includes the plan of a withdrawal that was interrupted. Nothing is changed. Raises StudyError where no session is
+    proved to be the participant's and no withdrawal was begun."""
     data, subject = session.path.parent.resolve(), session.subject
     intent = read_intent(data, subject)
     traces = find_traces(data, subject, intent.sessions if intent else ())
@@ -120,7 +120,7 @@ def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]
 
 
 def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
-    """Lock session and log until `locks` is closed. Raises OSError if a link or file is at the folder's path, and
+    """Lock session and log until `locks` is closed. Raises OSError unless a real folder is at the folder's path, and
     StudyError if the session is running."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)

@@ -56,7 +56,7 @@ class _MeasuredProbe:
     """Why the playback ended early; None where it was complete."""
     play_result: PlaybackResult
     mass_kg: float | None
-    """Apparent mass of the handle; None without a recording."""
+    """Apparent mass of the handle; None where it cannot be estimated, such as without a recording."""
 
 
 def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> ActionResult:
@@ -72,7 +72,8 @@ def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> ActionRes
 
 def play_reference(state: SessionState, sitting: Sitting) -> ActionResult:
     """Ask for a free handle, test with a probe whether it is free, and only then play the reference; afterwards ask the
-    participant to take the handle. If the reference is not played, the reason is logged."""
+    participant to take the handle, unless the sitting pauses or ends. If the reference is not played, the reason is
+    logged, except where a request, or an early end or fault of the probe, prevents it."""
     form = make_form(state.protocol, FormKind.HANDLE)
     assert form is not None, "a reference is due only where the protocol has one"
     hand_mass_kg = state.sitting.probing.hand_mass_kg

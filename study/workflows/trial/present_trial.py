@@ -3,7 +3,8 @@
 
 Order: wait until the handle rests at the centre; log the presentation; play the stimulus and ask; log the answer;
 release the force; measure the delivered acceleration and log it. A detection trial releases the force before the
-question. Each event is written to the disk before the next step, so that a crash loses no trial and no answer.
+question. Each event is written to the disk before the next step, so that a crash loses no trial and no answer; only an
+onset pulse is logged after the reply, so that writing does not delay the question.
 """
 
 import math

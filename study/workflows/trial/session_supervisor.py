@@ -18,7 +18,7 @@ LIVE_INTERVAL_S = 0.25
 Chosen."""
 
 PLAYING_ACTIVITIES = ("trial", "demo", "probe", "reference")
-"""Activities in which the device holds a stimulus: a fault ends their wait."""
+"""Activities in which the device holds or plays a stimulus: a fault ends their wait."""
 
 
 class SessionSupervisor:
@@ -54,8 +54,8 @@ class SessionSupervisor:
         self.pause_requester: RequestSource | None = None
 
     def start_activity(self, activity: Activity) -> None:
-        """Start a new wait: take pending requests and publish the live state. A button that is still held from the last
-        wait does not answer this one."""
+        """Start a new wait: take pending requests and, unless the clock is virtual, publish the live state. A button
+        that is still held from the last wait does not answer this one."""
         self._activity, self._activity_start_utc = activity, self._clock.utc()
         self._buttons_released = False
         self._answer = None

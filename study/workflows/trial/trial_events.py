@@ -29,7 +29,8 @@ class TrialOutcome:
     play_result: PlaybackResult
     """Recording of the stimulus, and counters of the device."""
     delivered: DeliveredMotion | None
-    """Delivered amplitudes; None where less than a period was measured or the acceleration cannot be trusted."""
+    """Delivered amplitudes; None without a recording, where less than a period was measured, or where the acceleration
+    cannot be trusted."""
     flags: tuple[str, ...]
     """Reasons, in words, why the stimulus should be inspected; empty without any."""
     unit_vector: FloatArray

@@ -85,7 +85,7 @@ def make_unreadable_line(folder: SessionFolder, remark: str) -> SessionLine:
 
 def _make_withdrawn_line(folder: SessionFolder) -> SessionLine:
     """Make the line of a withdrawn session, from its tombstone (a file that remains after the erasure) or, before that
-    is written, from the record of the intended withdrawal."""
+    is written, from the record of the intended withdrawal. The time of the withdrawal takes the place of the start."""
     tombstone = read_tombstone(folder)
     intent = read_intent(folder.path.parent, folder.subject)
     withdrawn_utc = str(tombstone.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))

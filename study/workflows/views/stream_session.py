@@ -1,9 +1,9 @@
 """Stream a session's events as markers of the lab streaming layer (LSL), with the time at which they happened. Called
 by `study.cli.stream` (`hapteq stream`).
 
-A separate process follows the log, so that streaming cannot delay or end the session. Every event in the log carries
-the time t by the session's monotonic clock; its marker gets the time t + offset on LSL's clock. The offset between the
-two clocks is measured every `OFFSET_INTERVAL_S` and is streamed as a marker too.
+A separate process follows the log, so that streaming cannot delay or end the session. An event in the log states its
+time t by the session's monotonic clock (older logs do not); its marker gets the time t + offset on LSL's clock. The
+offset between the two clocks is measured every `OFFSET_INTERVAL_S` and is streamed as a marker too.
 """
 
 import json
@@ -39,7 +39,7 @@ STREAMED_FIELDS = (
 """Fields of an event that are streamed; none contains personal data, notes or forms."""
 
 LAST_EVENT = "session_closed"
-"""Event after which streaming ends: the last of a session."""
+"""Event that closes a session, after which streaming ends."""
 
 
 class Outlet(Protocol):

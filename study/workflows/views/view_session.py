@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from analysis.psychophysics.study_analysis import StudyAnalysis
 
 THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark")
-"""Columns of the table of thresholds."""
+"""Columns of the table of thresholds; at: frequency, rev.: number of reversals, right: percentage of right answers."""
 
 
 def make_session_view(path: Path, zone: Zone = to_utc) -> SessionView:

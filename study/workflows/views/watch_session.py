@@ -63,9 +63,9 @@ class Follower:
         self._drifts: DriftReader | None = None
 
     def look(self, now_utc: str) -> WatchView | None:
-        """Read the new lines and make the view at the time now_utc (ISO 8601); None while the log has no complete line.
-        Raises StudyError where the log cannot be read, or its first line is invalid, before a line has been applied.
-        Later damage is reported in the view."""
+        """Read the new lines and make the view at the time now_utc (ISO 8601); None while there is no log, or no
+        complete line in it. Raises StudyError where the log cannot be read, or its first line is invalid, before a line
+        has been applied. Later damage is reported in the view."""
         self._read_new_lines()
         if self._watched is None:
             return None

@@ -7,7 +7,9 @@ import time
 import pytest
 
 from study.cli import watch
+from study.cli.conduct import make_simulated_code
 from study.cli.main import main
+from study.session.views.participant_codes import is_code
 from study.session.watching.requests import PauseAsked, StopAsked
 from study.store.sessions.event_log import LOG_NAME, EventLog, read_log
 from study.store.sessions.request_inbox import RequestInbox
@@ -129,3 +131,25 @@ def test_a_session_without_a_line_has_not_begun(capsys, tmp_path):
     (tmp_path / "P01_001" / LOG_NAME).write_bytes(b"")
     code, _out, err = run(capsys, tmp_path, "watch", "P01_001", "--once")
     assert (code, "This session has not begun" in err) == (1, True)
+
+
+def test_a_session_of_the_data_folder_precedes_a_folder_of_the_same_name_here(tmp_path, monkeypatch, data):
+    namesake = tmp_path / "S1_001"
+    namesake.mkdir()
+    (namesake / LOG_NAME).write_text("")
+    monkeypatch.chdir(tmp_path)
+    assert watch._find_folder("S1_001", data) == watch._find_last_changed(data) == (data / "S1_001").resolve()
+    assert watch._find_folder(str(namesake), data) == namesake.resolve()
+
+
+def test_each_simulated_participant_has_a_code_of_its_own():
+    names = (
+        "ideal",
+        "delivered_7_seed_1",
+        "delivered_7_seed_12",
+        "criterion_drift_7_seed_1",
+        "criterion_drift_71_seed_1",
+    )
+    codes = [make_simulated_code(name) for name in names]
+    assert codes[0] == "ideal1" and len(set(codes)) == len(names)
+    assert all(is_code(code) for code in codes)

@@ -59,9 +59,10 @@ ABSCISSA_BY_EFFECT: Mapping[str, Abscissa] = {
     "sensor_drift": "time",
     "clock_drift": "growth",
 }
-"""Variable of each effect's curve; an effect that is not listed is shown as a spectrum ("frequency")."""
+"""Variable of each effect's curve; an effect that is not listed is shown as a spectrum ("frequency"), except a
+discovered law that `law_curves` can draw."""
 _SPECTRAL_LINES = 1024
-"""Number of spectral lines before they are averaged in twelfths of an octave. Chosen by hand."""
+"""Largest number of spectral lines before they are averaged in twelfths of an octave. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +139,8 @@ def _compute_abscissa(position: FloatArray, velocity: FloatArray, abscissa: Absc
 
 
 def _compute_equivalent_force(evidence: Evidence, with_effect: SimulationResult, hold: Hold) -> FloatArray:
-    """Compute by deconvolution the force (n, m), in N or N m, that causes the same responses of the model without the
-    effect."""
+    """Compute by deconvolution the force (n, m), in the commands' unit, that causes the same responses of the model
+    without the effect."""
     without_effect = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
     response_changes, noise_levels = [with_effect.response - without_effect.response], [evidence.noise]
     if evidence.position_noise is not None:

@@ -1,9 +1,9 @@
 """Compute maps of the missing force along each axis against position, velocity, command and time, and hysteresis loops.
 
-With force balances, the missing force is the residual of mass, damping and stiffness (or of the given model); without
-balances, that of the re-tuned model, from its evidence. Its sign is that of a force on the device. Where laws complete
-the model, the residual with them is computed, too. Called by `diagnose`; `analysis.figures.diagnosis.state_maps` draws
-the maps.
+With force balances, the missing force is the residual of mass, damping and stiffness, or, where a model was given, of
+the re-tuned model; without balances, that of the re-tuned model, from its evidence. Its sign is that of a force on the
+device. Where laws complete the model, the residual with them is computed, too. Called by `diagnose`;
+`analysis.figures.diagnosis.state_maps` draws the maps.
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ class StateView:
     abscissa_name: str
     """Name of the abscissa: "position"."""
     unit: str
-    """Unit of the abscissa, SI."""
+    """Unit of the abscissa."""
     sample_abscissa: FloatArray
     """(samples,): abscissa of the single samples."""
     sample_force: FloatArray
@@ -81,20 +81,20 @@ class StateMaps:
 
     axis: str
     unit: str
-    """Unit of the force, SI."""
+    """Unit of the force: that of the command."""
     model: str
     """The model that lacks the force, in words."""
     completed: str
     """Kind of the laws that complete the model: WITH_NAMED, WITH_CANDIDATES; empty = none."""
     share: float
-    """Missing force over force, rms."""
+    """Missing force, rms, over the standard deviation of the force."""
     views: tuple[StateView, ...]
     loops: tuple[Loop, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AxisSeries:
-    """Samples (n,) of one axis, all parts one after another; SI."""
+    """Samples (n,) of one axis, all parts one after another, in the units of the recording."""
 
     rate_hz: float
     time_s: FloatArray

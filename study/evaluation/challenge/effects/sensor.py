@@ -5,10 +5,10 @@ sensitivity. In all channels: lag (bandwidth in Hz, in place of 500 Hz); misalig
 drift, linear from 0 to `total` at the end; mains hum; quantization to `step`; clock error (ppm); lost samples (fraction
 that repeats the sample before); logger offset (s; positive: the acceleration is delayed, but not the position).
 
-Accelerations are in m/s^2. Drift and hum have a random share in each channel; the largest share is 1. The strength
-interpolates each range geometrically. `challenge.sensor` applies the effects; `EFFECTS` is part of the table from which
-`draw_case` chooses. A `_draw_...` function draws parameters, a `_build_...` function builds them into a device; all
-ranges were chosen by hand. `axis` is not used where an effect acts on all channels.
+Accelerations are in m/s^2. Drift and hum have a random share in each channel; the largest of those read is 1. The
+strength interpolates each range geometrically. `challenge.sensor` applies the effects; `EFFECTS` is part of the table
+from which `draw_case` chooses. A `_draw_...` function draws parameters, a `_build_...` function builds them into a
+device; all ranges were chosen by hand. `axis` is not used where an effect acts on all channels.
 """
 
 from dataclasses import replace

@@ -1,8 +1,8 @@
 """Draw and generate the cases of a bank of laws: devices with a law outside the catalogue, and controls without one.
 
 A turn of twenty cases has twelve with a law, four with nothing missing, three with an effect of the catalogue and one
-with an additional linear mode, in random order. All laws, and all effects, are used before any is used again. Called by
-`study.evaluation.bank.laws.seal_laws`. All numbers were chosen.
+with an additional linear mode, in random order. All laws, and all of `DECOY_EFFECTS`, are used before any is used
+again. Called by `study.evaluation.bank.laws.seal_laws`. All numbers were chosen.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ CASES_PER_TURN: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "
 TURN_KINDS: tuple[LawBankKind, ...] = tuple(kind for kind, count in CASES_PER_TURN.items() for _ in range(count))
 """Kind of each case of a turn, before it is shuffled."""
 LOWEST_STRENGTH = 0.35
-"""Lowest strength of a concealed law, effect or mode; the highest is 1."""
+"""Lowest drawn strength of a concealed law, effect or mode; the highest is 1. `_build_stable_law` may reduce it."""
 MODE_EFFECT = "extra_mode"
 """Effect of the kind `mode`."""
 DECOY_EFFECTS = tuple(name for name in EFFECTS if name not in (*THREE_AXIS_EFFECTS, MODE_EFFECT, "hand_impedance"))

@@ -35,7 +35,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MujocoBench:
-    """Parameters of the bench and of its concealed effects; each array (3,), a value per axis."""
+    """Parameters of the bench and of its concealed effects; arrays (3,) have a value per axis."""
 
     mass_kg: FloatArray
     """Mass that moves along each axis (kg), without the oscillators."""

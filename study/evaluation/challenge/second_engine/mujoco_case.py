@@ -43,9 +43,9 @@ BuildEffect = Callable[[MujocoBench, int, Values], MujocoBench]
 def draw_mujoco_case(
     seed: int, effects: Sequence[str], origin: ModelOrigin, strength: Sequence[float], name: str, settings: CaseSettings
 ) -> Case:
-    """Draw a case as `challenge.draw_case.draw_case` does, with the motion from MuJoCo. Raises ValueError for an effect
-    that is neither in `BUILDERS` nor in `SENSOR_EFFECTS`, and where the motion diverges. The last element of the seed,
-    2, is arbitrary: it makes the random sequence independent of that of `draw_case`."""
+    """Draw a case as `challenge.draw_case.draw_case` does, with the motion from MuJoCo and no nuisance effects. Raises
+    ValueError for an effect that is neither in `BUILDERS` nor in `SENSOR_EFFECTS`, and where the motion diverges. The
+    last element of the seed, 2, is arbitrary: it makes the random sequence independent of that of `draw_case`."""
     if unknown_effects := set(effects) - set(BUILDERS) - set(SENSOR_EFFECTS):
         raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown_effects))}")
     random = np.random.default_rng([seed, len(effects), 2])

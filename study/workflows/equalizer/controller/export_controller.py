@@ -104,7 +104,7 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
 def make_controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
     """Make and check the settings of the real-time controller. weight: of |force|² against |error|² in the cost, (m/s²
     per N)²; preview_s: time (s) for which the stream is known in advance; cap_n: largest force (N). Raises StudyError
-    for values outside their limits."""
+    for a preview or a force outside its limits; `export_controller` checks the weight."""
     if not preview_s <= MAX_PREVIEW_S:
         raise _make_refusal(
             f"A preview of {preview_s:g} s was requested; {MAX_PREVIEW_S:g} s is the longest.", EXAMPLE_SETTINGS

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import StudyError, UserInterruptError
+from study.evaluation.bank import answer_cases
 from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
@@ -71,6 +72,14 @@ def test_the_process_that_answers_never_loads_the_challenge(proof):
     folder = proof[0].folder
     answers = [json.loads(path.read_text()) for path in folder.open.glob(f"*/{ANSWER_FILE}")]
     assert [answer["knows_the_challenge"] for answer in answers] == [False] * len(answers)
+
+
+def test_a_loaded_challenge_is_noticed(monkeypatch):
+    for name in [name for name in sys.modules if name.startswith(answer_cases.CHALLENGE_PACKAGE)]:
+        monkeypatch.setitem(sys.modules, name, None)
+    assert not answer_cases.is_challenge_loaded()
+    monkeypatch.setitem(sys.modules, f"{answer_cases.CHALLENGE_PACKAGE}.draw_case", sys)
+    assert answer_cases.is_challenge_loaded()
 
 
 @pytest.mark.parametrize(

@@ -184,3 +184,7 @@ def test_a_time_that_cannot_be_converted_stays_as_it_is():
 
 def test_control_characters_of_a_note_do_not_reach_the_terminal():
     assert "\x1b" not in describe_event(NoteTaken(UTC, "participant", "a\x1b[2Jb"))
+
+
+def test_a_line_break_in_a_reason_begins_no_line():
+    assert "\n" not in describe_event(SessionInterrupted(UTC, "the power failed\nP02 is fine"))

@@ -40,3 +40,10 @@ def test_seeds_hash_and_device_are_exported(tmp_path, small_text):
     opened = json.loads((data / session / "events.jsonl").read_text("utf-8").splitlines()[0])
     assert facts["devices"] == [opened["device"]["name"]]
     assert "`code/facts.json`" in (out / "README.md").read_text("utf-8")
+
+
+def test_no_target_of_the_staircase_is_stated_where_psi_chooses_the_levels(tmp_path):
+    text = PUBLISHED.replace("[staircase.bayesian]\ntrials = 0 ", "[staircase.bayesian]\ntrials = 60 ")
+    assert text != PUBLISHED
+    write_bids(tmp_path, "study", (), text, {})
+    assert "%" not in json.loads((tmp_path / "task-study_beh.json").read_text("utf-8"))["TaskDescription"]

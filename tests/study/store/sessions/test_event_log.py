@@ -66,6 +66,28 @@ def test_a_torn_line_that_cannot_be_removed_is_a_clear_error(written, monkeypatc
     assert error.value.saved == "All complete lines are on disk."
 
 
+def test_an_incomplete_line_is_removed_before_the_next_where_that_failed_at_first(written, monkeypatch):
+    log, write = EventLog.reopen(written), os.write
+
+    def write_half(descriptor: int, data: bytes) -> int:
+        write(descriptor, bytes(data)[:10])
+        raise OSError(28, "No space left on device")
+
+    def fail(descriptor: int, size: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    with monkeypatch.context() as full_disk:
+        full_disk.setattr(os, "write", write_half)
+        full_disk.setattr(os, "ftruncate", fail)
+        with pytest.raises(StudyError):
+            log.append(note("lost"))
+    assert read_log(written).torn
+    log.append(note("third"))
+    log.close()
+    contents = read_log(written)
+    assert not contents.torn and [event.text for event in contents.events][-1] == "third"
+
+
 def test_a_broken_line_in_the_middle_is_an_error_that_changes_nothing(written):
     first, second, _ = written.read_bytes().split(b"\n")
     damaged = first[:-5] + b"\n" + second + b"\n"
