@@ -106,7 +106,8 @@ def seal_injections(
 
 def _write_injection(folder: ProofFolder, recordings: Sequence[InjectableRecording], number: int, seed: int) -> str:
     """Draw one case, with the same strength for all its faults, and write its files and its label, to be sealed by
-    `seal`; returns its name. An existing case is kept."""
+    `seal`; returns its name. An existing case is kept. In the label, a second parameter of one name has its fault's
+    name before it."""
     label_path = folder.get_label_file(number)
     if label_path.exists():
         return str(read_label(label_path)["name"])
@@ -119,7 +120,6 @@ def _write_injection(folder: ProofFolder, recordings: Sequence[InjectableRecordi
     for effect in effects:
         injected = inject(faulty, effect, strength, generator)
         faulty = injected.recording
-        # Two faults may have a parameter of one name: the second then has its fault's name before it.
         values |= {name if name not in values else f"{effect}.{name}": value for name, value in injected.values.items()}
     clean, faultless, faulty = (_remove_origin(blank_lead_responses(half)) for half in (clean, faultless, faulty))
     change = compute_held_out_change(clean, faultless, faulty) if effects else 1.0

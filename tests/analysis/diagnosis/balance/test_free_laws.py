@@ -103,5 +103,9 @@ def test_a_friction_of_the_catalogue_keeps_its_name(find_balance, axis_module):
 def test_without_discovery_no_free_law_is_tried(find_balance):
     balance = find_balance(record(1, 21), without=FREE_LAWS)[0]
     assert {law.law.effect for law in balance.laws}.isdisjoint(FREE_LAWS)
+
+
+@pytest.mark.slow
+def test_without_discovery_no_formula_is_named():
     found = diagnose_values(record(1, 21), settings=DiagnosisSettings(discovery=False)).diagnosis
     assert all(effect.law is None for effect in found.effects)

@@ -86,7 +86,10 @@ def test_retuning_finds_the_bench_when_nothing_hides():
     np.testing.assert_allclose(found.stiffness, bench.stiffness, atol=0.3)
 
 
-@pytest.mark.parametrize("effect", ["viscous_damping", "extra_mode", "hand_impedance", "coulomb_friction"])
+@pytest.mark.parametrize(
+    "effect",
+    ["extra_mode", *(pytest.param(name, marks=pytest.mark.slow) for name in ("viscous_damping", "hand_impedance"))],
+)
 def test_a_further_recording_is_of_the_device_with_its_concealed_effect(effect):
     case = draw_case(7, (effect,), strength=1.0)
     again = case.record_again(case.recording.command.samples, "multisine", 0.0, 1)
