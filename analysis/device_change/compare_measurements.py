@@ -147,7 +147,10 @@ def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, li
         ratio = np.linalg.norm(today.response[:, :, axis], axis=1) / np.linalg.norm(
             accepted.response[:, :, axis], axis=1
         )
-        gain = max(float(np.median(ratio)), np.finfo(float).tiny)  # 0 for a sensor that reads nothing
+        gain = float(np.median(ratio))
+        if gain == 0:  # a sensor that reads nothing: nothing is said of the shape of its response
+            yield Change("gain", channel, 1.0, 0.0, 0.0, limits.relative_step, "", True)
+            continue
         # Standard error of a median: sqrt(pi / 2) = 1.2533 times that of a mean; 1.4826 MAD estimates the deviation.
         error = float(1.2533 * 1.4826 * np.median(np.abs(ratio - gain)) / np.sqrt(len(ratio)))
         changed = _is_significant(np.log(gain), error / gain, np.log1p(limits.relative_step), limits)

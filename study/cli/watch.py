@@ -51,9 +51,9 @@ def watch(
 
 
 def _find_folder(session: str, data: Path) -> Path:
-    """Find the session's folder by its name in `data`, or by its path. Raises StudyError where there is no session, or
+    """Find the session's folder by its path, or by its name in `data`. Raises StudyError where there is no session, or
     a withdrawn one."""
-    for path in (data / session, Path(session)):
+    for path in (Path(session), data / session):
         if (path / LOG_NAME).is_file():
             return path.resolve()
     from study.store.sessions.archive import find_session

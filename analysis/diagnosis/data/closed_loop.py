@@ -27,6 +27,8 @@ def is_in_closed_loop(recording: Recording) -> bool:
     if recording.excitation is not None:
         feedback = command - recording.excitation.samples
         is_complete = np.isfinite(feedback).all(axis=1)
+        if not is_complete.any():
+            return False
         return bool(_compute_rms(feedback[is_complete]) > FED_BACK_SHARE * _compute_rms(command[is_complete]))
     if recording.hold is not Hold.ZERO_ORDER:
         # The command written just before a sample may already depend on the sample after it.

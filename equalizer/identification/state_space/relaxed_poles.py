@@ -31,7 +31,7 @@ line spacing still determine its decay, up to the point where they equal those o
 SIGNIFICANCE_LEVEL = 1e-3
 """Significance level of the test: probability that noise alone relaxes a pole. Chosen."""
 RELAXED_SUFFIX = ", poles relaxed"
-"""Suffix of the name of a candidate from `_tighten_poles`, also where none of its poles is still relaxed."""
+"""Suffix of the name of a candidate with poles beyond the ordinary bound."""
 
 CandidateSearch = Callable[[IdentificationSettings], Sequence[Candidate]]
 """Search for candidates from new starting models, under the given settings."""

@@ -205,9 +205,8 @@ class ForceDimensionRig:
     def _get_error(self, code: int) -> DeviceError:
         """Return the error of a code; the first failure is kept. Must be called in the thread that got the code,
         because the library stores its last error per thread."""
-        return self._failure or self._record_failure(
-            self._describe_failure(int(self._cells[loop_cells.FAILED]) or code)
-        )
+        failure_code = int(self._cells[loop_cells.FAILED])  # read first: another thread sets it after `_failure`
+        return self._failure or self._record_failure(self._describe_failure(failure_code or code))
 
     def _describe_failure(self, code: int) -> str:
         """Describe a failure, without a full stop. code: as in `loop_cells`; LIBRARY_ERROR plus the index of a

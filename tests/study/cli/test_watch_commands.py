@@ -133,13 +133,12 @@ def test_a_session_without_a_line_has_not_begun(capsys, tmp_path):
     assert (code, "This session has not begun" in err) == (1, True)
 
 
-def test_a_session_of_the_data_folder_precedes_a_folder_of_the_same_name_here(tmp_path, monkeypatch, data):
+def test_the_session_that_changed_last_is_no_folder_of_the_same_name_here(tmp_path, monkeypatch, data):
     namesake = tmp_path / "S1_001"
     namesake.mkdir()
     (namesake / LOG_NAME).write_text("")
     monkeypatch.chdir(tmp_path)
-    assert watch._find_folder("S1_001", data) == watch._find_last_changed(data) == (data / "S1_001").resolve()
-    assert watch._find_folder(str(namesake), data) == namesake.resolve()
+    assert watch._find_last_changed(data) == (data / "S1_001").resolve() != namesake.resolve()
 
 
 def test_each_simulated_participant_has_a_code_of_its_own():
@@ -152,4 +151,5 @@ def test_each_simulated_participant_has_a_code_of_its_own():
     )
     codes = [make_simulated_code(name) for name in names]
     assert codes[0] == "ideal1" and len(set(codes)) == len(names)
+    assert make_simulated_code("delivered-7-seed-12") == make_simulated_code("delivered_7_seed_12")
     assert all(is_code(code) for code in codes)

@@ -274,3 +274,16 @@ def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
     (base,), _ = next(build_bases(parts[0], parts[1]))
     assert isinstance(base, AutoregressiveBase) and base.step > 1
     assert compare_base(base, parts[0], parts[1]).faulty.count >= LEAST_ROWS
+
+
+def test_the_shares_of_three_axes_are_those_of_the_catalogue():
+    recording, _ = record_oscillator(1)
+    samples = np.tile(recording.response.samples, (1, 3))
+    three = replace(recording.response, samples=samples, channels=("x", "y", "z"))
+    parts = split_into_parts([replace(recording, response=three)])
+    names = [
+        [*fault.variants[0].parameters_of(np.array([0.1]))]
+        for fault in make_sensor_faults(2, "z", parts, Lags(1, (), 0.0, ()))
+        if fault.effect == "cross_axis_sensitivity"
+    ]
+    assert names == [["from_next"], ["from_after_next"]]

@@ -67,6 +67,12 @@ def test_what_holds_itself_comes_to_rest_within_a_third_of_the_recording() -> No
 def test_feedback_is_seen_by_the_excitation_beside_the_command(controlled_recording: Recording) -> None:
     assert is_in_closed_loop(controlled_recording)
     assert not is_in_closed_loop(replace(controlled_recording, excitation=controlled_recording.command))
+    gappy = np.array(controlled_recording.command.samples)
+    gappy[100:130] = np.nan
+    command = replace(controlled_recording.command, samples=gappy)
+    assert is_in_closed_loop(replace(controlled_recording, command=command))
+    nothing = replace(controlled_recording.command, samples=np.full_like(gappy, np.nan))
+    assert not is_in_closed_loop(replace(controlled_recording, command=nothing))
 
 
 def test_feedback_is_seen_without_an_excitation_where_responses_make_the_command() -> None:

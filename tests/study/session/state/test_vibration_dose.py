@@ -1,7 +1,9 @@
 import math
+from types import SimpleNamespace
 
 import pytest
 
+from study.session.state.sitting_state import estimate_amplitude_mps2
 from study.session.state.vibration_dose import (
     NO_DOSE,
     Dose,
@@ -53,3 +55,10 @@ def test_time_without_a_measured_amplitude_is_distinguished() -> None:
 def test_a_negative_time_is_refused() -> None:
     with pytest.raises(ValueError, match="0 s or longer"):
         add_sinusoid(NO_DOSE, 25.0, 1.0, -1.0)
+
+
+def test_the_estimate_for_a_void_trial_has_the_acceleration_along_and_across() -> None:
+    measured = SimpleNamespace(frequency_hz=25.0, level_n=2.0, delivered_mps2=3.0, off_axis_mps2=4.0)
+    unmeasured = SimpleNamespace(frequency_hz=25.0, level_n=2.0, delivered_mps2=None, off_axis_mps2=None)
+    assert estimate_amplitude_mps2((measured, unmeasured), 25.0, 1.0) == pytest.approx(2.5)
+    assert estimate_amplitude_mps2((measured,), 35.0, 1.0) is None

@@ -54,6 +54,9 @@ def test_a_folder_goes_on_with_its_own_pair_alone(tmp_path):
     assert run(replace(plan, contrast_hz=(45.0, 5.0))) == begun
     with pytest.raises(StudyError, match="another power simulation"):
         run(replace(plan, contrast_hz=(5.0, 45.0)))
+    (tmp_path / PROGRESS_NAME).write_text("[1]\n", "utf-8")
+    with pytest.raises(StudyError, match="another power simulation"):
+        run(plan)
 
 
 @pytest.mark.slow
