@@ -4,6 +4,9 @@ Subclasses are raised, for example, by `equalizer.plant.mechanical_model`, `equa
 and `study.store.disk.csv_rows`.
 """
 
+from collections.abc import Iterable, Mapping
+from typing import Any, cast
+
 
 class ListedProblemsError(ValueError):
     """An input has one or more problems. `problems`: a sentence for each; the message joins them by semicolons."""
@@ -11,3 +14,9 @@ class ListedProblemsError(ValueError):
     def __init__(self, problems: tuple[str, ...]) -> None:
         super().__init__("; ".join(problems))
         self.problems = problems
+
+
+def format_validation_problems(errors: Iterable[Mapping[str, object]]) -> tuple[str, ...]:
+    """Format each error that pydantic found, as in "changes.0: Input should be an object": path of the entry, message.
+    errors: as of `ValidationError.errors()`."""
+    return tuple(f"{'.'.join(map(str, cast(tuple[Any, ...], error['loc'])))}: {error['msg']}" for error in errors)

@@ -151,7 +151,7 @@ class Windows:
             projected[:full_windows_end] = _project_out(
                 residual[:full_windows_end].reshape(-1, window_samples * c), free_motion.reshape(window_samples * c, -1)
             ).reshape(-1, c)
-        if (n - full_windows_end) * c >= READINGS_PER_STATE * free_motion.shape[2]:
+        if n > full_windows_end:
             projected[full_windows_end:] = _project_out(
                 residual[full_windows_end:].reshape(1, -1),
                 free_motion[: n - full_windows_end].reshape((n - full_windows_end) * c, -1),
@@ -231,15 +231,14 @@ def _compute_free_motion(
 
 def _project_out(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
     """Subtract from residuals (windows, samples), NaN where missing, their least-squares projection on the columns of
-    free_motion (samples, k). A window with missing samples is fitted to the others; it stays unchanged where those are
-    fewer than `READINGS_PER_STATE` per column."""
-    projected, is_complete = residual.copy(), np.isfinite(residual).all(axis=1)
-    projected[is_complete] = _project_complete_windows(residual[is_complete], free_motion)
-    for window in np.flatnonzero(~is_complete):
-        is_known = np.isfinite(residual[window])
+    free_motion (samples, k). A window is fitted to the samples that it has, and stays unchanged where those are fewer
+    than `READINGS_PER_STATE` per column."""
+    projected = residual.copy()
+    patterns, pattern_index = np.unique(np.isfinite(residual), axis=0, return_inverse=True)
+    for index, is_known in enumerate(patterns):  # windows with the same samples share a decomposition
         if np.count_nonzero(is_known) >= READINGS_PER_STATE * free_motion.shape[1]:
-            known_residual = residual[window, is_known]
-            projected[window, is_known] = _project_complete_windows(known_residual[None], free_motion[is_known])[0]
+            place = np.ix_(pattern_index.ravel() == index, is_known)
+            projected[place] = _project_complete_windows(residual[place], free_motion[is_known])
     return projected
 
 

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Errors
-from equalizer.signals.listed_problems import ListedProblemsError
+from equalizer.signals.listed_problems import ListedProblemsError, format_validation_problems
 
 FORMAT, VERSION = "hapteq-real-answer", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -189,8 +189,7 @@ def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        problems = tuple(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
-        raise RealAnswerError(problems) from error
+        raise RealAnswerError(format_validation_problems(error.errors())) from error
 
 
 def make_real_answer_schema() -> dict[str, Any]:

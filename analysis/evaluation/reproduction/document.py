@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from equalizer.signals.listed_problems import ListedProblemsError
+from equalizer.signals.listed_problems import ListedProblemsError, format_validation_problems
 
 FORMAT, VERSION = "hapteq-reproduction", 1
 """Name of the file format, and its version; a change of a field's name or meaning increases the version."""
@@ -138,9 +138,7 @@ def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        raise ReproductionError(
-            tuple(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
-        ) from error
+        raise ReproductionError(format_validation_problems(error.errors())) from error
 
 
 def make_reproduction_schema() -> dict[str, Any]:

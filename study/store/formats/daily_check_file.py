@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from equalizer.signals.listed_problems import format_validation_problems
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import gather_provenance
@@ -59,5 +60,5 @@ def read_daily_check(path: Path) -> DailyCheck:
         # As JSON, because lists become tuples there even where no other type is converted.
         return TypeAdapter(DailyCheck).validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        problems = tuple(f"{'.'.join(map(str, issue['loc']))}: {issue['msg']}" for issue in error.errors())
+        problems = format_validation_problems(error.errors())
         raise UnusableFileError(path, "daily check", problems) from error

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
+from equalizer.signals.listed_problems import format_validation_problems
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
@@ -76,7 +77,7 @@ def read_repeats(path: Path) -> Repeats:
     try:
         repeats = REPEATS_VALIDATOR.validate_python(document)
     except ValidationError as error:
-        problems = tuple(f"{'.'.join(map(str, issue['loc']))}: {issue['msg']}" for issue in error.errors())
+        problems = format_validation_problems(error.errors())
         raise UnusableFileError(path, KIND, problems) from error
     if not 0 <= repeats.kept < len(repeats.errors):
         raise UnusableFileError(path, KIND, (f"kept is {repeats.kept}, but there are {len(repeats.errors)} plays",))
