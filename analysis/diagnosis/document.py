@@ -289,10 +289,10 @@ def make_found_law(law: Law) -> FoundLaw:
     return FoundLaw(law.text, law.variables, law.acts_on, law.axis)
 
 
-def format_law(law: FoundLaw) -> str:
-    """Format a law: as "F = -4.1*abs(vy)**1.5*sign(vy) N" the force that it adds, else what replaces a command or
-    reading."""
+def format_law(law: FoundLaw, force_unit: str = "") -> str:
+    """Format a law: as "F = -4.1*abs(vy)**1.5*sign(vy) N" the force or torque that it adds, else what replaces a
+    command or reading. force_unit: of that force; empty where it is not known or a plain number."""
     if law.acts_on == "force":
-        return f"F = {law.expression} N"
+        return f"F = {law.expression} {force_unit}".rstrip()
     replaced_signal = "command" if law.acts_on == "command" else "reading"
     return f"in place of the {replaced_signal} of {law.axis}: {law.expression}"

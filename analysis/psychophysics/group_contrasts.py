@@ -28,8 +28,8 @@ EQUIVALENCE_UP_TO_HZ = 25.0
 censored."""
 
 ROUNDING_DB = 1e-9
-"""Range of differences (dB) up to which they count as equal, because sums of the same steps differ by rounding.
-Chosen."""
+"""Range of differences or sums (dB) up to which they count as equal, because sums of the same steps differ by
+rounding. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +49,7 @@ class Contrast:
     p: float
     """Two-sided p value of the t test, uncorrected."""
     p_holm: float
-    """p with Holm's correction over all planned contrasts, including those that are not reported (by the Tobit model:
-    over those reported)."""
+    """p with Holm's correction over all planned contrasts, including those that are not reported."""
     effect_size: float | None
     """Mean over standard deviation of the differences (Cohen's d_z); None where some of them rest on answers at other
     frequencies only."""
@@ -58,7 +57,7 @@ class Contrast:
     """p value of two one-sided tests against +-`EQUIVALENCE_DB`; None above `EQUIVALENCE_UP_TO_HZ`."""
     p_spread: float | None
     """p value of Pitman and Morgan's test: equal variance between people at both frequencies. None below three
-    participants, and where `effect_size` is None."""
+    participants, where the sums of all participants are equal, and where `effect_size` is None."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,6 +190,7 @@ def _compute_contrast(
     """Compute the contrast of a pair, with its interval at this confidence and its further tests."""
     half_width_db = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error_db
     p_equivalence = _compute_equivalence_p(pair.mean_db, pair.error_db, pair.df)
+    sums_db = pair.paired_db.sum(axis=1)
     return Contrast(
         frequency_hz=frequency_hz,
         against_hz=against_hz,
@@ -202,8 +202,8 @@ def _compute_contrast(
         p_holm=p_holm,
         effect_size=pair.mean_db / float(pair.differences_db.std(ddof=1)) if pair.all_answered else None,
         p_equivalence=p_equivalence if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
-        p_spread=float(pearsonr(pair.paired_db.sum(axis=1), pair.differences_db).pvalue)
-        if pair.all_answered and pair.people > 2
+        p_spread=float(pearsonr(sums_db, pair.differences_db).pvalue)
+        if pair.all_answered and pair.people > 2 and np.ptp(sums_db) > ROUNDING_DB
         else None,
     )
 

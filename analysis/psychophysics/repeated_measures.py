@@ -158,7 +158,8 @@ def compute_mauchly_test(rows: FloatArray) -> tuple[float, float] | None:
     # Orthonormal contrasts: an orthonormal basis without the constant vector.
     contrasts = np.linalg.qr(np.column_stack([np.ones(k), np.eye(k)[:, 1:]]))[0][:, 1:]
     eigenvalues = np.linalg.eigvalsh(np.cov(rows @ contrasts, rowvar=False))
-    if eigenvalues[0] <= 0:
+    # A singular covariance has a least eigenvalue of 0 but for rounding; the factor is that of `is_rounding_error`.
+    if eigenvalues[0] <= 64 * np.finfo(float).eps * eigenvalues[-1]:
         return None
     w_statistic = float(np.exp(np.log(eigenvalues).sum() - contrast_count * np.log(eigenvalues.mean())))
     # Chi-squared approximation with Anderson's second-order term.

@@ -5,7 +5,9 @@
 y is the mean level at the reversals of a staircase run. A run is censored where at least one of these reversals is a
 peak at the largest permitted force, the cap (`thresholds.is_censored`). Under Psi, y is the posterior mean, and
 `thresholds.CUT_PROBABILITY` decides. An uncensored run contributes the density of y to the likelihood, a censored run
-P(Y >= y). The random effect b_i is integrated out by Gauss-Hermite quadrature.
+P(Y >= y). The random effect b_i is integrated out: exactly over its normal distribution given the person's uncensored
+values, and over the censored ones by Gauss-Hermite quadrature under that distribution. Nodes spread over N(0,
+sd_people²) would lie farther apart than the values leave b_i uncertain, where people differ more than the errors.
 
 Limits: the mean of a censored run is not an exact lower bound, because its valleys lie below the cap, and means near
 the cap are biased low even in uncensored runs. The model therefore removes only a part of the bias; `measured_coverage`
@@ -29,13 +31,20 @@ from analysis.psychophysics.group_contrasts import Contrast, apply_holm_correcti
 from equalizer.signals.signal import FloatArray
 
 QUADRATURE_NODES, QUADRATURE_WEIGHTS = np.polynomial.hermite_e.hermegauss(25)
-"""Gauss-Hermite rule of the integral over a person's random effect: weight function exp(-x²/2), x = b / sd_people. The
-number of nodes is chosen."""
+"""Gauss-Hermite rule of the integral over a person's random effect: weight function exp(-x²/2), x = (b - mean) / sd
+given the uncensored values. The number of nodes is chosen."""
 LOG_SD_BOUNDS = (-4.0, 3.5)
 """Bounds of the natural logarithm of both standard deviations: 0.018 dB to 33 dB."""
 DIFFERENCE_STEP = 1e-3
 """Step of the finite differences of the log-likelihood's second derivatives: in dB for means, in natural logarithms for
 standard deviations."""
+SINGULAR_CURVATURE = 1e-6
+"""Curvature of the log-likelihood along a direction, relative to its largest, up to which the direction counts as
+undetermined: both standard deviations where no person has two values. It is held fixed in the covariance. Chosen."""
+CONVERGED_DECREMENT = 1e-4
+"""Largest squared Newton step to the maximum, in standard errors, of a fit that counts as converged: a remaining error
+of at most 1 % of a standard error. Chosen. The optimiser's own flag is no criterion: it also reports a failure where
+the maximum is reached within the rounding of its finite differences."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +54,8 @@ class TobitFit:
     parameters: FloatArray
     """(k + 2,): means mu in dB, then the natural logarithms of sd_people and sd_error."""
     covariance: FloatArray
-    """(k + 2, k + 2): inverse Hessian of minus the log-likelihood; zero for a standard deviation at its bound."""
+    """(k + 2, k + 2): inverse Hessian of minus the log-likelihood; zero for the standard deviation of people at its
+    bound, and along a direction that the data do not determine."""
     log_likelihood: float
 
 
@@ -56,24 +66,25 @@ def compute_tobit_contrasts(
     t with n - 1 degrees of freedom. values_db: (n, k), dB, NaN for a gap. is_censored: (n, k). confidence: level
     of the intervals, 0 to 1.
 
-    A frequency without an uncensored run is left out, because its likelihood has no maximum. Empty where no run is
-    censored (the analysis of the plain means then suffices), the first frequency or every other one is left out, or
-    there are fewer than three people (chosen). `Contrast.p_holm` is corrected over the contrasts that are returned
-    alone. Raises LinAlgError as `fit_tobit` does.
+    A frequency without an uncensored run is left out, because its likelihood has no maximum, but counts in Holm's
+    family; a person without a value at the others is left out, too. Empty where no run is censored (the analysis of
+    the plain means then suffices), the first frequency or every other one is left out, fewer than three people remain
+    (chosen), or the fit fails (`fit_tobit`).
     """
-    is_measured = np.isfinite(values_db)
-    has_uncensored: NDArray[np.bool_] = np.asarray((is_measured & ~is_censored).any(axis=0))
-    if not (is_censored & is_measured).any() or len(values_db) < 3 or not has_uncensored[0]:
+    planned_contrasts, is_measured = len(frequencies_hz) - 1, np.isfinite(values_db)
+    is_kept: NDArray[np.bool_] = np.asarray((is_measured & ~is_censored).any(axis=0))
+    has_values: NDArray[np.bool_] = np.asarray(is_measured[:, is_kept].any(axis=1))
+    if not (is_censored & is_measured).any() or has_values.sum() < 3 or not is_kept[0]:
         return ()
     frequencies_hz = [
-        frequency_hz for frequency_hz, is_kept in zip(frequencies_hz, has_uncensored, strict=True) if is_kept
+        frequency_hz for frequency_hz, is_fitted in zip(frequencies_hz, is_kept, strict=True) if is_fitted
     ]
-    values_db, is_censored, is_measured = (
-        values_db[:, has_uncensored],
-        is_censored[:, has_uncensored],
-        is_measured[:, has_uncensored],
-    )
-    fit = fit_tobit(values_db, is_censored)
+    cells = np.ix_(has_values, is_kept)
+    values_db, is_censored, is_measured = values_db[cells], is_censored[cells], is_measured[cells]
+    try:
+        fit = fit_tobit(values_db, is_censored)
+    except np.linalg.LinAlgError:
+        return ()
     frequency_count, df = len(frequencies_hz), len(values_db) - 1
     differences_db = fit.parameters[1:frequency_count] - fit.parameters[0]
     standard_errors_db = np.sqrt(
@@ -96,14 +107,14 @@ def compute_tobit_contrasts(
             p_equivalence=None,
             p_spread=None,
         )
-        for index, p_holm in enumerate(apply_holm_correction(p_values))
+        for index, p_holm in enumerate(apply_holm_correction(p_values, planned_contrasts))
     )
 
 
 def fit_tobit(values_db: FloatArray, is_censored: NDArray[np.bool_]) -> TobitFit:
     """Fit the Tobit model by maximum likelihood (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; is_censored: (n,
-    k). Each column needs an uncensored value. An optimiser that does not converge is not reported. Raises LinAlgError
-    where the Hessian is singular."""
+    k). Each column needs an uncensored value. Raises LinAlgError where the data do not determine the errors' standard
+    deviation, or the optimiser did not reach the maximum (`CONVERGED_DECREMENT`)."""
     frequency_count = values_db.shape[1]
     # Start: the means of the columns, and standard deviations of exp(0.7) = 2 dB (chosen).
     start_parameters = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
@@ -115,27 +126,36 @@ def fit_tobit(values_db: FloatArray, is_censored: NDArray[np.bool_]) -> TobitFit
     solution = minimize(
         compute_cost, start_parameters, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6}
     )
-    steps = DIFFERENCE_STEP * np.eye(frequency_count + 2)
+    return TobitFit(solution.x, _compute_covariance(compute_cost, solution.x), -float(solution.fun))
+
+
+def _compute_covariance(compute_cost: Callable[[FloatArray], float], parameters: FloatArray) -> FloatArray:
+    """Compute the inverse Hessian of the cost at the fitted parameters (k + 2,). Raises LinAlgError as `fit_tobit`."""
+    steps = DIFFERENCE_STEP * np.eye(len(parameters))
     hessian = (
         np.array(
             [
-                [_compute_second_difference(compute_cost, solution.x, row_step, column_step) for column_step in steps]
+                [_compute_second_difference(compute_cost, parameters, row_step, column_step) for column_step in steps]
                 for row_step in steps
             ]
         )
         / DIFFERENCE_STEP**2
     )
-    # At a bound, the Hessian by a standard deviation is meaningless: that parameter is held fixed in the covariance.
-    is_free = np.array(
-        [True] * frequency_count
-        + [
-            LOG_SD_BOUNDS[0] + DIFFERENCE_STEP < value < LOG_SD_BOUNDS[1] - DIFFERENCE_STEP
-            for value in solution.x[frequency_count:]
-        ]
+    gradient = np.array([compute_cost(parameters + step) - compute_cost(parameters - step) for step in steps]) / (
+        2.0 * DIFFERENCE_STEP
     )
-    covariance = np.zeros((frequency_count + 2, frequency_count + 2))
-    covariance[np.ix_(is_free, is_free)] = np.linalg.inv(hessian[np.ix_(is_free, is_free)])
-    return TobitFit(solution.x, covariance, -float(solution.fun))
+    lower, upper = (LOG_SD_BOUNDS[0] + DIFFERENCE_STEP, LOG_SD_BOUNDS[1] - DIFFERENCE_STEP)
+    is_free = np.array([True] * (len(parameters) - 2) + [lower < log_sd < upper for log_sd in parameters[-2:]])
+    free = np.ix_(is_free, is_free)
+    eigenvalues = np.linalg.eigvalsh(hessian[free])
+    if not is_free[-1] or eigenvalues[0] < -SINGULAR_CURVATURE * eigenvalues[-1]:
+        raise np.linalg.LinAlgError("the standard errors would follow from the bounds, not from the data")
+    # At a bound, the Hessian by the standard deviation of people is meaningless: it is held fixed in the covariance.
+    covariance = np.zeros_like(hessian)
+    covariance[free] = np.linalg.pinv(hessian[free], rcond=SINGULAR_CURVATURE, hermitian=True)
+    if not gradient @ covariance @ gradient <= CONVERGED_DECREMENT:
+        raise np.linalg.LinAlgError("the optimiser did not reach the maximum of the likelihood")
+    return covariance
 
 
 def _compute_second_difference(
@@ -156,13 +176,17 @@ def _compute_log_likelihood(parameters: FloatArray, values_db: FloatArray, is_ce
     nothing."""
     frequency_count = values_db.shape[1]
     sd_people, sd_error = math.exp(parameters[frequency_count]), math.exp(parameters[frequency_count + 1])
-    standardised_residual = (
-        values_db[:, :, None] - parameters[:frequency_count, None] - sd_people * QUADRATURE_NODES
-    ) / sd_error
-    log_density = -0.5 * standardised_residual**2 - math.log(sd_error) - 0.5 * math.log(2.0 * math.pi)
-    log_likelihoods = np.where(
-        np.isnan(standardised_residual),
-        0.0,
-        np.where(is_censored[:, :, None], log_ndtr(-standardised_residual), log_density),
-    )
-    return float(logsumexp(log_likelihoods.sum(axis=1), b=QUADRATURE_WEIGHTS / math.sqrt(2.0 * math.pi), axis=1).sum())
+    residuals_db, is_measured = values_db - parameters[:frequency_count], np.isfinite(values_db)
+    known = np.where(is_measured & ~is_censored, residuals_db / sd_error, 0.0)
+    known_count = (is_measured & ~is_censored).sum(axis=1)
+    # Normal distribution of the effect given the uncensored values: mean and standard deviation in dB.
+    effect_sd = 1.0 / np.sqrt(1.0 / sd_people**2 + known_count / sd_error**2)
+    effect_mean = effect_sd**2 * known.sum(axis=1) / sd_error
+    log_densities = np.log(effect_sd / sd_people) - known_count * (math.log(sd_error) + 0.5 * math.log(2.0 * math.pi))
+    log_densities -= 0.5 * ((known**2).sum(axis=1) - (effect_mean / effect_sd) ** 2)
+    effects_db = effect_mean[:, None, None] + effect_sd[:, None, None] * QUADRATURE_NODES
+    log_tails = np.where(
+        (is_measured & is_censored)[:, :, None], log_ndtr((effects_db - residuals_db[:, :, None]) / sd_error), 0.0
+    ).sum(axis=1)
+    log_tails = logsumexp(log_tails, b=QUADRATURE_WEIGHTS / math.sqrt(2.0 * math.pi), axis=1)
+    return float(np.sum(log_densities + log_tails))

@@ -220,7 +220,7 @@ def _make_sentence_sections(heading: str, sentence: str) -> list[Section]:
 
 def _describe_effect(findings: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
     """Describe a named effect with the text on its signature, if it has one. signatures: texts by effect name."""
-    return describe_effect(effect, signatures.get(effect.effect, ""), _has_single_input(findings))
+    return describe_effect(effect, signatures.get(effect.effect, ""), extract_device(findings))
 
 
 def _has_single_input(findings: Findings) -> bool:

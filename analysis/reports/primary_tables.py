@@ -42,6 +42,8 @@ SINGLE_RUN_NOTE = (
     "played (right answers only): no size, a one-sided bound."
 )
 """Note below the thresholds of single runs, where the model of all answers could not be fitted."""
+CAP_NOTE = "* (†): first (second) median above the cap; the interval has only its lower (upper) end; with both, none."
+"""Note below the contrasts by the model, where a median is above the cap."""
 TOBIT_NOTE = (
     "A mean that the cap cut counts as at least this. A sensitivity analysis: {too_low}. Wald's intervals, t with "
     "n − 1 degrees of freedom."
@@ -156,10 +158,9 @@ def describe_direction_limit(primary: PrimaryAnalysis) -> str:
     upper_text = f"{limit.upper_hz:.1f} Hz" if limit.upper_hz is not None else f"above {highest_hz:g} Hz"
     if limit.frequency_hz is None:
         return f"Direction limit: none within {lowest_hz:g} to {highest_hz:g} Hz. {limit.words}"
-    confidence_text = f"{100 * primary.confidence:g} %"
     return (
         f"Direction limit: the median participant's threshold reaches the cap at {limit.frequency_hz:.1f} Hz "
-        f"({confidence_text} interval: {lower_text} to {upper_text}). {limit.words}"
+        f"({100 * primary.confidence:g} % interval: {lower_text} to {upper_text}). {limit.words}"
     )
 
 
@@ -193,17 +194,14 @@ def format_median_interval(lower: float | None, upper: float | None, above_cap: 
     or, above the cap, where no lower bound was found."""
     if lower is None:
         return "no lower bound" if above_cap else "no interval: too few people"
-    return (
-        f"above {format_number(lower, digits)}"
-        if upper is None
-        else f"{format_number(lower, digits)} to {format_number(upper, digits)}"
-    )
+    lower_text = format_number(lower, digits)
+    return f"above {lower_text}" if upper is None else f"{lower_text} to {format_number(upper, digits)}"
 
 
 def _make_contrast_table(
     caption: str, contrasts: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
 ) -> Table:
-    """Make the table of contrasts (dB) between two frequencies, the first marked where its median is above the cap."""
+    """Make the table of contrasts (dB) between two frequencies, either marked where its median is above the cap."""
     above_cap_hz = {median.frequency_hz for median in medians if median.above_cap}
     return Table(
         caption=caption,
@@ -211,7 +209,7 @@ def _make_contrast_table(
         rows=tuple(
             (
                 f"{contrast.frequency_hz:g} − {contrast.against_hz:g} Hz"
-                f"{' *' * (contrast.frequency_hz in above_cap_hz)}",
+                f"{' *' * (contrast.frequency_hz in above_cap_hz)}{' †' * (contrast.against_hz in above_cap_hz)}",
                 str(contrast.participants),
                 format_signed(contrast.difference_db, 1),
                 f"{format_signed(contrast.lower_db, 1)} to {format_signed(contrast.upper_db, 1)}",
@@ -227,7 +225,7 @@ def _make_contrast_table(
             "Within participants, t with n − 1 degrees of freedom; n have enough answers at both. Equivalent: two "
             f"one-sided tests within ±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally "
             "much at both.",
-            *(("* The median is above the cap: only the lower end of the interval is known.",) if above_cap_hz else ()),
+            *((CAP_NOTE,) if above_cap_hz else ()),
             *notes,
         ),
     )

@@ -47,8 +47,8 @@ def make_threshold_table(analysis: StudyAnalysis) -> Table:
 
 def make_group_table(analysis: StudyAnalysis) -> Table:
     """Make the table of the frequencies: number, mean and standard deviation of the thresholds (N), comparison
-    interval, and how many were cut by the cap or stopped by the trial limit; the mean is marked as cut where any
-    was."""
+    interval, and how many were cut by the cap or stopped by the trial limit; the mean is marked where any was cut, and
+    where it lacks the stopped ones."""
     intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
     cut_counts, stop_counts = (
         [sum(column) for column in zip(*cells, strict=True)]
@@ -58,12 +58,12 @@ def make_group_table(analysis: StudyAnalysis) -> Table:
     for group, cut_count, stop_count in zip(analysis.anova.groups, cut_counts, stop_counts, strict=True):
         interval = intervals.get(group.name)
         interval_text = f"{format_number(interval.lower)} to {format_number(interval.upper)}" if interval else MISSING
-        mean_text = mark_cut(group.mean, bool(cut_count or stop_count))
+        stop_remark = " (without stopped)" if stop_count and group.n else ""
         rows.append(
             (
                 group.name,
                 str(group.n),
-                mean_text,
+                f"{mark_cut(group.mean, bool(cut_count))}{stop_remark}",
                 format_number(group.sd),
                 interval_text,
                 str(cut_count),

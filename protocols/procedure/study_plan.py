@@ -27,7 +27,8 @@ class Participant:
     """Position in the balanced order, from 0; None where none was assigned."""
     progress: Progress
     reason: str = ""
-    """Reason why a participant is left out, such as refused, excluded, withdrawn or unreadable; else empty."""
+    """Reason why a participant is left out, such as refused, excluded, withdrawn or unreadable; "running" where a
+    session is running, which cannot be resumed; else empty."""
 
 
 @dataclass(frozen=True, slots=True)

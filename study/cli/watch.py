@@ -5,6 +5,7 @@ The view is a full screen, lines, or the present state once. Loaded by its name 
 
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,7 +26,11 @@ PLAIN_UPDATE_INTERVAL_S = 0.2
 
 def watch(
     session: Annotated[
-        str, typer.Argument(help="Session folder, or its name in the data folder. Default: the one that changed last.")
+        str,
+        typer.Argument(
+            help="Session folder, or its name in the data folder. Default: the one that changed last; to stop, pause "
+            "or note: the one that runs."
+        ),
     ] = "",
     data: DataOption = Path("data"),
     plain: Annotated[bool, typer.Option("--plain", help="A line for each event; alarms ring.")] = False,
@@ -39,8 +44,10 @@ def watch(
     as_json: Annotated[bool, typer.Option("--json", help="With --once: one JSON document on stdout.")] = False,
 ) -> None:
     """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
-    folder = _find_folder(session, data) if session else _find_last_changed(data)
-    if stop or pause or note or adverse:
+    is_request = bool(stop or pause or note or adverse)
+    find_unnamed = _find_running if is_request else _find_last_changed
+    folder = _find_folder(session, data) if session else find_unnamed(data)
+    if is_request:
         _send_requests(folder, stop, pause, ((note, False), (adverse, True)))
     elif once or as_json:
         _print_state(folder, as_json)
@@ -71,6 +78,26 @@ def _find_last_changed(data: Path) -> Path:
             "There is no session to watch", f"No folder in {data} holds a session.", "Give a session, or --data."
         )
     return logs[-1].parent.resolve()
+
+
+def _find_running(data: Path) -> Path:
+    """Find the folder of the session in `data` for which a request without a name is: the one that runs, or where none
+    is known to run, the one that changed last. Raises WrongUseError where several run: a stop that reached another
+    session would leave the force on, and say that it is off."""
+    from study.store.sessions.log_lock import is_log_locked
+
+    running = [log.parent for log in sorted(data.glob(f"*/{LOG_NAME}")) if is_log_locked(log)]
+    if len(running) > 1:
+        from analysis.wording import conjoin
+        from study.errors import WrongUseError
+
+        raise WrongUseError(
+            "Several sessions are running",
+            f"{conjoin([folder.name for folder in running])} are running in {data}; nothing was sent to any of them.",
+            f"Repeat it with a name, as in: hapteq watch {running[0].name} --stop. If a handle moves: hand off, and "
+            "switch the device off.",
+        )
+    return running[0].resolve() if running else _find_last_changed(data)
 
 
 def _show_screen(folder: Path) -> None:
@@ -135,8 +162,8 @@ def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str
 
     session = SessionFolder(folder)
     if stop:
-        confirmation = f"The force is off and the sitting ends. Continue with: hapteq resume {folder}"
-        _send_request(session, StopAsked("experimenter"), confirmation)
+        _send_request(session, StopAsked("experimenter"), "The force is off and the sitting ends.")
+        typer.echo(f"Continue with: {_format_resume_command(session)}", err=True)
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)
@@ -151,3 +178,19 @@ def _send_request(session: "SessionFolder", request: "Request", confirmation: st
 
     send_request(session, request, RealClock())
     typer.echo(confirmation, err=True)
+
+
+def _format_resume_command(session: "SessionFolder") -> str:
+    """Format the command that continues the session on its device; without a device where the log cannot be read,
+    because a stop must not depend on that."""
+    from study.errors import StudyError
+    from study.session.facts.events import SessionOpened
+    from study.session.views.resume_command import SIMULATED_DEVICE, find_device_option, format_resume_command
+    from study.store.sessions import event_log
+
+    device_name = SIMULATED_DEVICE
+    with suppress(StudyError, OSError):
+        session_opened = event_log.read_opening(session.log)
+        if isinstance(session_opened, SessionOpened):
+            device_name = find_device_option(session_opened.device.name, session_opened.device.simulated)
+    return format_resume_command(str(session.path), device_name)

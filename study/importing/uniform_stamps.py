@@ -24,6 +24,8 @@ the second. Chosen."""
 _BINARY_TOLERANCE = 1e-3
 """Tolerance, in units of the last decimal, for the rounding of binary numbers: a small difference of large stamps is
 not an exact decimal. Chosen."""
+_MAX_INDEX = 2**62
+"""Largest sample index, far above the samples of any recording: a wrong stamp may lie beyond the 64-bit integers."""
 _ROUNDED_DIGITS = (4, 5, 6)
 """Significant digits to which a rate is rounded before it is tried as the exact one, the fewest first. Chosen."""
 
@@ -41,7 +43,7 @@ def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | 
     median_hz = 1 / float(np.median(np.diff(stamps_s)))
     for estimate_hz in (mean_hz, median_hz):
         for rate_hz in (*(float(f"{estimate_hz:.{digits}g}") for digits in _ROUNDED_DIGITS), estimate_hz):
-            sample_index = np.round(elapsed_s * rate_hz).astype(np.int64)
+            sample_index = np.round(elapsed_s * rate_hz)
             deviation = np.max(np.abs(elapsed_s * rate_hz - sample_index))
             index_steps = np.diff(sample_index)
             if (
@@ -49,7 +51,7 @@ def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | 
                 and (index_steps >= 1).all()
                 and np.mean(index_steps > 1) <= MAX_SKIPPED_SHARE
             ):
-                return rate_hz, sample_index
+                return rate_hz, np.minimum(sample_index, _MAX_INDEX).astype(np.int64)
     rate_hz = _estimate_rounded_rate(elapsed_s, unit_s)
     return rate_hz, np.arange(len(stamps_s)) if rate_hz else None
 

@@ -28,8 +28,7 @@ from equalizer.effects.effect import Effect, list_effects_by_address
 Result = TypeVar("Result")
 """Type of the result of a task."""
 MIN_FORKED_WORK_S = 0.1
-"""Shortest expected duration (s) of the work that is shared among processes; forking alone takes a fifth of it.
-Chosen."""
+"""Shortest expected duration (s) of the work that is shared among processes; forking alone takes a fifth. Chosen."""
 _TOKEN_BYTES, _MAX_TOKENS = 4, 8192
 """Bytes of a token; largest number of tokens written to the pipe, which they must not fill: 32 KiB of the 64 KiB of a
 pipe of Linux."""
@@ -41,13 +40,15 @@ _unforkable: set[CodeType | type] = set()
 """Functions whose results could not be pickled, or whose process died: they are not forked again."""
 _inherited_processor_s = [0.0]
 """Processor time (s) that the parent processes had used when this process was forked."""
+_PICKLING_ERRORS = (pickle.PickleError, EOFError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
+"""Errors where an object cannot be pickled (RuntimeError: nested too deeply) or restored (EOFError: incomplete;
+TypeError: an exception whose constructor needs other arguments than its message)."""
 _serial_context: list[bool] = []
 """Not empty within a task or `disable_forking`, where no further processes are started."""
 
 
 def measure_processor_s() -> float:
-    """Measure the processor time (s) used so far by this process, its ended children, and its parents before the
-    fork."""
+    """Measure the processor time (s) used by this process, its ended children, and its parents before the fork."""
     ended_children = os.times()
     return _inherited_processor_s[0] + process_time() + ended_children.children_user + ended_children.children_system
 
@@ -68,12 +69,14 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
     function_key = _identify_function(function)
     # On macOS system libraries start threads, after which forking is not safe.
     can_fork = process_count > 1 and not _serial_context and sys.platform != "darwin" and hasattr(os, "fork")
-    if (
-        can_fork
-        and function_key not in _unforkable
-        and _mean_task_s.get(function_key, MIN_FORKED_WORK_S) * len(tasks) >= MIN_FORKED_WORK_S
-    ):
-        return _SharedTasks(function, tasks).run_with_workers(process_count - 1)
+    expected_s = _mean_task_s.get(function_key, MIN_FORKED_WORK_S) * len(tasks)
+    if can_fork and function_key not in _unforkable and expected_s >= MIN_FORKED_WORK_S:
+        try:
+            shared_tasks = _SharedTasks(function, tasks)
+        except OSError:  # too many open files for another pipe: the tasks are done serially
+            pass
+        else:
+            return shared_tasks.run_with_workers(process_count - 1)
     start_s = perf_counter()
     results = [function(*task) for task in tasks]
     if tasks:
@@ -83,8 +86,7 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 @contextmanager
 def disable_forking() -> Iterator[None]:
-    """Disable forking within this context, for processes that already share the processors with others. The results are
-    the same."""
+    """Disable forking within this context, for processes that share the processors. The results are the same."""
     _serial_context.append(True)
     try:
         yield
@@ -145,12 +147,15 @@ class _SharedTasks:
 
     def _fork_worker(self, children: list[tuple[int, int]]) -> bool:
         """Start a process and append (process id, reading end of its pipe) to `children`; False if the system refuses
-        the fork."""
+        the pipe or the fork."""
         processor_s, parent_id = measure_processor_s(), os.getpid()
         # Signals wait: an exception here would leave a process that is not in `children`, or would let the child return
         # from this function and continue the work of its parent.
         with _block_signals():
-            read_end, write_end = os.pipe()
+            try:
+                read_end, write_end = os.pipe()
+            except OSError:  # too many open files
+                return False
             try:
                 with warnings.catch_warnings():
                     # Python warns of other threads, for whose locks the child might wait. The child only computes and
@@ -274,22 +279,22 @@ def _pack_results(
         buffer = io.BytesIO()
         try:
             _Pickler(buffer, known_effects).dump((index, result_and_error))
-        except (pickle.PicklingError, TypeError, AttributeError, ValueError):
+        except _PICKLING_ERRORS:
             continue
         packed_results.write(buffer.getbuffer())
     return packed_results.getvalue()
 
 
 def _receive_results(read_end: int, known_effects: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
-    """Receive the results of a child, by the index of the task, up to the first that is incomplete. read_end:
-    descriptor of its pipe."""
+    """Receive the results of a child, by the index of the task, up to the first that cannot be restored.
+    read_end: descriptor of its pipe."""
     with os.fdopen(read_end, "rb", closefd=False) as pipe:
         received_bytes = io.BytesIO(pipe.read())
     results_by_task: dict[int, tuple[Any, Exception | None]] = {}
     while received_bytes.tell() < len(received_bytes.getbuffer()):
         try:
             index, result_and_error = _Unpickler(received_bytes, known_effects).load()
-        except (pickle.UnpicklingError, EOFError):
+        except _PICKLING_ERRORS:
             break
         results_by_task[index] = result_and_error
     return results_by_task

@@ -104,20 +104,21 @@ def judge_laws(search: StructureSearch) -> Balance:
         error = float(np.sqrt(search.linear.error / _sum_power(regression)))
         return Balance(search, search.linear, (), (), error, error, error, search.complete, tested=False)
     balance = judge_structure(search, choose_simplest_structure(search))
-    if balance.named or not _has_two_frictions(regression, balance.chosen.laws):
+    named_channels = {law.law.channel for law in balance.named if law.law.effect in find_family("coulomb_friction")}
+    if _find_shared_channels(regression, balance.chosen.laws) <= named_channels:
         return balance
     # Either of two frictions could explain the same error, so that neither seems necessary: try structures with one.
-    candidates = tuple(structure for structure in search.ranked if not _has_two_frictions(regression, structure.laws))
+    candidates = tuple(entry for entry in search.ranked if not _find_shared_channels(regression, entry.laws))
     best = min(candidates, key=lambda structure: structure.error, default=search.linear)
     simpler_balance = judge_structure(search, choose_simplest_structure(replace(search, ranked=candidates, best=best)))
-    return simpler_balance if simpler_balance.named else balance
+    return simpler_balance if len(simpler_balance.named) > len(balance.named) else balance
 
 
-def _has_two_frictions(regression: Regression, law_indices: Sequence[int]) -> bool:
-    """Whether laws (indices in the regression) contain two laws of the family of friction for the same channel."""
+def _find_shared_channels(regression: Regression, law_indices: Sequence[int]) -> set[int]:
+    """Find the channels for which laws (indices in the regression) contain two laws of the family of friction."""
     law_keys = [regression.laws[law_index].key for law_index in law_indices]
     channels = [channel for effect, channel in set(law_keys) if effect in find_family("coulomb_friction")]
-    return len(channels) > len(set(channels))
+    return {channel for channel in channels if channels.count(channel) > 1}
 
 
 def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
@@ -289,10 +290,8 @@ def _judge_further_laws(
         objection = ("it explains too little in addition to the named laws" if chosen.laws
                   else WEAK_GAIN_OBJECTIONS[gain > FURTHER_LAW_GAIN])  # fmt: skip
         if gain > 0 and gain_low > 0:
-            law, is_physical = (
-                regression.laws[index],
-                compute_force_ratio(regression, law_indices, index) <= LARGEST_LAW_FORCE,
-            )
+            law = regression.laws[index]
+            is_physical = compute_force_ratio(regression, law_indices, index) <= LARGEST_LAW_FORCE
             further_law = JudgedLaw(
                 index, law, values, gain, gain_low, share, (), 0.0, objection, is_physical=is_physical
             )

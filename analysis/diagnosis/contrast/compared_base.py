@@ -141,7 +141,7 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     valid = tuple(base.mask_valid_samples(parts) for parts in (clean, faulty))
     gap_reach = min(_choose_gap_reach(part_masks) for part_masks in valid)
     masks = tuple(tuple(_mask_interior(mask, gap_reach) for mask in part_masks) for part_masks in valid)
-    least_rows = max(LEAST_ROWS, 2 * rows[0][0].shape[1])
+    least_rows = max([LEAST_ROWS, *(2 * part.shape[1] for part in rows[0])])
     if any(sum(int(mask.sum()) for mask in part_masks) < least_rows for part_masks in masks):
         raise ValueError("too few samples of one of the two sets remain for a comparison")
     all_rows = np.vstack([part[mask] for index in (0, 1) for part, mask in zip(rows[index], masks[index], strict=True)])

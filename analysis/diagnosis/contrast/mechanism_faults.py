@@ -42,7 +42,7 @@ STOP_SHARES = tuple(np.arange(0.05, 0.5, 0.05).tolist())
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Axis:
-    """A driven axis with the range of its measured motion, in m or rad and s."""
+    """A driven axis with the middle of its measured motion, in m or rad."""
 
     index: int
     """Index of the axis in the command."""
@@ -53,10 +53,6 @@ class _Axis:
     """Index of the channel of the motion along this axis."""
     middle: float
     """Middle of the travel."""
-    travel: float
-    """Travel, from end to end."""
-    least_speed_width: float
-    """Least width of the smoothed sign, m/s or rad/s."""
 
     def make_fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
         """Make a fault of the mechanism on this axis. simpler: faults that it contains as special cases."""
@@ -104,7 +100,7 @@ def make_mechanism_faults(
     lower_end, travel = float(position.min()), max(float(np.ptp(position)), 1e-300)
     longest_pitch = min(travel, 2 * np.pi) if is_rotational else travel
     least_width = max(LEAST_WIDTH_SHARE * float(np.sqrt(np.mean(velocity**2))), 1e-300)
-    axis = _Axis(axis_index, name, get_motion, channel, lower_end + 0.5 * travel, travel, least_width)
+    axis = _Axis(axis_index, name, get_motion, channel, lower_end + 0.5 * travel)
     yield axis.make_proportional_fault("added_mass", lambda m: m.acceleration[:, channel], "mass")
     yield axis.make_proportional_fault("viscous_damping", axis.get_velocity, "damping")
     yield axis.make_proportional_fault(

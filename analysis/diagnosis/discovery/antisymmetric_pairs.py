@@ -117,11 +117,10 @@ def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) ->
     )
     for (prefix, axis, coupled_axis), (claim_index, factor) in couplings.items():
         partner_index, partner_factor = couplings.get((prefix, coupled_axis, axis), (claim_index, 0.0))
-        if axis < coupled_axis and factor * partner_factor < 0:
-            mean_factor, parameter_index = (
-                (factor + partner_factor) / 2,
-                _find_coupled_parameter(tuning, prefix, axis, coupled_axis),
-            )
+        parameter_index = _find_coupled_parameter(tuning, prefix, axis, coupled_axis)
+        # A parameter with tolerance 0 cannot take the mean.
+        if axis < coupled_axis and factor * partner_factor < 0 < tuning.deviation[parameter_index]:
+            mean_factor = (factor + partner_factor) / 2
             deviations[parameter_index] -= mean_factor / tuning.deviation[parameter_index]
             values[claim_index]["p0"], values[partner_index]["p0"] = factor - mean_factor, partner_factor - mean_factor
     if (deviations == fitted.deviations).all() or np.abs(deviations).max() > tuning.bound:
@@ -135,16 +134,16 @@ def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) ->
 
 def can_coupling_imitate(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]) -> bool:
     """Whether the model's damping or stiffness could imitate a fitted law that is linear in the motion of an axis. A
-    force on a single axis: always. An antisymmetric pair: if re-tuning within its bound can reach its factor. inputs:
-    command channels."""
+    force on a single axis: always. An antisymmetric pair: if re-tuning within its bound can reach its factor. Neither
+    where the parameter's tolerance is 0. inputs: command channels."""
     couplings = _find_coupled_laws(fitted, inputs)
     for (prefix, axis, coupled_axis), (_, factor) in couplings.items():
         partner_factor = couplings.get((prefix, coupled_axis, axis), (0, 0.0))[1]
         antisymmetric_factor = abs(factor - partner_factor) / 2 if factor * partner_factor < 0 else 0.0
         parameter_index = _find_coupled_parameter(tuning, prefix, axis, coupled_axis)
-        if (
-            antisymmetric_factor / tuning.deviation[parameter_index] - abs(fitted.deviations[parameter_index])
-            <= tuning.bound
+        deviation = tuning.deviation[parameter_index]
+        if deviation > 0 and (
+            antisymmetric_factor / deviation - abs(fitted.deviations[parameter_index]) <= tuning.bound
         ):
             return True
     return False

@@ -39,11 +39,13 @@ _SETTLING_S = 2.0  # chosen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilteredRecord:
-    """Filters of one record with n samples and c channels. Its m + p outputs are the matched filters for forces along
-    the m driven axes, then p readings limited to the band."""
+    """Filters of one record with n samples, c channels and m driven axes. Its k + p outputs are the matched filters for
+    forces along the first k axes, which have a letter in `AXES`, then p readings limited to the band."""
 
     columns: Columns
     """Signals by their names in a formula, (n,) each."""
+    axis_motion: tuple[FloatArray, FloatArray]
+    """(n, m) each: positions, m, and velocities, m/s, of all axes, with or without a letter."""
     missing_force: FloatArray
     """(n, m), N: the force that the model lacks."""
     rate_hz: float
@@ -52,23 +54,24 @@ class FilteredRecord:
     force_response: ComplexArray
     """(lines, c, m), 1/N: response h from a force to the residuals, up to the last line with command power."""
     strength: FloatArray
-    """(lines, m), 1/N: norm of that response over the channels, |h|; at least 1e-9 of the axis's largest, so not 0."""
+    """(lines, k), 1/N: norm of that response over the channels, |h|; at least 1e-9 of the axis's largest, so not 0."""
     reading_units: FloatArray
     """(p,): units of the residuals of the response channels; none where forces are compared."""
     block_slices: tuple[slice, ...]
     """Blocks of the cross-validation, as ranges of decimated samples."""
 
     def filter_residuals(self, residuals: FloatArray) -> FloatArray:
-        """Compute (kept samples, m + p): output of each filter for residuals (n, c), decimated."""
+        """Compute (kept samples, k + p): output of each filter for residuals (n, c), decimated."""
         return self._filter_spectrum(rfft(residuals, self.length, axis=0)[: len(self.force_response)])
 
     def _filter_spectrum(self, spectrum: ComplexArray) -> FloatArray:
-        """Compute (kept samples, m + p): output of each filter. spectrum: (lines, c), of residuals."""
-        force_outputs = np.einsum("lcm,lc->lm", np.conj(self.force_response), spectrum) / self.strength
+        """Compute (kept samples, k + p): output of each filter. spectrum: (lines, c), of residuals."""
+        response = self.force_response[:, :, : self.strength.shape[1]]
+        force_outputs = np.einsum("lcm,lc->lm", np.conj(response), spectrum) / self.strength
         return self._select_blocks(np.hstack([force_outputs, spectrum[:, : len(self.reading_units)]]))
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
-        """Compute (kept samples, m + p): outputs for the residuals that forces (n, m), N, cause together. A force acts
+        """Compute (kept samples, k + p): outputs for the residuals that forces (n, m), N, cause together. A force acts
         as in `compute_column`."""
         step_mean = forces.copy()
         step_mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
@@ -120,7 +123,7 @@ class View:
 
 
 def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
-    """Build one view per driven axis, then one per response channel (at most three: the names of the grammar)."""
+    """Build one view per driven axis, then one per response channel (three of each at most: names of the grammar)."""
     model, placed_effects = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed_effects, fitted.residuals)
     filtered_records = tuple(
@@ -139,12 +142,12 @@ def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[
             for index in range(len(fitted.deviations))
         ]
     )
-    edges = _compute_block_edges(filtered_records)
+    edges, axis_count = _compute_block_edges(filtered_records), filtered_records[0].strength.shape[1]
     to_calibration = np.append(-fitted.deviations, 0.0)
     views = []
-    for output in range(min(residual.shape[1], model.inputs + len(AXES))):
-        acts_on: ActsOn = "force" if output < model.inputs else "response"
-        axis = output if output < model.inputs else output - model.inputs
+    for output in range(min(residual.shape[1], axis_count + len(AXES))):
+        acts_on: ActsOn = "force" if output < axis_count else "response"
+        axis = output if output < axis_count else output - axis_count
         constant = np.concatenate(
             [filtered.compute_column(np.ones(len(filtered.missing_force)), output) for filtered in filtered_records]
         )
@@ -168,7 +171,7 @@ def _set_missing_to_zero(residuals: FloatArray) -> FloatArray:
 def _compute_parameter_columns(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, filtered_records: Sequence[FilteredRecord], index: int
 ) -> FloatArray:
-    """Compute (s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its
+    """Compute (s, k + p): change of all outputs by one standard deviation of one of the model's parameters, by its
     index. For mass, damping and stiffness it is that of their force along the measured motion, exact even for a wrong
     model; for modes, a finite difference of simulations without the hypothesis; 0 where no such model is valid."""
     m = tuning.model.inputs
@@ -195,8 +198,8 @@ def _compute_parameter_columns(
             )
         ]
         return np.concatenate(output_changes)
-    sample_count = sum(block.stop - block.start for filtered in filtered_records for block in filtered.block_slices)
-    return np.zeros((sample_count, m + len(filtered_records[0].reading_units)))
+    output_count = filtered_records[0].strength.shape[1] + len(filtered_records[0].reading_units)
+    return np.zeros((_compute_block_edges(filtered_records)[-1], output_count))
 
 
 def _compute_parameter_force(
@@ -206,12 +209,8 @@ def _compute_parameter_force(
     order, (i, j) = parameter_index // len(axis_pairs), axis_pairs[parameter_index % len(axis_pairs)]
     forces = np.zeros_like(record.missing_force)
     for axis, motion_axis in {(i, j), (j, i)}:
-        name = AXES[motion_axis]
-        motion_by_order = (
-            np.gradient(record.columns[f"v{name}"]) * record.rate_hz,
-            record.columns[f"v{name}"],
-            record.columns[name],
-        )
+        position, velocity = (motion[:, motion_axis] for motion in record.axis_motion)
+        motion_by_order = np.gradient(velocity) * record.rate_hz, velocity, position
         forces[:, axis] -= tuning.deviation[parameter_index] * motion_by_order[order]
     return forces
 
@@ -226,7 +225,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     line_count = int(1.1 * np.searchsorted(cumulative_power, LAW_POWER_KEPT * cumulative_power[-1])) + 8
     line_count = min(next_fast_len(line_count, real=True) + 1, len(lines_hz))
     force_response = _compute_force_response(measure, evidence, lines_hz[:line_count])
-    strength = np.sqrt(np.sum(np.abs(force_response) ** 2, axis=1))
+    strength = np.sqrt(np.sum(np.abs(force_response[:, :, : len(AXES)]) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     ratio = 2 * (line_count - 1) / length
     # The response to a force near the record's end is cut off: the last samples, a quarter at most, are left out.
@@ -236,9 +235,11 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     )
     compares_forces = isinstance(measure, PredictedForce)
     units = measure.unit[: 0 if compares_forces else evidence.response.shape[1]]
+    motion = evidence.axis_position, evidence.axis_velocity
     return FilteredRecord(
-        name_signals(evidence), evidence.axis_force, rate_hz, length, force_response, strength, units, block_slices
-    )
+        name_signals(evidence), motion, evidence.axis_force, rate_hz, length, force_response, strength, units,
+        block_slices,
+    )  # fmt: skip
 
 
 def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, f_hz: FloatArray) -> ComplexArray:

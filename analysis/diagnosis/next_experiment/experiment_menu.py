@@ -1,9 +1,9 @@
 """List the experiments that a laboratory could record next to discriminate rival effects, as commands to simulate.
 
 Sweeps at several levels, a wide and a longer sweep, slow sinusoids, for a stiff axis a sweep about a constant force and
-releases, and a sweep with added mass: `propose_experiment` predicts by simulation how well each discriminates the
-rivals. Nothing exceeds the level already recorded. Commands are in the unit of the model's commands. Also called by
-`study.evaluation.bank.follow_up`.
+releases, and in SI units a sweep with added mass: `propose_experiment` predicts by simulation how well each
+discriminates the rivals. Nothing exceeds the level already recorded. Commands are in the unit of the model's commands.
+Also called by `study.evaluation.bank.follow_up`.
 """
 
 from dataclasses import dataclass
@@ -57,7 +57,6 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
     length_s = SWEEP_CYCLES / lowest_hz
     fade_samples = int(_FADE_SHARE * length_s * sample_rate_hz)
     sinusoid_hz = 4.0 / length_s  # four cycles per experiment
-    added_mass = ADDED_MASS_SHARE * _compute_driven_mass(model)
 
     def drive_axis(waveform: FloatArray) -> FloatArray:
         return np.outer(apply_fades(waveform, fade_samples, fade_samples), np.arange(model.inputs) == axis)
@@ -80,7 +79,6 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
     sinusoid_words, long_s = f"a slow sinusoid of {sinusoid_hz:.3g} Hz", LONG_SWEEP_FACTOR * length_s
     small_sinusoid_words = f"{sinusoid_words} at {level / 10:.3g}, so small that the device hardly moves"
     long_sweep_words = f"{wide_sweep} at {level:.3g} that lasts {long_s:.3g} s"
-    mass_words = _describe_added_mass(model, added_mass)
     return (
         *sweeps,
         Experiment(f"{wide_sweep} at {level:.3g}", make_sweep(level, wide_end_hz), "sweep"),
@@ -88,7 +86,7 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
         Experiment(small_sinusoid_words, make_sinusoid(level / 10), "slow"),
         Experiment(long_sweep_words, make_sweep(level, wide_end_hz, LONG_SWEEP_FACTOR), "sweep", minutes=1.5),
         *static_experiments,
-        Experiment(f"{sweep} at {level:.3g} with {mass_words}", make_sweep(level), "sweep", added_mass, minutes=3.0),
+        *_list_mass_experiments(model, f"{sweep} at {level:.3g}", make_sweep(level)),
     )
 
 
@@ -146,8 +144,15 @@ def _compute_driven_mass(model: MechanicalModel) -> float:
     return float(np.diagonal(input_matrix.T @ model.mass @ input_matrix).mean())
 
 
-def _describe_added_mass(model: MechanicalModel, added_mass: float) -> str:
-    """Describe the mass (kg, shown in g) or inertia (kg m^2) to attach."""
-    if model.rotational:
-        return f"a known inertia of {added_mass:.2g} kg m^2 on the lever"
-    return f"{1e3 * added_mass:.0f} g strapped to the handle"
+def _list_mass_experiments(model: MechanicalModel, sweep: str, command: FloatArray) -> tuple[Experiment, ...]:
+    """List the sweep with a known mass (kg, shown in g) or inertia (kg m^2) attached. Empty for a model outside SI: its
+    mass is in another unit, such as A s^2/m, to which a weighed mass cannot be added. sweep: its description."""
+    if model.system.rotational is None:
+        return ()
+    added_mass = ADDED_MASS_SHARE * _compute_driven_mass(model)
+    mass_text = (
+        f"a known inertia of {added_mass:.2g} kg m^2 on the lever"
+        if model.system.rotational
+        else f"{1e3 * added_mass:.0f} g strapped to the handle"
+    )
+    return (Experiment(f"{sweep} with {mass_text}", command, "sweep", added_mass, minutes=3.0),)

@@ -38,7 +38,7 @@ from analysis.diagnosis.result.retuned_parameters import (
     find_moved_parameters,
 )
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
-from analysis.diagnosis.unit_wording import format_probability, format_share
+from analysis.diagnosis.unit_wording import format_probability, format_share, typeset_unit
 from analysis.wording import capitalise, conjoin, end_sentence, format_p_text
 
 _MAX_LISTED_PLACES = 3
@@ -58,11 +58,13 @@ def format_effect_title(effect: NamedEffect, is_single_axis: bool = False) -> st
     return f"{format_class_noun(effect)} {format_place(effect.place, effect.axis, is_single_axis)}"
 
 
-def describe_effect(effect: NamedEffect, signature: str = "", is_single_axis: bool = False) -> str:
+def describe_effect(effect: NamedEffect, signature: str = "", device: DeviceWording | None = None) -> str:
     """Describe an effect with its parameters in a sentence. signature: what it causes in the data, from the catalogue;
-    a discovered law is written before it."""
+    a discovered law is written before it. device: None = several axes, and a law without its unit."""
+    is_single_axis = device is not None and device.is_single_axis
     if effect.law is not None:
-        signature = "; ".join(filter(None, (format_law(effect.law), signature)))
+        force_unit = "" if device is None else typeset_unit(device.system.force)
+        signature = "; ".join(filter(None, (format_law(effect.law, force_unit), signature)))
     title_and_parameters = ", ".join(
         filter(None, (format_effect_title(effect, is_single_axis), format_parameters(effect.effect, effect.parameters)))
     )
@@ -231,13 +233,13 @@ def describe_gain(effect: NamedEffect) -> str:
 def write_summary_lines(findings: Findings) -> tuple[str, ...]:
     """Write the lines of the diagnosis: verdict, effects, mismatch, next experiment, doubts and remarks; none is
     empty."""
-    diagnosis, is_single_axis = findings.diagnosis, findings.given.inputs == 1
+    diagnosis, device = findings.diagnosis, extract_device(findings)
     moved_parameters = find_final_moves(findings)
     lines = [write_answer(findings)]
     signatures = collect_signature_texts(findings)
     for effect in diagnosis.effects:
         lines += [
-            describe_effect(effect, signatures.get(effect.effect, ""), is_single_axis),
+            describe_effect(effect, signatures.get(effect.effect, ""), device),
             describe_equivalents(effect),
         ]
     if diagnosis.verdict in ("explained", "partly_explained"):
@@ -246,10 +248,10 @@ def write_summary_lines(findings: Findings) -> tuple[str, ...]:
         lines += [
             describe_raised_error(diagnosis.fit.test),
             describe_retuning(moved_parameters, findings.fitted),
-            describe_remainder(diagnosis, extract_device(findings)),
+            describe_remainder(diagnosis, device),
             *describe_ceiling(findings.balance_errors),
             describe_black_box(findings.black_box, bool(diagnosis.effects)),
-            *describe_candidates(diagnosis, extract_device(findings)),
+            *describe_candidates(diagnosis, device),
         ]
     lines += [
         describe_next_experiment(diagnosis),

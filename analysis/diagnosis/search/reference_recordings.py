@@ -110,7 +110,7 @@ class ReferenceRecordings:
     fewer the clean recordings, the larger the factor."""
     gains_by_key: dict[object, FloatArray] = field(default_factory=dict)
     """Results of `compute_clean_gain` so far, by `Hypothesis.key`: hypotheses that differ in parameters alone share
-    one."""
+    one. The model is no part of the key, because `recordings` contain their own, re-tuned to them."""
 
     def compute_clean_gain(self, hypothesis: Hypothesis) -> FloatArray:
         """Compute (c,): the gain that is counted against the hypothesis, `gain_factor` times the largest gain on the

@@ -3,9 +3,9 @@
 A change is right where the diagnosis returns one of the effects that it may show as: a loosened cable is backlash or a
 loose joint, depending on its slack. The control, a change that changes nothing, counts against a diagnosis that names
 anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter; a
-value of a change without a unit is kept in the table and compared with nothing. Called by
-`study.evaluation.kit.lab_kit`, which draws and reads the labels, and `study.evaluation.kit.score_kit`; `study.cli.kit`
-lists the changes.
+value of a change without a unit, or with another unit than the parameter's, is kept in the table and compared with
+nothing. Called by `study.evaluation.kit.lab_kit`, which draws and reads the labels, and
+`study.evaluation.kit.score_kit`; `study.cli.kit` lists the changes.
 """
 
 from collections.abc import Sequence
@@ -102,8 +102,9 @@ class ScoredLabel:
     """Whether the diagnosis is right (`score_label`)."""
     inside: bool | None
     """Whether the written value lies in the 95 % interval (ends included) of the first parameter of the change's first
-    effect. None where no value was written, the change has no unit, or that effect was not named or has no interval;
-    False where the diagnosis is missing although a value with a unit was written."""
+    effect. None where no value was written, the change has no unit, or that effect was not named or has no interval in
+    this unit (as on a rotating device); False where the diagnosis is missing although a value with a unit was
+    written."""
 
 
 def score_label(label: Label, diagnosis: Diagnosis) -> ScoredLabel:
@@ -141,9 +142,11 @@ def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -
     if value is None or not change.unit:
         return None
     for effect in diagnosis.effects:
-        interval = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
-        if effect.effect == change.effects[0] and interval is not None:
-            return interval[0] <= value <= interval[1]
+        estimate = next(iter(effect.parameters.values()), None)
+        if effect.effect != change.effects[0] or estimate is None or estimate.ci95 is None:
+            continue
+        if estimate.unit == change.unit:
+            return estimate.ci95[0] <= value <= estimate.ci95[1]
     return None
 
 

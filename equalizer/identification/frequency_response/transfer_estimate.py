@@ -49,9 +49,9 @@ class EstimateSettings:
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
-    is no recording, the recordings differ in rate (to six digits), channels or units, no segment for the fit yields a
-    whole period or window without missing samples, an output is constant, or there are fewer independent experiments
-    than inputs at every line."""
+    is no recording, the recordings differ in rate, channels or units, no segment for the fit yields a whole period or
+    window without missing samples, an output is constant, or there are fewer independent experiments than inputs at
+    every line."""
     settings = settings or EstimateSettings()
     _check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
@@ -160,14 +160,14 @@ def _join_groups(
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
-    """Check the recordings: raises TransferEstimateError without any, and where sample rate (to six digits), channels
-    or units differ."""
+    """Check the recordings: raises TransferEstimateError without any, and where sample rate, channels or units differ.
+    Rates are compared and stated with all digits, as `identify` compares them."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first_recording = recordings[0]
     for recording_number, recording in enumerate(recordings[1:], start=2):
         for property_name, expected, value in (
-            ("sample rate", f"{first_recording.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),
+            ("sample rate", f"{float(first_recording.sample_rate_hz)} Hz", f"{float(recording.sample_rate_hz)} Hz"),
             ("command channels", _describe_channels(first_recording.command), _describe_channels(recording.command)),
             ("response channels", _describe_channels(first_recording.response), _describe_channels(recording.response)),
         ):

@@ -59,7 +59,9 @@ def estimate_rigid_start(
     if structure.grounded:
         unknowns[structure.slices["stiffness"]] = pack_square_root(_make_positive(stiffness) / unit_scales[2])
     if structure.outputs > m:
-        unknowns[structure.slices["rows"]] = _fit_further_output_rows(segments, m).ravel()
+        # The rows apply to the axes' motions, of which the axes' own sensors may measure the negative.
+        rows = _fit_further_output_rows(segments, m) * np.array(structure.signs)
+        unknowns[structure.slices["rows"]] = rows.ravel()
     return structure, unknowns
 
 

@@ -59,8 +59,8 @@ class _Solution:
 
 class ModalSearch:
     """Adds modes one at a time to a modal model of line groups, none of which may contain a transient. structure: gives
-    numbers of axes and responses, quantity, step, sensor and the actuator's delay (its bandwidth is not used);
-    fit_delay: whether the delay is estimated."""
+    numbers of axes and responses, quantity, step, sensor, and delay and bandwidth of the actuator; fit_delay: whether
+    the delay is estimated."""
 
     def __init__(
         self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool
@@ -246,8 +246,8 @@ class ModalSearch:
         )
 
     def _compute_mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
-        """Compute the responses (lines, modes) of modes of unit mass by partial fractions, sampled exactly, with delay
-        and sensor. A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
+        """Compute the responses (lines, modes) of modes of unit mass by partial fractions, sampled exactly, with
+        actuator and sensor. A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
         modes = len(unknowns) // 2
         natural_rad_s, ratio = np.exp(unknowns[:modes]), np.exp(unknowns[modes : 2 * modes])
         delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz
@@ -258,9 +258,16 @@ class ModalSearch:
         z = np.exp(2j * np.pi * group.frequency_hz / group.rate_hz)
         responses, direct = compute_pole_responses(poles, z, group.rate_hz, group.hold, delay_s)
         pole_terms = responses * (poles**self._order / (poles - conjugate_poles))
-        feedthrough = direct[:, None] if self._order == 2 else 0.0
+        further_term: ComplexArray | float = direct[:, None] if self._order == 2 else 0.0
+        if lag_rad_s := 2 * np.pi * self._structure.actuator.bandwidth_hz:
+            # Behind the actuator's low pass there is no direct feedthrough, but a third pole.
+            lag_pole = np.array([-lag_rad_s], dtype=np.complex128)
+            lag_response, _ = compute_pole_responses(lag_pole, z, group.rate_hz, group.hold, delay_s)
+            pole_terms *= lag_rad_s / (poles - lag_pole)
+            residues = lag_rad_s * lag_pole**self._order / ((lag_pole - poles[:modes]) * (lag_pole - poles[modes:]))
+            further_term = np.asarray(lag_response * residues, dtype=np.complex128)
         sensor = compute_sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
-        return np.asarray((pole_terms[:, :modes] + pole_terms[:, modes:] + feedthrough) * sensor[:, None])
+        return np.asarray((pole_terms[:, :modes] + pole_terms[:, modes:] + further_term) * sensor[:, None])
 
 
 def _concatenate_real_imaginary(values: ComplexArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """Identification of a state-space model from recordings: estimate of the frequency response, fit, and repetitions.
 
-The free decay of slow poles disturbs the estimate: it is subtracted from the recordings, and estimate and fit are
+The free decay of relaxed poles disturbs the estimate: it is subtracted from the recordings, and estimate and fit are
 repeated. Where the lines scatter more than their noise, the fit is repeated on local averages. Called as
 `equalizer.identify` and by `study.workflows.equalizer.identify_model`.
 """
@@ -16,7 +16,8 @@ from equalizer.identification.state_space.free_decay import extract_slow_modes, 
 from equalizer.identification.state_space.identify import IdentificationResult, identify, write_outside_gain_remark
 from equalizer.identification.state_space.misfit import compute_estimate_misfit
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED_COST, describe_misfit_causes
-from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.relaxed_poles import list_slow_poles
+from equalizer.identification.state_space.settings import ORDINARY_DECAY_S, IdentificationSettings
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.recording import Recording
@@ -40,8 +41,7 @@ class RecordingsIdentification:
     """Result of `identify_recordings`: frequency response of the recordings, and the state-space model fitted to it."""
 
     estimate: FrequencyResponse
-    """Frequency response of the recordings, free decays of slow poles subtracted, unless local averages alone were
-    fitted."""
+    """Frequency response of the recordings, free decays of relaxed poles subtracted."""
     fitted: FrequencyResponse
     """The frequency response that the model was fitted to: the estimate, or its local averages."""
     identified: IdentificationResult
@@ -55,10 +55,10 @@ def identify_recordings(
 ) -> RecordingsIdentification:
     """Identify a state-space model of the recorded device, and state how well it fits.
 
-    smooth: whether to fit local averages over neighbouring lines, taken about the model where a pole was relaxed,
-    because they would blunt its resonance; None: where the lines scatter more than their noise. `on_progress` takes the
-    share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does, IdentificationError as `identify`
-    does, and ValueError where there are too few lines for local averages.
+    smooth: whether to fit local averages over neighbouring lines, taken about the model where a pole decays more slowly
+    than the ordinary bound, because they would blunt its resonance; None: where the lines scatter more than their
+    noise. `on_progress` takes the share done, 0 to 1. Raises TransferEstimateError as `estimate_transfer` does,
+    IdentificationError as `identify` does, and ValueError where there are too few lines for local averages.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or IdentificationSettings()
@@ -80,9 +80,9 @@ def _fit_estimate(
     report_progress: Callable[[float], None],
 ) -> RecordingsIdentification:
     """Fit the lines of the estimate, then, depending on `smooth`, local averages of them; the averages alone where
-    `smooth` is true and the bound of the decay is fixed, because no pole is then relaxed. report_progress: takes the
-    share done."""
-    if smooth and settings.longest_decay_s is not None:
+    `smooth` is true and the bound of the decay is fixed at the ordinary one or below, because no pole then decays more
+    slowly. report_progress: takes the share done."""
+    if smooth and settings.longest_decay_s is not None and settings.longest_decay_s <= ORDINARY_DECAY_S:
         return _fit_smoothed(estimate, recordings, settings, None, report_progress)
     identified = identify(estimate, settings, recordings, lambda share: report_progress(share / 2))
     estimate, identified = _remove_transients(estimate, identified, recordings, settings)
@@ -147,9 +147,10 @@ def _fit_smoothed(
     report_progress: Callable[[float], None],
 ) -> RecordingsIdentification:
     """Fit local averages of the lines. unsmoothed: the fit of the lines themselves, whose chosen model is refined where
-    a pole was relaxed; None, or no relaxed pole: a new search. report_progress: takes the share done."""
-    has_relaxed_pole = unsmoothed is not None and bool(unsmoothed.relaxed)
-    if unsmoothed is not None and has_relaxed_pole:
+    a pole decays more slowly than the ordinary bound; None, or no such pole: a new search. report_progress: takes the
+    share done."""
+    # A bound that is fixed by hand relaxes no pole, but permits slow ones.
+    if unsmoothed is not None and list_slow_poles(unsmoothed.chosen, ORDINARY_DECAY_S, estimate.sample_rate_hz):
         fitted = smooth_response(estimate, baseline=compute_model_response(unsmoothed.model, estimate.frequency_hz))
         identified = identify(fitted, settings, initial=unsmoothed.chosen)
     else:

@@ -135,8 +135,9 @@ def _assemble_model(
 ) -> tuple[IdentifiedModel, float]:
     """Assemble the state-space model of the modes and of the remainder (lines, p, m), which is fitted by least squares
     with fixed real poles; also returns the largest error of that fit relative to `total_norm`, (lines,), the norm of
-    the total response. The model has no covariance and no samples of its uncertainty. Singular values of the basis
-    below 1e-7 of the largest (chosen by hand) are dropped, because neighbouring poles have similar responses."""
+    the total response. The model has no covariance, no samples of its uncertainty and no quality, which belong to the
+    given models; its delay is the least of theirs. Singular values of the basis below 1e-7 of the largest (chosen by
+    hand) are dropped, because neighbouring poles have similar responses."""
     first_model, lines = interpolation.workspace.models[0], interpolation.lines
     poles = _choose_remainder_poles(interpolation.workspace.band_hz, first_model.sample_rate_hz)
     basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / total_norm[:, None]
@@ -167,10 +168,12 @@ def _assemble_model(
         "resonances_hz": [mode.natural_hz for mode in modes],
         "worst_relative_error": fit_error,
     }
-    band_hz = interpolation.workspace.band_hz
+    workspace = interpolation.workspace
+    delay_samples = min(model.delay_samples for model in workspace.models)
     return replace(
-        first_model, A=A, B=B, C=C, D=gains[-1], band_hz=band_hz, covariance=None, samples=None, provenance=provenance
-    ), fit_error
+        first_model, A=A, B=B, C=C, D=gains[-1], band_hz=workspace.band_hz, delay_samples=delay_samples,
+        covariance=None, samples=None, provenance=provenance, quality=None,
+    ), fit_error  # fmt: skip
 
 
 def _choose_remainder_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:

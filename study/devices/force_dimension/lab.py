@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
+from equalizer.signals.listed_problems import format_validation_problems
 from protocols.definition.staircase_rule import STRICT
 from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.sensor import Accelerometer
@@ -97,10 +98,7 @@ def read_lab_settings() -> LabSettings:
     except tomllib.TOMLDecodeError as error:
         raise _make_lab_file_error(path, str(error)) from error
     except ValidationError as error:
-        first_problem = error.errors()[0]
-        raise _make_lab_file_error(
-            path, f"{'.'.join(map(str, first_problem['loc']))}: {first_problem['msg']}"
-        ) from error
+        raise _make_lab_file_error(path, "; ".join(format_validation_problems(error.errors()))) from error
 
 
 def write_sensor_table(sensor_table: str) -> Path:

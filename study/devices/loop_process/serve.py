@@ -140,19 +140,23 @@ def run(caller_pid: int, *handles: int) -> None:
 
 
 class CallerWatchdog:
-    """Ends the process if it does not end itself soon after its caller has ended or after a SIGTERM. caller_pid:
-    process id of the caller. received_signals: numbers of the signals received, filled by the signal handler."""
+    """Ends the process if it does not end itself soon after its caller has ended or asked for the end, or after a
+    SIGTERM. caller_pid: process id of the caller. received_signals: numbers of the signals received, filled by the
+    signal handler."""
 
     def __init__(self, caller_pid: int, received_signals: list[int]) -> None:
         self._caller_pid = caller_pid
         self._received_signals = received_signals
+        self.end_requested = threading.Event()
+        """To be set when the device's closing begins: the caller is gone or has asked for it."""
         self.exit_timeout_s = OPENING_GRACE_S
         """Time (s) that the main thread may take to end the process, from the moment at which `must_exit` is True."""
 
     def must_exit(self) -> bool:
-        """Whether a SIGTERM was received, or the process that started this one is gone (not recognised on Windows,
-        where `os.getppid` does not change)."""
-        return bool(self._received_signals) or os.getppid() != self._caller_pid
+        """Whether a SIGTERM was received, `end_requested` is set, or the process that started this one is gone. On
+        Windows `os.getppid` does not change, and the end of the caller is recognised by its closed pipes alone, thus
+        not while the device is being opened."""
+        return bool(self._received_signals) or self.end_requested.is_set() or os.getppid() != self._caller_pid
 
     def watch(self) -> None:
         """Wait until the process must exit, and terminate it if its main thread does not within `exit_timeout_s`; the
@@ -186,6 +190,7 @@ def _open_and_serve(watchdog: CallerWatchdog, pipe_ends: tuple[PipeEnd, ...]) ->
         server.start()
         while not (server.ended.wait(POLL_INTERVAL_S) or watchdog.must_exit()):
             pass
+        watchdog.end_requested.set()
         server.close()
 
 

@@ -144,17 +144,26 @@ def _find_stretch(excitation: FloatArray, pattern: FloatArray) -> int:
 
 
 def _collect_readings(recording: Recording, path: Path) -> FloatArray:
-    """Collect the recorded readings (n, READING_SIZE). Clipping of the sensor is not recorded, and is 0. Raises
-    `DeviceError` for a recording without a position in m or an acceleration in m/s², three channels each."""
+    """Collect the recorded readings (n, READING_SIZE). Missing positions, such as of missed ticks, are interpolated
+    linearly, because the safety layer ends a stimulus at a reading without a position. Clipping of the sensor is not
+    recorded, and is 0. Raises `DeviceError` for a recording without a position in m or an acceleration in m/s², three
+    channels each."""
     position, response = recording.position, recording.response
-    if position is None or position.samples.shape[1] != 3 or set(position.units) != {"m"}:
+    if (
+        position is None
+        or position.samples.shape[1] != 3
+        or set(position.units) != {"m"}
+        or np.isnan(position.samples).all(axis=0).any()
+    ):
         raise _make_replay_error(f"{path.name} has no position of a handle, three channels in metres.")
     if response.samples.shape[1] != 3 or set(response.units) != {"m/s^2"}:
         raise _make_replay_error(
             f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2."
         )
     readings = np.zeros((len(recording), READING_SIZE))
-    readings[:, POSITION] = position.samples
+    for channel, samples in enumerate(position.samples.T, start=POSITION.start):
+        (known_rows,) = np.nonzero(~np.isnan(samples))
+        readings[:, channel] = np.interp(np.arange(len(samples)), known_rows, samples[known_rows])
     readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = response.samples
     return readings
 

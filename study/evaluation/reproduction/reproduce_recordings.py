@@ -1,8 +1,9 @@
 """Cache of the recordings for the reproduced figures: each is made once and reused by later runs.
 
-A recording is reused only where protocol, seed and position of the handle agree with the request; the device is not
-compared, because each file name stands for one device. A recording that differs is never overwritten (StudyError); an
-interrupted one is removed and made again. Called by `reproduce_paper`.
+A recording is reused only where protocol, seed, position of the handle and version of hapteq agree with the request.
+The device is not compared: each file name stands for a single simulated device, which changes with the version only. A
+recording that differs is never overwritten (StudyError); an interrupted one is removed and made again. Called by
+`reproduce_paper`.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from study.devices.opening import SIMULATED
 from study.errors import StudyError
 from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
 from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.provenance import list_versions
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device
@@ -80,6 +82,8 @@ def _load_cached_recording(
         raise _make_foreign_file_error(path, "it follows another protocol")
     if provenance.get("seeds") != {"device": plan.seed}:
         raise _make_foreign_file_error(path, "it was made with another seed")
+    if provenance.get("versions", {}).get("hapteq") != list_versions()["hapteq"]:
+        raise _make_foreign_file_error(path, "it was made with another version of hapteq")
     if tuple(meta.get("place_m", ())) != request.place_m:
         raise _make_foreign_file_error(path, "it was made at another place")
     if meta.get("interrupted"):
@@ -103,6 +107,6 @@ def _make_foreign_file_error(path: Path, reason: str) -> StudyError:
     return StudyError(
         "This folder holds another reproduction",
         f"{path} is in the way: {reason}.",
-        "Choose another folder with --out, or the same --seed to continue.",
+        "Choose another folder with --out, or the same --seed and version to continue.",
         saved="Nothing was changed.",
     )

@@ -115,7 +115,7 @@ def _classify_columns(columns: "Mapping[str, pd.Series[Any]]", body: list[Line],
                     raise  # a number in another notation is an error, not a remark
                 arrays[name] = np.array(FaultyColumn(problem), dtype=object)
     joined_stamps = join_stamps(stamps)
-    in_seconds = {name: _make_seconds_name(name, columns) for name in joined_stamps}
+    in_seconds = _name_in_seconds(joined_stamps, layout.names)
     all_columns = arrays | {name: _subtract_first(stamp.seconds) for name, stamp in joined_stamps.items()}
     notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined_stamps.items())
     notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in text_names)
@@ -129,10 +129,15 @@ def _reduce_to_scalar(column: npt.NDArray[np.float64]) -> npt.NDArray[np.float64
     return np.asarray(column[0]) if is_single else column
 
 
-def _make_seconds_name(name: str, used_names: Iterable[str]) -> str:
-    """Make the name of a column of stamps that was converted to seconds; with "stamp" where it is in `used_names`."""
-    stem = split_bracketed_unit(name)[0]
-    return f"{stem} [s]" if f"{stem} [s]" not in used_names else f"{stem} stamp [s]"
+def _name_in_seconds(names: Iterable[str], used_names: Iterable[str]) -> dict[str, str]:
+    """Make the names of columns of stamps that were converted to seconds, by their names: the first of "t [s]",
+    "t stamp [s]", "t stamp 2 [s]" and so on that is neither in `used_names` nor the name of another such column."""
+    in_seconds: dict[str, str] = {}
+    for name in names:
+        taken_names, stem = {*used_names, *in_seconds.values()}, split_bracketed_unit(name)[0]
+        marks = ("", " stamp", *(f" stamp {number}" for number in range(2, len(taken_names) + 2)))
+        in_seconds[name] = next(new_name for mark in marks if (new_name := f"{stem}{mark} [s]") not in taken_names)
+    return in_seconds
 
 
 def _find_fault(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
@@ -151,15 +156,11 @@ def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
 
 def convert_times(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
     """Convert arrays of dates and clock times to seconds since the first; keep others. Raises as `read_stamps`."""
-    converted, clocks, notes = {}, [], []
-    for name, array in stored.items():
-        seconds_and_first = _convert_to_seconds(array)
-        column_name = name if seconds_and_first is None else _make_seconds_name(name, stored)
-        converted[column_name] = array if seconds_and_first is None else seconds_and_first[0]
-        if seconds_and_first is not None:
-            clocks.append(column_name)
-            notes.append(f"{name}: read as seconds since {seconds_and_first[1]}.")
-    return Table(converted, tuple(clocks), tuple(notes))
+    stamps = {name: pair for name, array in stored.items() if (pair := _convert_to_seconds(array)) is not None}
+    in_seconds = _name_in_seconds(stamps, stored)
+    converted = {in_seconds.get(name, name): stamps.get(name, (array, ""))[0] for name, array in stored.items()}
+    notes = tuple(f"{name}: read as seconds since {first}." for name, (_, first) in stamps.items())
+    return Table(converted, tuple(in_seconds.values()), notes)
 
 
 def _convert_to_seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | None:
@@ -288,8 +289,7 @@ def _parse_numbers(
     is_time = fields.map(is_stamp).to_numpy() & is_unparsed if is_unparsed.any() else is_unparsed
     invalid_rows = np.flatnonzero(is_unparsed & ~is_time if (is_unparsed & ~is_time).any() else is_unparsed)
     if len(invalid_rows):
-        line_number = body[int(invalid_rows[0])][0]
-        field = str(column.iloc[int(invalid_rows[0])])
+        line_number, field = body[int(invalid_rows[0])][0], str(column.iloc[int(invalid_rows[0])])
         has_comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", field.strip())
         comma_hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if has_comma else ""
         stamp_hint = f"; {STAMP_NOTATIONS}" if re.search(r"\d[-/:]\d", field) else ""

@@ -121,13 +121,18 @@ def _find_contradictions(import_map: ImportMap) -> Iterator[str]:
 
 
 def _find_segment_contradictions(import_map: ImportMap) -> Iterator[str]:
-    """Find invalid splits (shares must sum to 1 within 0.001, for rounded fractions) and limits that are stated both in
-    samples and in seconds; yields a clause for each. A limit of 0 counts as not stated."""
+    """Find invalid splits (shares, none below 0, must sum to 1 within 0.001, for rounded fractions) and limits that are
+    stated both in samples and in seconds; yields a clause for each. A limit of 0 counts as not stated."""
     for number, segment in enumerate(import_map.segment, start=1):
         if set(segment.split) - {"fit", "test", ""}:
             yield f"segment[{number}].split names {', '.join(segment.split)}; roles are fit, test, or empty"
-        elif segment.split and (segment.role or not 0.999 <= sum(segment.split.values()) <= 1.001):
-            yield f"segment[{number}].split must have shares that sum to 1, and must not be combined with `role`"
+        elif (shares := segment.split.values()) and (
+            segment.role or min(shares) < 0 or not 0.999 <= sum(shares) <= 1.001
+        ):
+            yield (
+                f"segment[{number}].split must have shares that sum to 1, none below 0, and must not be combined with "
+                "`role`"
+            )
         if (segment.start and segment.start_s) or (segment.stop and segment.stop_s):
             yield f"segment[{number}] is stated in samples and in seconds; state one of them"
 

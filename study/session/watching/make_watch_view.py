@@ -78,7 +78,7 @@ def make_watch_view(
         gate_radius_mm=state.protocol.gate.radius_mm,
         live=live_state if status in RUNNING_STATUSES and situation.is_live_fresh else None,
         alarms=find_alarms(situation, previous_view.alarms if previous_view is not None else ()),
-        probes=len(session.probes),
+        probes=sum(bool(probe.recording and not probe.trouble) for probe in session.probes),
         drifts=live_info.drifts,
     )
 

@@ -251,7 +251,7 @@ class WatchView:
     alarms: tuple[Alarm, ...]
     """Present alarms."""
     probes: int = 0
-    """Number of probes in the log with their measurement, references included."""
+    """Number of probes with a recording that can be used, references included."""
     drifts: tuple[DriftRecord, ...] = ()
     """Drifts that the probes show at present."""
 

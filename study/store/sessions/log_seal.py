@@ -20,6 +20,7 @@ from typing import Annotated
 
 from pydantic import Field, TypeAdapter, ValidationError
 
+from equalizer.signals.listed_problems import format_validation_problems
 from study.errors import StudyError
 from study.session.facts.fact_types import Count, Sha256
 from study.session.facts.log_chain import CHECKSUM_DIGITS, Chain, ChainBrokenError, verify_checksum
@@ -95,9 +96,7 @@ def read_seal(path: Path) -> Seal:
     try:
         return SEAL_VALIDATOR.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        first_error = error.errors(include_url=False)[0]
-        field_path = ".".join(map(str, first_error["loc"])) or "the document"
-        raise UnusableFileError(path, "seal of a session log", (f"{field_path}: {first_error['msg']}",)) from error
+        raise UnusableFileError(path, "seal of a session log", format_validation_problems(error.errors())) from error
 
 
 def check_seals(folder: Path, log_contents: LogContents) -> int:

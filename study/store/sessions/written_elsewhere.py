@@ -24,14 +24,17 @@ LINE_BREAK_REPLACEMENT = "\0"
 def note_written_folder(source: Path, folder: Path, even_if_searched: bool = False) -> None:
     """Add the absolute path of `folder` to the list, unless it is listed already or a withdrawal would search it: the
     data folder, a folder directly in it, or any folder within a session. Errors of writing the list are ignored; a
-    list that cannot be read is replaced.
+    list that cannot be read is left as it is, so that its folders are not lost.
 
     source: the data folder, or a session folder in it. even_if_searched: add `folder` wherever it is, such as for an
     export, which a withdrawal does not recognise.
     """
     folder, source = folder.resolve(), source.resolve()
     data_folder = source.parent if FOLDER_PATTERN.fullmatch(source.name) else source
-    noted_folders = read_written_folders(data_folder)
+    try:
+        noted_folders = _read_list(data_folder)
+    except OSError:
+        return
     relative_parts = folder.relative_to(data_folder).parts if folder.is_relative_to(data_folder) else None
     is_searched = (
         not even_if_searched
@@ -49,11 +52,17 @@ def note_written_folder(source: Path, folder: Path, even_if_searched: bool = Fal
 def read_written_folders(data_folder: Path) -> tuple[Path, ...]:
     """Read the listed folders, in the order in which they were added; empty if there are none or the list cannot be
     read."""
+    try:
+        return _read_list(data_folder)
+    except OSError:
+        return ()
+
+
+def _read_list(data_folder: Path) -> tuple[Path, ...]:
+    """Read the listed folders; empty without a list, or with a link in its place. Raises OSError where the list cannot
+    be read."""
     list_path = data_folder / WRITTEN_ELSEWHERE_NAME
     if not is_real_file(list_path):
         return ()
-    try:
-        lines = os.fsdecode(read_regular(list_path, MAX_DOCUMENT_BYTES)).split("\n")
-    except OSError:
-        return ()
+    lines = os.fsdecode(read_regular(list_path, MAX_DOCUMENT_BYTES)).split("\n")
     return tuple(Path(line.replace(LINE_BREAK_REPLACEMENT, "\n")) for line in lines if line)

@@ -23,8 +23,9 @@ STATUS_SYMBOLS: dict[SittingStatus, str] = {
 
 NOT_MEASURED_MARK = "n.m."
 """Text in place of an acceleration that was not measured, in the table of trials."""
-NOT_MEASURED_LEGEND = "answered too early to measure; counts"
-"""Explanation of `NOT_MEASURED_MARK`, short enough for a terminal of 80 columns."""
+NOT_MEASURED_LEGEND = "answered too early, or see remark; counts"
+"""Explanation of `NOT_MEASURED_MARK`, short enough for a terminal of 80 columns. The remark on the trial states any
+other reason than an early answer, such as a lost recording."""
 
 
 def format_local_time(utc: str) -> str:
@@ -161,5 +162,5 @@ def describe_drifts(view: WatchView) -> str:
         return ""
     over_limit_count = sum(drift.beyond for drift in view.drifts)
     if not view.drifts:
-        return f"none in {view.probes} probes"
+        return f"none in {view.probes} {'probe' if view.probes == 1 else 'probes'}"
     return f"{len(view.drifts)} changed, {over_limit_count} beyond what is allowed"

@@ -120,7 +120,8 @@ def compare_with_bare_loop(late_ticks: int, ticks: int, run: BareLoopRun) -> Dev
     fine = late_ticks <= late_limit
     comparison_text = (
         f"{reference.late_ticks} of {reference.ticks} late "
-        f"({reference.late_ticks / max(reference.ticks, 1):.2%}) at the same time, the latest by "
+        f"({reference.late_ticks / max(reference.ticks, 1):.2%}) at the same time, "
+        f"{'with' if reference.raised_priority else 'without'} real-time priority, the latest by "
         f"{1000 * reference.latest_s:.1f} ms; this loop: {late_ticks} of {ticks} "
         f"({late_ticks / max(ticks, 1):.2%}), where up to {late_limit} are fine ({ACCEPTED_RATIO:g} times as many, and "
         "chance)"

@@ -176,15 +176,12 @@ def check_data_folder(data: Path) -> DeviceFinding:
     """Check whether sessions can be written below `data`, by a temporary file, and whether `MIN_FREE_BYTES` are free. A
     missing folder is fine: the first session creates it."""
     finding_name = "Data folder"
-    nearest_folder = next(
-        existing_folder for existing_folder in (data.absolute(), *data.absolute().parents) if existing_folder.exists()
-    )
     try:
+        nearest_folder = next(folder for folder in (data.absolute(), *data.absolute().parents) if folder.exists())
         with tempfile.TemporaryFile(dir=nearest_folder):
             free_bytes = shutil.disk_usage(nearest_folder).free
     except OSError as error:
-        advice = "Choose another folder with --data, or change the rights of this one."
-        return DeviceFinding(finding_name, f"{data}: {error.strerror}", fine=False, advice=advice)
+        return DeviceFinding(finding_name, f"{data}: {error.strerror}", fine=False, advice=_RIGHTS_ADVICE)
     has_enough_space = free_bytes >= MIN_FREE_BYTES
     value_text = f"{data}: can be written, {free_bytes / 1e9:.1f} GB free"
     return DeviceFinding(
@@ -198,8 +195,12 @@ def check_data_folder(data: Path) -> DeviceFinding:
 def check_privacy(data: Path) -> DeviceFinding:
     """Check whether other accounts of this computer can read the data folder. A missing folder is fine."""
     finding_name = "Data rights"
-    if not data.exists():
+    try:
+        data.stat()
+    except (FileNotFoundError, NotADirectoryError):
         return DeviceFinding(finding_name, f"{data}: not there yet; it will be for this account alone", fine=True)
+    except OSError as error:
+        return DeviceFinding(finding_name, f"{data}: {error.strerror}", fine=False, advice=_RIGHTS_ADVICE)
     warning = format_privacy_warning(data)
     value_text = f"{data}: open to other accounts" if warning else f"{data}: for this account alone"
     return DeviceFinding(finding_name, value_text, not warning, warning)
@@ -222,5 +223,7 @@ def _describe_colours(kind: str) -> str:
 
 _PLAIN_ADVICE = "or use `hapteq study --plain`."
 """End of each advice on the terminal: the line mode needs no particular terminal."""
+_RIGHTS_ADVICE = "Choose another folder with --data, or change the rights of this one."
+"""Advice for a data folder that this account cannot use."""
 _INSTALL_ADVICE = "Run `make study` in hapteq's folder, or install hapteq again."
 """Advice for a missing or unsuitable package or Python."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
+from study.session.views.resume_command import find_device_option, format_resume_command
 from study.store.disk.privacy import format_data_folder_warning
 from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, check_subject, list_session_folders
@@ -88,7 +89,13 @@ def plan_sitting(
     check_model_for_protocol(plan.protocol, model)
     check_participant_code(data, plan.subject, simulated=observer is not None)
     unfinished_notes = (
-        f"{folder.name} is not finished; hapteq resume {folder.path} continues it."
+        f"{folder.name} is not finished; {_format_resume_command(folder)} continues it."
         for folder in find_unfinished_sessions(data, plan.subject, protocol_source.protocol.name)
     )
     return SittingPlan(plan, (*unfinished_notes, *filter(None, [format_data_folder_warning(data)])))
+
+
+def _format_resume_command(folder: SessionFolder) -> str:
+    """Format the command that continues an unfinished session on the device on which it was begun."""
+    device = fold_session(folder).state.opened.device
+    return format_resume_command(str(folder.path), find_device_option(device.name, device.simulated))

@@ -152,9 +152,8 @@ def _make_participant(code: str, sessions: Sequence[_StartedSession]) -> Partici
     numbers = [session.number for session in sessions if session.number is not None]
     best_standing = next((standing for standing in STANDINGS_BEST_FIRST if standing in standings), standings[-1])
     progress = PROGRESS_BY_STANDING.get(best_standing, "left out")
-    return Participant(
-        code, numbers[0] if numbers else None, progress, "" if best_standing in PROGRESS_BY_STANDING else best_standing
-    )
+    reason = "" if best_standing in ("finished", "unfinished") else best_standing
+    return Participant(code, numbers[0] if numbers else None, progress, reason)
 
 
 def _load_latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> StudyProtocol:
@@ -232,15 +231,15 @@ def _summarise_next_order(cell: Cell | None) -> dict[str, Any]:
 
 
 def format_plan_lines(study: PlannedStudy) -> list[str]:
-    """Format a plan as lines of text for the terminal: progress, participants to resume or left out, orders that lack
-    participants, next participant, warnings."""
+    """Format a plan as lines of text for the terminal: progress, participants to resume, running or left out, orders
+    that lack participants, next participant, warnings."""
     plan = study.plan
     done_count, begun_count, left_out_count = (plan.count(progress) for progress in ("done", "begun", "left out"))
     planned_text = f" of {plan.planned} planned" if plan.planned else ""
     lines = [f"{plan.protocol}: {done_count} done{planned_text}, {begun_count} begun, {left_out_count} left out"]
-    lines += _format_codes(
-        "to resume", [participant.code for participant in plan.participants if participant.progress == "begun"]
-    )
+    begun = [participant for participant in plan.participants if participant.progress == "begun"]
+    lines += _format_codes("to resume", [participant.code for participant in begun if not participant.reason])
+    lines += _format_codes("running", [participant.code for participant in begun if participant.reason])
     lines += _format_codes(
         "left out",
         [

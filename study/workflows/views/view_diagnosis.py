@@ -38,7 +38,9 @@ def make_diagnosis_view(path: Path) -> DiagnosisView:
     view = DiagnosisView(
         path=str(path),
         verdict=describe_verdict(diagnosis, device=device_wording),
-        sentences=tuple(sentence for effect in diagnosis.effects for sentence in _describe_named_effect(effect)),
+        sentences=tuple(
+            sentence for effect in diagnosis.effects for sentence in _describe_named_effect(effect, device_wording)
+        ),
         rivals=tuple(sentence for effect in diagnosis.effects for sentence in describe_rivals(effect)),
         mismatch=_tabulate_mismatches(diagnosis.mismatch),
         fit=(ERROR_HEADER, _format_error_row("fit", diagnosis.fit.fit), _format_error_row("test", diagnosis.fit.test)),
@@ -61,11 +63,11 @@ def _read_device(path: Path) -> DeviceWording | None:
     return DeviceWording(model.inputs == 1, model.system)
 
 
-def _describe_named_effect(effect: NamedEffect) -> tuple[str, ...]:
+def _describe_named_effect(effect: NamedEffect, device: DeviceWording | None) -> tuple[str, ...]:
     """Describe in sentences a named effect, and the effects that the recording cannot distinguish from it."""
     effect_text = (
-        f"{describe_effect(effect)} It explains {_format_percent(effect.share)} of the mismatch that remains after "
-        f"re-tuning (probability {_format_probability(effect.probability)})."
+        f"{describe_effect(effect, device=device)} It explains {_format_percent(effect.share)} of the mismatch that "
+        f"remains after re-tuning (probability {_format_probability(effect.probability)})."
     )
     return tuple(filter(None, (effect_text, describe_equivalents(effect))))
 

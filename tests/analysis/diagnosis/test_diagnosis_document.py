@@ -3,7 +3,18 @@ import json
 
 import pytest
 
-from analysis.diagnosis.document import DiagnosisError, build_diagnosis_schema, diagnosis_from_json, diagnosis_to_json
+from analysis.diagnosis.document import (
+    DiagnosisError,
+    Estimate,
+    FoundLaw,
+    NamedEffect,
+    build_diagnosis_schema,
+    diagnosis_from_json,
+    diagnosis_to_json,
+)
+from analysis.diagnosis.result.candidate_wording import DeviceWording
+from analysis.diagnosis.result.wording import describe_effect
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem
 
 ERRORS = {"before": 0.4, "retuned": 0.3, "after": 0.011, "noise": 0.01}
 DOCUMENT = {
@@ -132,3 +143,12 @@ def test_a_law_that_contradicts_itself_is_refused(effect, problem):
     with pytest.raises(DiagnosisError) as error:
         diagnosis_from_json(change_document(("effects",), [effect]))
     assert problem in str(error.value)
+
+
+def test_a_law_has_the_unit_of_the_force_or_torque_that_it_adds():
+    law = FoundLaw("-0.2*vx", ("vx",), "force", "x")
+    effect = NamedEffect("discovered_law", "mechanism", "x", 1.0, 1.0, {"p0": Estimate(0.2, "1")}, law=law)
+    systems = {LINEAR: "*vx N.", ROTATIONAL: "*vx N m.", UnitSystem("A", "rad"): "*vx A.", UnitSystem("1"): "*vx."}
+    for system, end in systems.items():
+        assert describe_effect(effect, device=DeviceWording(False, system)).endswith(end)
+    assert describe_effect(effect).endswith("*vx.")

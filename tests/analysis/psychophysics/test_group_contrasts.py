@@ -60,3 +60,9 @@ def test_differences_that_are_equal_but_for_rounding_are_left_out():
     values = np.array([[0.0, 0.3, 0.0], [0.1, 0.1 + (0.1 + 0.2), 0.4]])
     assert np.ptp(values[:, 1] - values[:, 0]) > 0
     assert [c.frequency_hz for c in compute_contrasts((5.0, 15.0, 25.0), values, 0.95)] == [25.0]
+
+
+def test_sums_that_are_all_equal_do_not_determine_the_test_of_equal_spread():
+    """Both thresholds then vary by the same amount in opposite directions: the correlation would be 0 / 0."""
+    (found,) = compute_contrasts((5.0, 15.0), np.array([[-1.0, 3.0], [0.0, 2.0], [1.0, 1.0]]), 0.95)
+    assert found.difference_db == 2.0 and found.p_spread is None

@@ -113,3 +113,9 @@ def test_huynh_feldt_and_mauchly_of_the_ncss_manual():
 
 def test_mauchly_needs_more_people_than_contrasts():
     assert compute_mauchly_test(np.array(DRUGS[:3], float)) is None
+
+
+def test_two_conditions_with_the_same_values_do_not_determine_mauchlys_test():
+    """The covariance of the contrasts is singular; by rounding its least eigenvalue is not exactly 0."""
+    values = np.array([[0.1, 0.1, 0.7, 1.3], [0.3, 0.3, 0.4, 2.2], [0.2, 0.2, 1.9, 1.1], [0.9, 0.9, 1.2, 3.4]])
+    assert compute_mauchly_test(np.vstack([values, values[::-1] * [1.1, 1.1, 0.9, 1.3]])) is None

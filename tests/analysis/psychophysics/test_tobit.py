@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import OptimizeResult
 from scipy.stats import CensoredData, norm
 
+from analysis.psychophysics import tobit
 from analysis.psychophysics.tobit import compute_tobit_contrasts, fit_tobit
 
 HZ = (5.0, 35.0, 45.0)
@@ -66,3 +68,47 @@ def test_gaps_are_left_out_and_where_it_says_nothing_it_is_silent():
     assert [contrast.frequency_hz for contrast in compute_tobit_contrasts(HZ, values, none_known, 0.95)] == [35.0]
     none_known[:, 0] = True
     assert compute_tobit_contrasts(HZ, values, none_known, 0.95) == ()
+
+
+def test_people_who_differ_much_more_than_the_errors_are_integrated_exactly():
+    # Five frequencies: each person's effect is known to 0.4 dB, six times more closely than the people differ.
+    values = simulate_people(4, means=(-6.0, -3.0, 0.0, 3.0, 5.0), person=4.0, error=1.0)
+    cut = values > 6.0
+    values[0, 1] = np.nan
+    parameters = np.array([-6.0, -3.0, 0.0, 3.0, 5.0, np.log(4.0), np.log(1.0)])
+    effect_db = np.linspace(-40.0, 40.0, 40001)
+    likelihoods = np.ones((len(values), len(effect_db)))
+    for (person, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            law = norm(parameters[column] + effect_db, 1.0)
+            likelihoods[person] *= law.sf(value) if cut[person, column] else law.pdf(value)
+    exact = np.log(np.trapezoid(likelihoods * norm(0.0, 4.0).pdf(effect_db), effect_db, axis=1)).sum()
+    assert tobit._compute_log_likelihood(parameters, values, cut) == pytest.approx(exact, abs=1e-6)
+
+
+def test_a_fit_that_did_not_converge_is_no_result(monkeypatch):
+    values = simulate_people(3)
+    assert len(compute_tobit_contrasts(HZ, values, values > 7.0, 0.95)) == 2
+    monkeypatch.setattr(tobit, "minimize", lambda cost, start, **_: OptimizeResult(x=start, fun=cost(start)))
+    assert compute_tobit_contrasts(HZ, values, values > 7.0, 0.95) == ()
+
+
+def test_people_with_equal_thresholds_give_no_result():
+    values = np.array([[-3.5, -3.1, 4.0]] * 3)
+    assert compute_tobit_contrasts(HZ, values, values == 4.0, 0.95) == ()
+
+
+def test_a_person_without_a_threshold_adds_no_degree_of_freedom():
+    values = simulate_people(3)
+    with_gaps = np.vstack([values, np.full((2, 3), np.nan)])
+    expected = compute_tobit_contrasts(HZ, values, values > 7.0, 0.95)
+    assert compute_tobit_contrasts(HZ, with_gaps, with_gaps > 7.0, 0.95) == expected
+    assert compute_tobit_contrasts(HZ, with_gaps[8:], with_gaps[8:] > 6.0, 0.95) == ()  # two people have values
+
+
+def test_a_frequency_that_is_left_out_counts_in_holms_family():
+    values = simulate_people(3)
+    cut = values > 7.0
+    cut[:, 2] = True
+    (contrast,) = compute_tobit_contrasts(HZ, values, cut, 0.95)
+    assert contrast.p_holm == min(1.0, 2.0 * contrast.p)

@@ -1,17 +1,21 @@
 """`hapteq watch` and `hapteq note` from the command line, on a session that this test runs or does not run."""
 
 import json
+import os
+import shutil
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
 from study.cli import watch
 from study.cli.conduct import make_simulated_code
 from study.cli.main import main
+from study.session.facts.events import DeviceFacts
 from study.session.views.participant_codes import is_code
 from study.session.watching.requests import PauseAsked, StopAsked
-from study.store.sessions.event_log import LOG_NAME, EventLog, read_log
+from study.store.sessions.event_log import LOG_NAME, EventLog, read_log, read_opening
 from study.store.sessions.request_inbox import RequestInbox
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
@@ -101,6 +105,40 @@ def test_notes_reach_a_running_session(capsys, data, running):
     code, _out, err = run(capsys, data, "watch", "S1_001", "--note", "lower chair", "--adverse", "numb thumb")
     assert (code, err.count("Noted in S1_001.")) == (0, 2)
     assert [(note.text, note.adverse) for note in running] == [("lower chair", False), ("numb thumb", True)]
+
+
+@pytest.fixture
+def newer(data):
+    """Another session without a program; its log changed later than that of S1_001."""
+    folder = data / "S2_001"
+    shutil.copytree(data / "S1_001", folder)
+    later_s = (data / "S1_001" / LOG_NAME).stat().st_mtime + 60.0
+    os.utime(folder / LOG_NAME, (later_s, later_s))
+    yield folder
+    shutil.rmtree(folder)
+
+
+def test_a_stop_without_a_name_reaches_the_session_that_runs(capsys, data, running, newer):
+    code, _out, err = run(capsys, data, "watch", "--stop")
+    assert (code, "S1_001" in err) == (0, True)
+    assert running == [StopAsked("experimenter")]
+
+
+def test_a_stop_without_a_name_is_refused_where_several_sessions_run(capsys, data, running, newer):
+    log = EventLog.reopen(newer / LOG_NAME)
+    code, _out, err = run(capsys, data, "watch", "--stop")
+    log.close()
+    said = " ".join(err.split())
+    assert (code, "S1_001 and S2_001" in said, "hapteq watch S1_001" in said) == (2, True, True)
+    assert running == [] and RequestInbox(newer).take() == ()
+
+
+def test_after_a_stop_the_command_names_the_real_device(capsys, data, running, monkeypatch):
+    device = DeviceFacts("omega.7", simulated=False, sample_rate_hz=1000.0)
+    session_opened = replace(read_opening(data / "S1_001" / LOG_NAME), device=device)
+    monkeypatch.setattr("study.store.sessions.event_log.read_opening", lambda _path: session_opened)
+    code, _out, err = run(capsys, data, "watch", "S1_001", "--stop")
+    assert (code, "S1_001 --device omega7" in " ".join(err.split())) == (0, True)
 
 
 def test_nothing_can_be_stopped_where_nothing_runs(capsys, data):

@@ -2,10 +2,12 @@
 calls of Linux. Nothing here ran on Windows."""
 
 import contextlib
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +20,7 @@ from study.devices.device import Fault
 from study.devices.drive import real_time_class
 from study.devices.force_dimension import library
 from study.devices.loop_process import serve, start
+from study.devices.loop_process.call_pipe import PIPE_NAMES
 from study.devices.native import CLOCK, MONOTONIC, SLEEP, SharedLock, collect_system_calls, read_clock_s
 from study.devices.safe import SafeDevice
 
@@ -124,6 +127,23 @@ def test_where_the_parent_s_number_stays_after_its_end_the_closed_pipe_ends_the_
     here.hang_up()
     assert here.server.ended.wait(10.0)
     device.close()
+
+
+def test_there_the_closed_pipe_starts_the_time_after_which_a_driver_that_hangs_is_ended(rigs, monkeypatch):
+    parent, pairs = os.getppid(), [multiprocessing.Pipe() for _ in PIPE_NAMES]
+    watchdog = serve.CallerWatchdog(parent, [])
+    seen: list[bool] = []
+    methods = dict.fromkeys(("hold", "release", "play", "keep_alive", "fault", "health", "look", "stop"), int)
+    device = SimpleNamespace(**methods, info="opened", close=lambda: seen.append(watchdog.must_exit()))
+    monkeypatch.setattr(serve.os, "getppid", lambda: parent)
+    monkeypatch.setattr(serve, "gc", SimpleNamespace(collect=int, freeze=int, disable=int))
+    monkeypatch.setattr(serve, "open_device", lambda *given, **named: device)
+    pairs[0][0].send(("open", ("omega3", rigs.SETTINGS, 1, "")))
+    hanging_up = threading.Timer(0.2, lambda: [end.close() for end, _ in pairs])
+    hanging_up.start()
+    serve._open_and_serve(watchdog, tuple(end for _, end in pairs))
+    hanging_up.join()
+    assert seen[0]
 
 
 @pytest.mark.slow

@@ -155,6 +155,13 @@ def test_a_stamp_that_jumps_a_million_seconds_is_refused_before_the_memory_is_fu
     assert "1e+09 samples long" in said
 
 
+def test_a_stamp_beyond_the_range_of_integers_is_refused_as_a_jump(files):
+    t = np.arange(N) / 1000 + 1e18 * (np.arange(N) >= N - 1)
+    assert f"t jumps from 0.398 to 1e+18 s at sample {N - 1}" in refusal(
+        map_text("time = 't'\ntime_unit = 's'"), files(t=t, u=U, y=Y)
+    )
+
+
 def test_a_rate_that_makes_more_samples_than_anyone_can_hold_is_refused(files):
     text = map_text("rate_hz = 1000", 'resample = "held"', 'resample = "linear"', "rate_hz = 1e12\n")
     assert "0.399 s at 1e+12 Hz are 3.99e+11 samples, more than 1e+08" in refusal(text, files())

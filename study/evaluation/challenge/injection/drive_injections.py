@@ -5,6 +5,7 @@ the recorded command u, and u' replaces u. `force_injections` joins these faults
 `injections` injects them.
 Saturation, slew limit and quantization have no unique inverse: their commands are approximations. The size of a fault
 grows exponentially with its strength, 0 to 1: a factor r**strength spans the ratio r. All ranges were chosen by hand.
+A constant command gives a quantization step of 0, which changes nothing; a largest command of 0 counts as 1.
 """
 
 from collections.abc import Callable, Mapping
@@ -63,6 +64,12 @@ def _invert_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
     for _ in range(NEWTON_STEPS):
         command -= (command + values["cubic"] * command**3 - motion.command) / (1 + 3 * values["cubic"] * command**2)
     return command
+
+
+def _quantize_command(motion: AxisMotion, values: Values) -> FloatArray:
+    """Round the command to multiples of the step; unchanged where the step is 0."""
+    step = values["step"]
+    return np.asarray(step * np.round(motion.command / step)) if step else motion.command
 
 
 def _draw_saturation(motion: AxisMotion, strength: float, generator: np.random.Generator) -> dict[str, float]:
@@ -143,7 +150,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "force_quantization",
         lambda motion, strength, generator: {"step": compute_force_level(motion, 0.3 + 0.7 * strength)},
-        lambda motion, values: values["step"] * np.round(motion.command / values["step"]),
+        _quantize_command,
         actuator=True,
     ),
     ForceInjection(
@@ -154,7 +161,9 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ),
     ForceInjection(
         "actuator_cubic",
-        lambda motion, strength, generator: {"cubic": 0.02 * 30.0**strength / float(np.abs(motion.command).max()) ** 2},
+        lambda motion, strength, generator: {
+            "cubic": 0.02 * 30.0**strength / (float(np.abs(motion.command).max()) or 1.0) ** 2
+        },
         _invert_cubic_gain,
         actuator=True,
     ),

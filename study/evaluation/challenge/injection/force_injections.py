@@ -8,7 +8,7 @@ forces.
 Written for the challenge only: no code is shared with the effects that a diagnosis compares, so that an error in those
 effects is not injected as well. Ranges of the drawn parameters are set by hand. Called by `injections`; positions,
 velocities and forces have the units of the recording. The rms values that scale a force are at least 1e-300, so that
-they can be divided by; cogging and presliding friction need a motion that is not at rest.
+they can be divided by; the travel of an axis at rest counts as 1 for cogging and presliding friction.
 """
 
 from collections.abc import Callable
@@ -53,10 +53,15 @@ def _centre_position(motion: AxisMotion) -> FloatArray:
     return np.asarray(motion.q - 0.5 * (motion.q.min() + motion.q.max()))
 
 
+def _measure_travel(motion: AxisMotion) -> float:
+    """Measure the travel, from end to end; 1 where the axis is at rest, so that it can be divided by."""
+    return float(np.ptp(motion.q)) or 1.0
+
+
 def _draw_cogging(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Draw amplitude, pitch (3 to 30 % of the travel) and phase (turns) of cogging. 1.4: amplitude over rms of a
     sine."""
-    pitch = float(np.ptp(motion.q)) * float(random.uniform(0.03, 0.3))
+    pitch = _measure_travel(motion) * float(random.uniform(0.03, 0.3))
     return {"amplitude": 1.4 * compute_force_level(motion, strength), "pitch": pitch, "turn": float(random.random())}
 
 
@@ -98,7 +103,7 @@ def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
 def _draw_elastoplastic_friction(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Draw the friction level, 1.2 times `compute_force_level` (chosen), and the stiffness of the bristle, which slips
     after 1 to 15 % of the travel."""
-    slip_distance = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
+    slip_distance = _measure_travel(motion) * float(random.uniform(0.01, 0.15))
     level = 1.2 * compute_force_level(motion, strength)
     return {"level": level, "stiffness": level / slip_distance}
 

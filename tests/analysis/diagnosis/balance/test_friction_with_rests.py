@@ -20,8 +20,9 @@ def reference_m():
     return 10.0 * whole / whole.max()
 
 
-def simulate_motor(friction_n, dead_band_n, seed):
-    """A motor under position control; noise of a tenth in what is recorded of its command."""
+def simulate_motor(friction_n, dead_band_n, seed, spring_n_per_m2=0.0, noise_share=0.1):
+    """A motor under position control; a spring pulls it with the square of the distance from half way. noise_share: of
+    what is recorded of its command."""
     random, aims = np.random.default_rng(seed), reference_m()
     position, command = np.empty(len(aims)), np.empty(len(aims))
     q = v = 0.0
@@ -32,10 +33,11 @@ def simulate_motor(friction_n, dead_band_n, seed):
         command[k] = GAINS[0] * (aim - position[k]) - GAINS[1] * v
         force = np.sign(command[k]) * max(abs(command[k]) - dead_band_n, 0.0)
         for _ in range(STEPS):
-            free = v + (force - DAMPING_N_S_PER_M * v) / MASS_KG / (STEPS * RATE_HZ)
+            pull = spring_n_per_m2 * (q - 5.0) ** 2
+            free = v + (force - DAMPING_N_S_PER_M * v - pull) / MASS_KG / (STEPS * RATE_HZ)
             v = np.sign(free) * max(abs(free) - friction_n / MASS_KG / (STEPS * RATE_HZ), 0.0)
             q += v / (STEPS * RATE_HZ)
-    command += 0.1 * command.std() * random.standard_normal(len(command))
+    command += noise_share * command.std() * random.standard_normal(len(command))
     return make_recording(command[:, None], position[:, None], RATE_HZ)
 
 
@@ -44,6 +46,14 @@ def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(find_bala
     (balance,) = find_balance(simulate_motor(LEVEL_N, 0.0, seed))
     (named,) = balance.named
     assert named.law.effect in find_family("coulomb_friction")
+
+
+def test_a_named_spring_does_not_hide_friction_that_two_laws_share(find_balance):
+    """The balance holds two frictions, of which neither seems necessary beside the other."""
+    (balance,) = find_balance(simulate_motor(LEVEL_N, 0.0, 1, spring_n_per_m2=0.1, noise_share=0.03))
+    named = {law.law.effect for law in balance.named}
+    assert len(named) == 2
+    assert named & find_family("asymmetric_stiffness") and named & find_family("coulomb_friction")
 
 
 @pytest.mark.slow

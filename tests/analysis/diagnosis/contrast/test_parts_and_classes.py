@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.bases import build_bases
 from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, UndoneRows, compare_base
@@ -47,6 +48,17 @@ def test_a_side_with_too_few_rows_is_not_compared(rig):
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
     with pytest.raises(ValueError, match="too few samples"):
         compare_base(next(build_bases(clean, other))[0][0], clean, (bare,))
+
+
+@pytest.mark.parametrize("short", ["clean", "other"])
+def test_a_side_of_takes_that_are_all_too_short_for_the_model_is_not_compared(short, rig):
+    """An IndexError of a short clean side once ended the diagnosis."""
+    takes = [{"start": start, "stop": start + 1000} for start in range(0, rig.COUNT - 999, 1000)]
+    whole = split_into_parts([rig.record_rig(1)])
+    in_takes = split_into_parts([replace(rig.record_rig(2), meta={"parts": takes})])
+    slow_model = AutoregressiveBase(channel=0, order=24, step=20, responses=1)
+    with pytest.raises(ValueError, match="too few samples"):
+        compare_base(slow_model, *((in_takes, whole) if short == "clean" else (whole, in_takes)))
 
 
 def test_what_undoing_a_fault_loses_stays_as_it_was(compared_base):

@@ -1,6 +1,7 @@
 """Laws of commands, of readings and of pairs of axes are found in simulated recordings. Compiles."""
 
 from dataclasses import replace
+from functools import reduce
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,8 +20,9 @@ from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.matched_filter import build_views
 from analysis.diagnosis.discovery.view_terms import list_reading_terms
 from analysis.diagnosis.document import Candidate, diagnosis_from_json, make_found_law
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.candidates import add_balances_with_given_model
 from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect, make_law_parameters
 from equalizer.effects.effect import PlacedEffect
@@ -40,6 +42,19 @@ def test_a_force_that_grows_with_time_is_no_coupling_of_axes():
     claim = Claim(make_law_effect(drift), "one", (0,))
     fitted = SimpleNamespace(hypothesis=make_claim_hypothesis(claim, [get_law_values(drift)]))
     assert not can_coupling_imitate(None, fitted, ("fx", "fy"))
+
+
+@pytest.mark.parametrize("forces", [1, 2])
+def test_a_coupling_without_tolerance_takes_no_part_of_a_force_or_pair(forces):
+    tuning = make_tuning(replace(device(2), tolerance=Tolerance(0.0003, 0.0, 0.8, 0.01)), ("fx", "fy"))
+    claims = [
+        make_claim_hypothesis(Claim(placed.effect, "one", placed.sites), [placed.values])
+        for placed in whirl_forces(0.6)[:forces]
+    ]
+    fitted = SimpleNamespace(hypothesis=reduce(combine_hypotheses, claims), deviations=np.zeros(len(tuning.names)))
+    measure = SimpleNamespace(records=[SimpleNamespace(recording=recorded_on_axes(2))])
+    assert not can_coupling_imitate(tuning, fitted, ("fx", "fy"))
+    assert make_antisymmetric(measure, tuning, fitted) is fitted
 
 
 def always():

@@ -15,8 +15,13 @@ from analysis.diagnosis.discovery.screen_terms import (
     solve_all_blocks,
     solve_bounded_least_squares,
 )
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.settings import RETUNING_BOUND
+from equalizer.effects.simulation.simulator import simulate_mechanism
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+from tests.diagnosed import NOISE, RATE_HZ, device
 from tests.lawful import arena_of, law, recorded
 
 
@@ -79,3 +84,30 @@ def test_pitches_start_within_the_travel_of_a_motion_far_from_zero():
     for term in in_position:
         assert term.bounds[0][0] <= term.numbers[0] <= term.bounds[0][1] <= np.ptp(x)
     assert min(abs(term.numbers[0] / pitch - 1) for term in in_position) < 0.05
+
+
+def test_the_fourth_axis_is_tuned_with_the_others_and_not_searched(axes=4):
+    """Its signals have no letter in the grammar; a diagnosis of such a device once ended with an IndexError."""
+    random = np.random.default_rng(3)
+    command = random.standard_normal((4000, axes))
+    played = simulate_mechanism(device(axes), command, RATE_HZ, ())
+
+    def signal(samples: FloatArray, quantity: str, unit: str, letter: str, rms: float = 0.0) -> Signal:
+        names = tuple(f"{letter}{number}" for number in range(axes))
+        return Signal(samples + rms * random.standard_normal(samples.shape), RATE_HZ, quantity, unit, names)
+
+    recording = Recording(
+        "four",
+        signal(command, "force", "N", "f"),
+        signal(played.response, "acceleration", "m/s^2", "a", NOISE[0]),
+        signal(played.position, "position", "m", "q", NOISE[1]),
+    )
+    context, known = arena_of(recording, device(axes))
+    fitted = evaluate_fit(context.measure, context.tuning, known.retuned.fitted.deviations, NO_EFFECTS)
+    views = build_views(context.measure, context.tuning, fitted)
+    assert [(view.output, view.acts_on, view.axis) for view in views] == [
+        *((axis, "force", axis) for axis in range(3)),
+        *((3 + channel, "response", channel) for channel in range(3)),
+    ]
+    coupled_mass = context.tuning.names.index("mass f0 f3")
+    assert np.abs(views[0].parameter_columns[coupled_mass]).max() > 0

@@ -24,6 +24,7 @@ from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tolerance
 from equalizer.signals.recording import Hold
+from equalizer.signals.unit_system import UnitSystem
 
 RATE_HZ, LEVEL_N = 1000.0, 3.0
 KNOWN = Tolerance(0.003, 0.1, 2.0, 0.01)
@@ -242,6 +243,13 @@ def test_an_informative_expensive_recording_ranks_before_a_cheap_uninformative_o
     gains = predict_gains(bench, named, rival, known, (small, dear))
     assert choose_experiments([gains]).experiments == (dear,)
     assert gains[0].gain < DISCRIMINATING_GAIN < gains[1].gain
+
+
+@pytest.mark.parametrize("units", [UnitSystem("A", "m"), UnitSystem("N", "mm"), UnitSystem("A", "rad")])
+def test_no_known_mass_is_proposed_where_that_of_the_model_is_not_in_kg(units):
+    model = make_bench().tuning.model
+    weighed, unweighed = (list_experiments(m, RATE_HZ, 0, LEVEL_N) for m in (model, replace(model, units=units)))
+    assert [each.words for each in unweighed] == [each.words for each in weighed if not each.added]
 
 
 def test_an_axis_that_no_stiffness_holds_is_not_pushed_away():

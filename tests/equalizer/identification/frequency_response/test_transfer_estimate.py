@@ -218,6 +218,14 @@ def test_recordings_that_do_not_belong_together_are_refused(plants, synthetic):
         estimate_transfer((first, replace(faster, command=volts)))
 
 
+def test_sample_rates_that_differ_in_the_seventh_digit_are_refused_by_all_their_digits(plants, synthetic):
+    first = synthetic.recording_of(np.ones((10, 3)), np.ones((10, 3)))
+    signals = (replace(signal, sample_rate_hz=1000.0001) for signal in (first.command, first.response))
+    second = replace(first, **dict(zip(("command", "response"), signals, strict=True)))
+    with pytest.raises(TransferEstimateError, match=r"sample rate 1000\.0001 Hz, but the first has 1000\.0 Hz"):
+        estimate_transfer((first, second))
+
+
 def test_orthogonal_multisines_leave_no_line_without_all_directions(plants, synthetic):
     lines = list_lines_between(4.5, 37.0, 5000, synthetic.RATE, odd_only=True)
     waves = make_multisines(lines, 5000, 1.5, 3, 3, seed=4)

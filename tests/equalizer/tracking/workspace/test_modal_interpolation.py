@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from equalizer.plant.model_quality import summarise_quality
 from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.workspace.modal_interpolation import build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
@@ -41,6 +42,15 @@ def test_the_order_in_which_models_are_given_does_not_matter(three):
     np.testing.assert_allclose(
         compute_model_response(one, LINES), compute_model_response(other, LINES), rtol=1e-6, atol=1e-6
     )
+
+
+def test_the_quality_and_the_delay_of_the_first_model_are_not_those_of_the_interpolated_one(three):
+    first, *others = three.models
+    delayed = replace(first, delay_samples=2.0, quality=summarise_quality(0.01, None, None))
+    workspace = WorkspaceModels((delayed, *(replace(model, delay_samples=1.0) for model in others)))
+    (model,) = build_modal_interpolation(workspace).interpolate_at((0.02, 0.01, 0.0)).models
+    assert model.quality is None
+    assert model.delay_samples == 1.0
 
 
 def test_outside_the_nearest_place_is_used_and_reported(three):

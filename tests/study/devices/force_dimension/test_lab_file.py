@@ -68,6 +68,13 @@ def test_nothing_changes_where_the_file_cannot_be_used_or_the_table_is_none(file
     assert file.read_text() == OLD
 
 
+def test_all_that_is_wrong_in_the_file_is_told_at_once(file):
+    file.parent.mkdir()
+    file.write_text('effector_mass_kg = -1.0\n[accelerometer]\nport = "COM3"\nbais = [0.0, 0.0, 0.0]\n')
+    with pytest.raises(DeviceError, match="effector_mass_kg: .*; accelerometer.bias: .*; accelerometer.bais: "):
+        read_lab_settings()
+
+
 def test_a_range_at_the_ends_of_16_bits_is_written_as_whole_numbers():
     wide = Calibration(IDEAL.bias, 10 * IDEAL.sensitivity, IDEAL.noise_mps2, 0.0)
     assert "raw_range = [0, 65535]" in format_calibration_toml(wide, "COM3", 9600)

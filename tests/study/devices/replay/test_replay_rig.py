@@ -135,6 +135,20 @@ def test_a_recorded_handle_that_rests_under_a_force_is_no_frozen_encoder(rigs, o
         assert np.ptp(played.recording.position.samples, axis=0).max() == 0.0
 
 
+def test_a_position_that_is_missing_in_the_recording_does_not_end_the_stimulus(rigs, originals, commands, tmp_path):
+    """As of missed ticks: it is interpolated from its neighbours."""
+    gappy = originals[1].position.samples.copy()
+    gappy[[0, 400, 401, 402]] = np.nan
+    position = replace(originals[1].position, samples=gappy)
+    write_recording(tmp_path / "gappy.h5", replace(originals[1], position=position))
+    with contextlib.closing(open_device(f"replay:{tmp_path / 'gappy.h5'}", rigs.SETTINGS, VirtualClock(), 1)) as device:
+        played = device.play(rigs.force(commands[1]))
+    assert played.health.fault is Fault.NONE
+    replayed = played.recording.position.samples
+    np.testing.assert_allclose(replayed[399:404], np.linspace(gappy[399], gappy[403], 5), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(replayed[403:], gappy[403:])
+
+
 def test_only_a_simulated_device_may_stand_still_under_a_force(rigs):
     info = DeviceInfo("replayed", True, 1000.0, 12.0, 0.2, moved_by_force=False)
     packed = [
@@ -155,6 +169,8 @@ def test_doctor_checks_a_replayed_device(file, capsys):
 def without(name: str, recording: Recording) -> Recording:
     if name == "position":
         return replace(recording, position=None)
+    if name == "position in numbers":
+        return replace(recording, position=replace(recording.position, samples=0 * recording.position.samples + np.nan))
     if name == "response":
         return replace(
             recording, response=Signal(recording.response.samples, 1000.0, "velocity", "m/s", ("vx", "vy", "vz"))
@@ -164,7 +180,13 @@ def without(name: str, recording: Recording) -> Recording:
 
 
 @pytest.mark.parametrize(
-    ("name", "says"), [("position", "no position"), ("response", "no acceleration"), ("command", "no force")]
+    ("name", "says"),
+    [
+        ("position", "no position"),
+        ("position in numbers", "no position"),
+        ("response", "no acceleration"),
+        ("command", "no force"),
+    ],
 )
 def test_a_recording_that_cannot_be_replayed_is_refused_with_the_reason(rigs, originals, tmp_path, name, says):
     write_recording(tmp_path / "lab.h5", without(name, originals[0]))

@@ -18,10 +18,10 @@ LABELS = (
 )
 
 
-def diagnosis(effect: str = "", rivals: tuple[str, ...] = (), value: float = 0.05) -> Diagnosis:
+def diagnosis(effect: str = "", rivals: tuple[str, ...] = (), value: float = 0.05, unit: str = "") -> Diagnosis:
     known = EFFECTS_BY_NAME.get(effect)
     errors = Errors(0.5, 0.4, 0.1 if effect else 0.4, 0.05)
-    estimate = Estimate(value, "kg", (0.9 * value, 1.1 * value))
+    estimate = Estimate(value, unit or (known.main.unit if known else "1"), (0.9 * value, 1.1 * value))
     beside = tuple(Rival(rival, 0.3, True, "as good") for rival in rivals)
     named = (
         ()
@@ -92,6 +92,15 @@ def test_a_value_of_a_change_without_a_unit_is_compared_with_no_interval(tmp_pat
     seal_labels(table)
     said = {"rec_01": diagnosis("hand_impedance")}
     assert score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0].inside is None
+
+
+def test_a_value_is_not_compared_with_an_interval_in_another_unit(tmp_path: Path) -> None:
+    """On a rotating device an added mass is a moment of inertia."""
+    table = labels_in(tmp_path)
+    seal_labels(table)
+    said = {"rec_01": diagnosis("added_mass", value=0.0004, unit="kg m^2")}
+    row = score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0]
+    assert (row.right, row.inside) == (True, None)
 
 
 def test_a_rival_that_cannot_be_told_apart_counts(tmp_path: Path) -> None:

@@ -151,6 +151,18 @@ def test_another_recording_of_that_name_is_refused(written, plan, wanted, why):
         record_or_load(plan, wanted, lambda share: None)
 
 
+def test_a_recording_of_the_device_of_another_version_is_refused(plan, tmp_path):
+    other, request = replace(plan, output_folder=tmp_path), RecordingRequest("centre", plan.protocols.hand)
+    other.recordings.mkdir()
+    made = record_or_load(other, request, lambda share: None)
+    provenance = made.recording.meta["provenance"]
+    older = {**provenance, "versions": {**provenance["versions"], "hapteq": "0.0.1"}}
+    made.path.unlink()
+    write_recording(made.path, replace(made.recording, meta={**made.recording.meta, "provenance": older}))
+    with pytest.raises(StudyError, match="holds another reproduction.*made with another version of hapteq"):
+        record_or_load(other, request, lambda share: None)
+
+
 def test_a_recording_that_cannot_be_read_is_left_alone(plan, tmp_path):
     other = replace(plan, output_folder=tmp_path)
     other.recordings.mkdir()

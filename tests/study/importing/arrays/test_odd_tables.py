@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from study.importing.arrays.csv_arrays import convert_times
 from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
@@ -233,3 +234,19 @@ def test_a_name_in_quotes_may_hold_a_line_break(tmp_path):
 def test_names_of_digits_with_underscores_are_a_header(tmp_path):
     rows = "".join(f"{t},{u}\n" for t, u in VALUES)
     assert list(read(tmp_path, f"1_0,2_0\n{rows}").by_name) == ["1_0", "2_0"]
+
+
+def test_times_in_seconds_take_no_name_of_another_column(tmp_path):
+    names = ("when stamp [s]", "when [s]", "when [UTC]", "when [local]")
+    rows = "".join(f"{7 * row},word,12:00:0{row},13:00:0{2 * row},1.5\n" for row in range(3))
+    found = read(tmp_path, ",".join((*names, "u")) + "\n" + rows)
+    np.testing.assert_array_equal(found.by_name["when stamp [s]"], [0.0, 7.0, 14.0])
+    np.testing.assert_array_equal(found.by_name["when stamp 2 [s]"], [0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(found.by_name["when stamp 3 [s]"], [0.0, 2.0, 4.0])
+    assert found.clocks == ("when stamp 2 [s]", "when stamp 3 [s]")
+
+
+def test_stored_times_in_seconds_take_no_name_of_another_array():
+    stored = {f"when{mark}": np.array([0.0, 7.0]) for mark in (" [s]", " stamp [s]")}
+    found = convert_times({"when": np.array(["12:00:00", "12:00:01"]), **stored})
+    assert list(found.by_name) == ["when stamp 2 [s]", "when [s]", "when stamp [s]"]

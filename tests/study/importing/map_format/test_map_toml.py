@@ -101,6 +101,10 @@ def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
         ),
         ('[[segment]]\nkind = "noise"\nsplit = { fitt = 1.0 }', "segment[1].split names fitt; roles are fit, test"),
         ('[[segment]]\nkind = "noise"\nsplit = { fit = 0.5 }', "segment[1].split must have shares that sum to 1"),
+        (
+            '[[segment]]\nkind = "noise"\nevery = 9\nsplit = { fit = 1.5, test = -0.5 }',
+            "segment[1].split must have shares that sum to 1, none below 0",
+        ),
         ('[[segment]]\nkind = "noise"\nstart = 1\nstart_s = 1.0', "segment[1] is stated in samples and in seconds"),
         ('[[segment]]\nkind = "loud"', 'segment[1].kind is "loud"; it must be "multisine", "sweep"'),
     ],

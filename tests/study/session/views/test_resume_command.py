@@ -1,7 +1,8 @@
 """The command that continues a session names the device, unless the command takes it anyway."""
 
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.opening import SIMULATED
-from study.session.views.resume_command import SIMULATED_DEVICE, format_resume_command
+from study.session.views.resume_command import SIMULATED_DEVICE, find_device_option, format_resume_command
 
 
 def test_a_real_device_is_named():
@@ -11,3 +12,8 @@ def test_a_real_device_is_named():
 def test_the_default_device_is_left_out():
     assert format_resume_command("data/P01_001", SIMULATED) == "hapteq resume data/P01_001"
     assert SIMULATED_DEVICE == SIMULATED
+
+
+def test_each_real_device_of_a_log_is_opened_by_its_own_name():
+    assert [find_device_option(model.name, simulated=False) for model in MODELS.values()] == list(MODELS)
+    assert find_device_option("simulated omega.3", simulated=True) == SIMULATED

@@ -1,5 +1,7 @@
 """What the view of a running session tells: trials, runs, forms, time, and what goes on."""
 
+from dataclasses import replace
+
 import pytest
 
 from protocols.trial import Phase
@@ -9,7 +11,7 @@ from study.session.facts.events import (
     SessionInterrupted,
     SessionResumed,
 )
-from study.session.watching.followed_session import UNMEASURED_FLAG
+from study.session.watching.followed_session import UNMEASURED_FLAG, PlayedProbe
 from tests.watched_story import DEVICE, at
 
 
@@ -138,3 +140,10 @@ def test_a_program_that_is_gone_is_not_running(story):
     view = story.view(writer=False)
     assert view.standing == "not running"
     assert "every answer is on disk" in view.reason
+
+
+def test_a_probe_that_cannot_be_used_is_not_counted_among_those_without_a_drift(story):
+    kept, lost = PlayedProbe(0, "hand", 1.0, 5.0, 0, "recordings/probe-000.h5"), PlayedProbe(1, "hand", 1.0, 9.0, 0)
+    late = replace(kept, number=2, trouble="3 ticks late")
+    story.watched = replace(story.watched, probes=(kept, lost, late))
+    assert story.view().probes == 1

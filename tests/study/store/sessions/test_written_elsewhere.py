@@ -1,5 +1,8 @@
 """Folders outside a data folder, noted for a withdrawal."""
 
+import os
+
+from study.regular_file import MAX_DOCUMENT_BYTES
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME, note_written_folder, read_written_folders
 
 
@@ -11,3 +14,14 @@ def test_each_folder_is_noted_once_also_with_a_line_break_in_its_name(tmp_path):
         note_written_folder(data, out)
     assert read_written_folders(data) == outs
     assert (data / WRITTEN_ELSEWHERE_NAME).read_text().splitlines()[0] == str(outs[0])
+
+
+def test_a_list_that_cannot_be_read_is_not_replaced(tmp_path):
+    (tmp_path / "data").mkdir()
+    note_written_folder(tmp_path / "data", tmp_path / "old")
+    list_path = tmp_path / "data" / WRITTEN_ELSEWHERE_NAME
+    os.truncate(list_path, MAX_DOCUMENT_BYTES + 1)
+    note_written_folder(tmp_path / "data", tmp_path / "new")
+    assert read_written_folders(tmp_path / "data") == ()
+    with list_path.open("rb") as file:
+        assert file.readline() == os.fsencode(tmp_path / "old") + b"\n"

@@ -7,7 +7,7 @@ import pytest
 
 from study.store.sessions.event_log import LOG_NAME
 from study.tui.watch.watch_lines import format_changes, format_view
-from study.tui.watch.watch_words import format_duration
+from study.tui.watch.watch_words import describe_drifts, format_duration
 from study.workflows.views.watch_session import follow
 
 TEXT = (
@@ -108,4 +108,22 @@ def test_too_little_to_measure_is_no_note_on_each_trial(tmp_path):
     early = tuple(trial for trial in view.last if trial.status == "unmeasured")
     assert early
     assert {(trial.remark, trial.delivered_mps2) for trial in early} == {("", None)}
-    assert sum("answered too early to measure" in line for line in format_view(replace(view, last=early))) == 1
+    assert (
+        sum("answered too early, or see remark; counts" in line for line in format_view(replace(view, last=early))) == 1
+    )
+
+
+def test_a_trial_whose_recording_was_lost_is_not_explained_by_an_early_answer_alone(views):
+    lost = "its recording was lost when the program ended"
+    rows = tuple(replace(trial, status="unmeasured", delivered_mps2=None, remark=lost) for trial in views[-1].last)
+    lines = format_view(replace(views[-1], last=rows))
+    assert sum(line.endswith(f"not measured, {lost}") for line in lines) > 0
+    assert [line.strip() for line in lines if "not measured:" in line] == [
+        "not measured: answered too early, or see remark; counts"
+    ]
+
+
+def test_a_single_probe_is_not_told_in_the_plural(views):
+    assert [describe_drifts(replace(views[-1], probes=count)) for count in (0, 1, 2)] == [
+        "", "none in 1 probe", "none in 2 probes",
+    ]  # fmt: skip

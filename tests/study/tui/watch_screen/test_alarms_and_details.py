@@ -142,7 +142,7 @@ def test_what_the_screen_says(seated, changes, words):
 
 def test_what_was_not_measured_is_a_mark_with_one_explanation(seated):
     async def story(seat):
-        assert seat.text.count("n.m. answered too early to measure; counts") == 1
+        assert seat.text.count("n.m. answered too early, or see remark; counts") == 1
         assert seat.text.count("n.m.") > 3
         assert "unmeasured" not in seat.text
 

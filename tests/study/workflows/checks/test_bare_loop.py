@@ -49,6 +49,12 @@ def test_more_than_that_is_a_warning_with_what_to_do(late, bare_late):
     assert found.advice
 
 
+@pytest.mark.parametrize(("granted", "said"), [(True, "with"), (False, "without")])
+def test_the_priority_that_the_bare_loop_got_is_told(granted, said):
+    found = compare_with_bare_loop(5, 1000, BareLoopRun(BareLoopTiming(1000, 4, 0.0042, granted)))
+    assert f" {said} real-time priority" in found.value
+
+
 @pytest.mark.parametrize("bare_late", [0, 1, 17, 400])
 def test_the_verdict_changes_at_the_number_that_it_names(bare_late):
     most = int(re.search(r"up to (\d+) are fine", beside(0, bare_late).value)[1])

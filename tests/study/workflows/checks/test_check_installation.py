@@ -1,5 +1,6 @@
 """What an installation can lack, one thing at a time."""
 
+import errno
 import importlib
 import shutil
 from importlib.metadata import packages_distributions
@@ -16,6 +17,7 @@ from study.workflows.checks.check_installation import (
     check_import_name,
     check_installation,
     check_packages,
+    check_privacy,
     check_requirement,
     check_terminal,
     detect_terminal,
@@ -163,6 +165,22 @@ def test_a_folder_that_cannot_be_written_is_found(tmp_path):
     (tmp_path / "data").write_text("a file")
     finding = check_data_folder(tmp_path / "data")
     assert finding.value == f"{tmp_path / 'data'}: Not a directory"
+    assert finding.advice == "Choose another folder with --data, or change the rights of this one."
+
+
+@pytest.mark.parametrize("check", [check_data_folder, check_privacy])
+def test_a_folder_that_this_account_may_not_look_into_is_found(tmp_path, monkeypatch, check):
+    """A superuser may look into all: the system's answer to others is simulated."""
+    examined_path, stat = tmp_path / "closed" / "data", Path.stat
+
+    def refuse(path: Path, **options: bool):
+        if path == examined_path:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return stat(path, **options)
+
+    monkeypatch.setattr(Path, "stat", refuse)
+    finding = check(examined_path)
+    assert (finding.value, finding.fine) == (f"{examined_path}: Permission denied", False)
     assert finding.advice == "Choose another folder with --data, or change the rights of this one."
 
 

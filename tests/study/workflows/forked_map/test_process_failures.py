@@ -2,6 +2,7 @@
 
 import errno
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -10,31 +11,41 @@ from pathlib import Path
 
 import pytest
 
-from study.workflows.forked_map import map_forked
+from study.workflows.forked_map import _pack_results, map_forked
 from tests.study.workflows.forked_map.child_processes import children, slow
 
 
-def failing_fork(after: int):
-    """fork, that the system refuses after so many times."""
-    left, fork = [after], os.fork
+def refused(call, after: int, error: OSError):
+    """A call that the system refuses after so many times."""
+    left = [after]
 
-    def forked() -> int:
+    def refusing() -> object:
         if not left[0]:
-            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+            raise error
         left[0] -= 1
-        return fork()
+        return call()
 
-    return forked
+    return refusing
 
 
 @pytest.mark.parametrize("after", [0, 1])
 def test_a_system_without_further_processes_leaves_the_work_to_those_there_are(monkeypatch, after):
-    monkeypatch.setattr(os, "fork", failing_fork(after))
+    error = BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+    monkeypatch.setattr(os, "fork", refused(os.fork, after, error))
     before = len(list(Path("/proc/self/fd").iterdir()))
     found = map_forked(slow, range(8), workers=4)
     assert [number for number, _ in found] == list(range(8))
     assert len({process for _, process in found}) == 1 + after
     assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert children() == []
+
+
+@pytest.mark.parametrize(("pipes", "processes"), [(0, 1), (1, 1), (2, 2)])
+def test_too_many_open_files_leave_the_work_to_the_processes_there_are(monkeypatch, pipes, processes):
+    monkeypatch.setattr(os, "pipe", refused(os.pipe, pipes, OSError(errno.EMFILE, "Too many open files")))
+    found = map_forked(slow, range(8), workers=4)
+    assert [number for number, _ in found] == list(range(8))
+    assert len({process for _, process in found}) == processes
     assert children() == []
 
 
@@ -84,6 +95,34 @@ def test_an_error_is_raised_where_the_results_are_wanted_and_leaves_no_process(w
         map_forked(inverse, range(4))
     assert children() == []
     assert map_forked(abs, [-1, -2]) == [1, 2]
+
+
+class TwoTextsError(Exception):
+    """An error that is pickled, but cannot be made again from its message alone."""
+
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(f"{first} {second}")
+
+
+def test_an_error_that_cannot_be_sent_is_raised_as_it_is(tmp_path):
+    here = os.getpid()
+
+    def failing_elsewhere(number: int) -> None:
+        time.sleep(0.05)
+        if os.getpid() != here:
+            (tmp_path / str(number)).touch()
+        if (tmp_path / str(number)).exists():
+            raise TwoTextsError("no", "number")
+
+    with pytest.raises(TwoTextsError, match="no number"):
+        map_forked(failing_elsewhere, range(8))
+
+
+def test_a_result_nested_too_deeply_is_left_out_and_the_others_are_sent():
+    nested: list[object] = []
+    for _ in range(10 * sys.getrecursionlimit()):
+        nested = [nested]
+    assert pickle.loads(_pack_results({0: (nested, None), 1: (7, None)}, {})) == (1, (7, None))
 
 
 @pytest.mark.real_time

@@ -9,6 +9,7 @@ from protocols.document.dumping import dump_protocol
 from study.errors import WrongUseError
 from study.session.views.participant_views import Unanswered
 from study.store.sessions.archive import find_session
+from study.store.sessions.event_log import EventLog
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
 from study.workflows.views.plan_study import format_plan_lines, list_planned_studies, summarise_plans
@@ -69,6 +70,17 @@ def test_a_second_session_of_a_participant_counts_once_by_the_furthest(sitter, b
     begin("P01", to_the_end=True)
     begin("P01")
     assert [(who.code, who.progress) for who in only(sitter.data).plan.participants] == [("P01", "done")]
+
+
+def test_a_session_that_is_running_is_not_to_be_resumed(sitter, begin):
+    begin("P01")
+    begin("P02")
+    log = EventLog.reopen(find_session("P02_001", sitter.data).log)
+    study = only(sitter.data)
+    log.close()
+    said = format_plan_lines(study)
+    assert said[:3] == ["small: 0 done of 4 planned, 2 begun, 0 left out", "to resume: P01", "running: P02"]
+    assert [who.reason for who in study.plan.participants] == ["", "running"]
 
 
 def test_people_and_simulated_participants_are_planned_apart(sitter, begin):

@@ -90,6 +90,19 @@ def test_a_fault_of_mechanism_or_actuator_changes_the_command_alone_and_more_the
     assert np.isfinite(strong.recording.command.samples).all()
 
 
+@pytest.mark.parametrize("effect", [force_injection.effect for force_injection in FORCE_INJECTIONS])
+@pytest.mark.parametrize("force_n", [None, 0.0, 2.5])
+def test_faults_of_an_axis_at_rest_are_finite_and_leave_a_command_of_zero(effect, force_n):
+    plain = swinging()
+    resting = replace(plain, response=replace(plain.response, samples=np.full((6000, 1), 0.5)))
+    if force_n is not None:
+        resting = replace(resting, command=replace(plain.command, samples=np.full((6000, 1), force_n)))
+    found = inject(resting, effect, 0.9, np.random.default_rng(2))
+    assert np.isfinite(found.recording.command.samples).all() and np.isfinite([*found.values.values()]).all()
+    if force_n == 0.0:
+        assert not found.change.any()
+
+
 def test_an_added_mass_asks_for_its_force_and_a_weaker_drive_for_a_larger_command():
     plain = swinging()
     heavy = inject(plain, "added_mass", 0.8, np.random.default_rng(2))

@@ -1,0 +1,25 @@
+"""What the tables of thresholds say of runs that the cap or the trial limit affected."""
+
+from types import SimpleNamespace
+
+from analysis.psychophysics.anova import compute_one_way_anova
+from analysis.psychophysics.comparisons import compare_group_means
+from analysis.psychophysics.threshold_table import ThresholdTable
+from analysis.reports.study_tables import make_group_table
+
+
+def test_a_mean_is_called_cut_only_where_the_cap_cut_a_threshold_of_it():
+    table = ThresholdTable(
+        "threshold_n", ("s1", "s2", "s3"), (5.0, 25.0, 35.0, 45.0),
+        ((0.4, 0.5, 2.0, 2.0), (0.5, 0.7, 2.4, 2.4), (0.6, None, 2.2, None)),
+        ((False,) * 4, (False, False, True, True), (False,) * 4),
+        ((False,) * 4, (False,) * 4, (False, True, False, True)), (),
+    )  # fmt: skip
+    anova = compute_one_way_anova(table.group_by_frequency())
+    analysis = SimpleNamespace(table=table, anova=anova, comparisons=compare_group_means(anova))
+    assert [(n, mean, cut, stopped) for _, n, mean, _, _, cut, stopped in make_group_table(analysis).rows] == [
+        ("3", "0.50", "0", "0"),
+        ("2", "0.60 (without stopped)", "0", "1"),
+        ("3", "2.20 cut", "1", "0"),
+        ("2", "2.20 cut (without stopped)", "1", "1"),
+    ]

@@ -1,0 +1,32 @@
+"""The search for modes finds those of a plant whose actuator has a known low pass, and no other."""
+
+import numpy as np
+import pytest
+
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup
+from equalizer.identification.mechanical.mechanical_response import compute_sampled_response
+from equalizer.identification.mechanical.mechanical_structure import Structure
+from equalizer.identification.mechanical.modal_search import ModalSearch
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel
+from equalizer.signals.recording import Hold
+
+RATE_HZ = 500.0
+
+
+@pytest.mark.parametrize("quantity", ["position", "velocity", "acceleration"])
+def test_a_known_low_pass_of_the_actuator_needs_no_mode_of_its_own(quantity):
+    actuator = ActuatorLimits(bandwidth_hz=60.0)
+    mass, damping, stiffness = np.eye(1) * 0.3, np.eye(1) * 2.0, np.eye(1) * 0.3 * (2 * np.pi * 20.0) ** 2
+    plant = MechanicalModel("plant", quantity, mass, damping, stiffness, np.eye(1), np.eye(1), actuator=actuator)
+    lines_hz = np.arange(1.0, 200.0)
+    response = compute_sampled_response(plant, lines_hz, RATE_HZ, Hold.ZERO_ORDER)[:, :, 0]
+    weight = 1 / np.abs(response)
+    group = LineGroup(
+        lines_hz, weight[:, :, None, None] + 0j, (weight * response)[:, :, None], weight, np.arange(199) % 4 == 2,
+        np.ones(199), False, RATE_HZ, Hold.ZERO_ORDER,
+    )  # fmt: skip
+    structure = Structure(1, 1, quantity, 0.3, 125.0, (1.0,), step_s=1 / RATE_HZ, actuator=actuator)
+    found = ModalSearch([group], structure, (1.0, 199.0), fit_delay=False).add_mode(None)
+    assert np.exp(found.logs[0]) / (2 * np.pi) == pytest.approx(20.0, rel=1e-3)
+    assert found.shapes[0, 0, 0] == pytest.approx(1 / 0.3, rel=1e-3)
+    assert found.held_out_squares / found.held_out_count < 1e-6

@@ -1,0 +1,24 @@
+"""A resonance that rings longer than the ordinary bound keeps its height where local averages are fitted."""
+
+import numpy as np
+
+from equalizer.identification.state_space.identify_recordings import identify_recordings
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.plant.model_response import compute_model_response
+
+BOUND_BY_HAND = IdentificationSettings(
+    order=12, longest_decay_s=10.0, draws=0, longer_horizons=(0,), record_horizons=()
+)
+LINES = np.linspace(5, 35, 3001)
+
+
+def test_local_averages_under_a_long_bound_do_not_blunt_what_rings(plants, synthetic):
+    rigid = [(3.5, 1.4, axis / np.sqrt(plants.MASS_KG)) for axis in np.eye(3)]
+    device = plants._sampled([*rigid, (12.0, 0.005, np.array([0.5, 0.4, 0.3]))])
+    commands, segments = synthetic.one_after_another(synthetic.axes(plants.sweep(4.5, 37.0, 8.0)), 3)
+    recording = synthetic.recording_of(commands, device.measured(commands, 1), segments)
+    found = identify_recordings(recording, BOUND_BY_HAND, smooth=True)
+    assert found.fitted is not found.estimate
+    truth = device.response(LINES)
+    error = compute_model_response(found.identified.model, LINES) - truth
+    assert np.linalg.norm(error) < 0.01 * np.linalg.norm(truth)
