@@ -215,7 +215,7 @@ def _compute_balances(
     """Compute the force balances of the recordings, one per command; none where the guard caught a crash."""
     # Imported on demand: a diagnosis with a given model computes its balances in `decide_with_model`.
     from analysis.diagnosis.balance.balances import find_balances
-    from analysis.diagnosis.balance.free_laws import list_excluded_laws
+    from analysis.diagnosis.balance.laws.free_laws import list_excluded_laws
 
     excluded = list_excluded_laws(settings.without, settings.discovery)
     fit_balances = partial(find_balances, recordings, excluded, settings.time_left, map_)

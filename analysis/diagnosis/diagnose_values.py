@@ -7,7 +7,7 @@ Checks and prepares the recordings, fits a linear first model where none is give
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.diagnosis.balance.free_laws import list_excluded_laws
+from analysis.diagnosis.balance.laws.free_laws import list_excluded_laws
 from analysis.diagnosis.data.input_checks import require_comparable, require_model_of
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings

@@ -16,7 +16,10 @@ from typing import cast
 
 import numpy as np
 
-from analysis.diagnosis.balance.command_laws import (
+from analysis.diagnosis.balance.inverse_balance import InverseBalance
+from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
+from analysis.diagnosis.balance.laws.command_laws import (
     IDEAL_ACTUATOR,
     CommandLaw,
     PiecewiseCommandLaw,
@@ -27,10 +30,7 @@ from analysis.diagnosis.balance.command_laws import (
     make_slew_laws,
     vary_parameters,
 )
-from analysis.diagnosis.balance.inverse_balance import InverseBalance
-from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.laws.law import Law
 from analysis.diagnosis.balance.linear_part import search_with_linear_part
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression

@@ -13,11 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS, make_free_laws
+from analysis.diagnosis.balance.change_laws import append_laws
 from analysis.diagnosis.balance.judge_laws import Balance, judge_structure
-from analysis.diagnosis.balance.law import measure_scales
+from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS, make_free_laws
+from analysis.diagnosis.balance.laws.law import measure_scales
 from analysis.diagnosis.balance.linear_part import is_freely_turning
-from analysis.diagnosis.balance.regression import Regression, append_laws, fit_all_laws
+from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import (
     Structure,
     add_further_laws,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.laws.law import Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, build_regression, fit_all_laws
 from equalizer.signals.signal import FloatArray

@@ -23,8 +23,8 @@ from analysis.diagnosis.balance.blocks import (
     solve_normal_equations,
     sum_products,
 )
-from analysis.diagnosis.balance.command_laws import CommandLaw
 from analysis.diagnosis.balance.judged_law import select_test_blocks
+from analysis.diagnosis.balance.laws.command_laws import CommandLaw
 from analysis.diagnosis.balance.structures import StructureSearch
 from analysis.diagnosis.settings import STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask

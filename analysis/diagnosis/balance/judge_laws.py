@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS
 from analysis.diagnosis.balance.judged_law import (
     FRICTIONS,
     SIMULATED_AS,
@@ -22,7 +21,8 @@ from analysis.diagnosis.balance.judged_law import (
     list_special_cases,
     select_test_blocks,
 )
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.laws.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
 from analysis.diagnosis.balance.structures import (
     Structure,

@@ -9,11 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.fft import rfftfreq
 
 from analysis.diagnosis.balance.blocks import build_blocks
-from analysis.diagnosis.balance.law import BaseTerms
+from analysis.diagnosis.balance.change_laws import keep_laws
+from analysis.diagnosis.balance.laws.law import BaseTerms
 from analysis.diagnosis.balance.motion import Motion, filter_spectrum
-from analysis.diagnosis.balance.regression import Regression, build_regression, keep_laws
+from analysis.diagnosis.balance.regression import Regression, build_regression
 from analysis.diagnosis.balance.structures import (
     Structure,
     StructureSearch,
@@ -230,5 +232,9 @@ def _delay_forces(motion: Motion, delay_s: float) -> Motion:
     """Delay the forces of a motion: multiply their spectra by exp(-i omega delay_s)."""
     if not delay_s:
         return motion
-    delayed_force = filter_spectrum(motion.force, motion.rate_hz, lambda f: np.exp(-2j * np.pi * f * delay_s))
-    return replace(motion, force=delayed_force)
+
+    def compute_delay_response(length: int) -> FloatArray:
+        """Compute the frequency response (lines,) of the delay."""
+        return np.asarray(np.exp(-2j * np.pi * rfftfreq(length, 1 / motion.rate_hz) * delay_s))
+
+    return replace(motion, force=filter_spectrum(motion.force, compute_delay_response))

@@ -10,6 +10,7 @@ only, below which noise would dominate the position (`band.py` computes both end
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
@@ -21,7 +22,7 @@ from analysis.diagnosis.settings import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED,
 from analysis.diagnosis.types import Mask
 from equalizer.effects.discovered_law import collect_channels, name_conditions
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.band_limited import compute_low_pass_gain, extend_as_odd
+from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_pass_gain, extend_as_odd
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -206,7 +207,15 @@ def _compute_motion(
 def filter_band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
     """Filter columns (n, k) to the band from `lowest_hz` to `band_hz` without a phase shift; a low pass where
     `lowest_hz` is 0. The straight line between their ends is kept."""
-    return filter_spectrum(columns, rate_hz, lambda frequency_hz: _compute_band_gain(frequency_hz, band_hz, lowest_hz))
+    return filter_spectrum(columns, lambda length: _tabulate_band_gain(length, rate_hz, band_hz, lowest_hz))
+
+
+@lru_cache(maxsize=8)  # the columns of all laws are filtered alike
+def _tabulate_band_gain(length: int, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
+    """Compute (length // 2 + 1,): gain of the band-pass filter at the lines of a spectrum of `length` samples."""
+    gain = _compute_band_gain(rfftfreq(length, 1 / rate_hz), band_hz, lowest_hz)
+    gain.setflags(write=False)
+    return gain
 
 
 def _compute_band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
@@ -233,10 +242,12 @@ def _differentiate_in_band(
     end in Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered
     at the lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
-    end_line, slope = _fit_end_line(samples, rate_hz)
+    end_line = compute_end_to_end_line(samples)
+    slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz
 
-    def compute_gain(frequency_hz: FloatArray) -> FloatArray:
+    def compute_gain(length: int) -> FloatArray:
         """Compute the frequency response (lines,) of differentiation, band limit and advance."""
+        frequency_hz = rfftfreq(length, 1 / rate_hz)
         i_omega = 2j * np.pi * np.maximum(frequency_hz, 1e-12)  # above 0: a negative power of it is finite
         band_gain = _compute_band_gain(frequency_hz, band_hz, lowest_hz if order < 0 else 0.0)
         return np.asarray(band_gain * np.exp(i_omega * advance_s) * i_omega**order)
@@ -246,17 +257,11 @@ def _differentiate_in_band(
         smoothed = _differentiate_in_band(samples, rate_hz, band, 0, advance_s)
         return np.asarray(np.cumsum(smoothed, axis=0) / rate_hz)
     if order < 0:
-        return filter_spectrum(samples, rate_hz, compute_gain, subtract_line=False)
-    derivative = filter_spectrum(samples - end_line, rate_hz, compute_gain, subtract_line=False)
+        return filter_spectrum(samples, compute_gain, subtract_line=False)
+    derivative = filter_spectrum(samples - end_line, compute_gain, subtract_line=False)
     if order == 0:
-        return derivative + end_line + slope * advance_s
+        return np.asarray(derivative + end_line + slope * advance_s)
     return derivative + slope if order == 1 else derivative
-
-
-def filter_low_pass(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
-    """Low-pass filter samples (n, k) to `band_hz` in the frequency domain; the straight line between their ends is
-    kept."""
-    return filter_spectrum(samples, rate_hz, lambda frequency_hz: compute_low_pass_gain(frequency_hz, band_hz))
 
 
 def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: int) -> FloatArray:
@@ -265,24 +270,16 @@ def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: in
 
 
 def filter_spectrum(
-    samples: FloatArray, rate_hz: float, compute_gain: Callable[[FloatArray], FloatArray], subtract_line: bool = True
+    samples: FloatArray, compute_gain: Callable[[int], FloatArray], subtract_line: bool = True
 ) -> FloatArray:
-    """Filter samples (n, k) in the frequency domain. compute_gain: function of the frequencies in Hz (lines,) that
-    returns the frequency response (lines,). Samples are continued beyond both ends by an odd extension. subtract_line:
-    whether the line between the end points is subtracted before and added after filtering."""
-    end_line = _fit_end_line(samples, rate_hz)[0] if subtract_line else np.zeros_like(samples)
+    """Filter samples (n, k) in the frequency domain. compute_gain: function of the number of samples of a spectrum that
+    returns the frequency response at its lines, (lines,). Samples are continued beyond both ends by an odd extension.
+    subtract_line: whether the line between the end points is subtracted before and added after filtering."""
+    end_line = compute_end_to_end_line(samples) if subtract_line else np.zeros_like(samples)
     extended = extend_as_odd(samples - end_line)
     spectrum = rfft(extended, axis=0)
-    frequency_hz = rfftfreq(len(extended), 1 / rate_hz)
-    filtered = irfft(compute_gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)
+    filtered = irfft(compute_gain(len(extended))[:, None] * spectrum, len(extended), axis=0)
     return np.asarray(filtered[: len(samples)] + end_line)
-
-
-def _fit_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """Compute the straight line from the first to the last sample, (n, k), and its slope per second, (k,)."""
-    fraction = np.linspace(0.0, 1.0, len(samples))[:, None]
-    end_line = (1 - fraction) * samples[0] + fraction * samples[-1]
-    return np.asarray(end_line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
 def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:

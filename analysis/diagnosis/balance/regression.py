@@ -10,8 +10,7 @@ cross-validation, the error of a block is that of weights fitted to all other bl
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from analysis.diagnosis.balance.blocks import (
     stack_products,
     sum_products,
 )
-from analysis.diagnosis.balance.law import BaseTerms, Law
+from analysis.diagnosis.balance.laws.law import BaseTerms, Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -148,7 +147,7 @@ def build_regression(
     kept_laws, column_ranges, next_column = [], [], column_parts[0][0].shape[1]
     base_column_count = next_column
     for law in laws:
-        columns = _make_law_columns(motions, law)
+        columns = make_law_columns(motions, law)
         if columns is not None:
             column_parts.append(columns)
             kept_laws.append(law)
@@ -186,8 +185,9 @@ def _make_base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
     return np.hstack([motion.decimate(linear), np.ones((len(linear[:: motion.step]), 1))])
 
 
-def _make_law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
-    """Make a law's filtered and decimated columns per motion; None where any is zero or not finite."""
+def make_law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
+    """Make a law's filtered and decimated columns (kept samples, k) per motion; None where any is zero or not
+    finite."""
     columns = [motion.decimate(law.make_columns(motion, law.numbers)) for motion in motions]
     is_usable = all(np.isfinite(column).all() for column in columns) and all(_is_above_rounding(columns))
     return columns if is_usable else None
@@ -197,89 +197,6 @@ def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
     """(k,): whether each column's rms is above rounding errors of the law's largest column."""
     rms = np.sqrt(np.mean(np.vstack(columns) ** 2, axis=0))
     return np.asarray(rms > 1e-12 * max(float(rms.max(initial=0.0)), 1e-290))
-
-
-def replace_law(regression: Regression, law_index: int, law: Law) -> Regression | None:
-    """Replace the law of this index; None where the new law's columns are zero, not finite or differ in number from
-    those of the old law."""
-    column_range = regression.column_ranges[law_index]
-    columns = _make_law_columns(regression.motions, law)
-    if columns is None or columns[0].shape[1] != column_range.stop - column_range.start:
-        return None
-    rows = tuple(
-        np.hstack([old_columns[:, : column_range.start], new_columns, old_columns[:, column_range.stop :]])
-        for old_columns, new_columns in zip(regression.columns, columns, strict=True)
-    )
-    scale = regression.scale.copy()
-    scale[column_range] = compute_scale(
-        columns, [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
-    )
-    laws = (*regression.laws[:law_index], law, *regression.laws[law_index + 1 :])
-    updated_regression = replace(regression, laws=laws, columns=rows, scale=scale)
-    return replace(
-        updated_regression,
-        fit=tuple(_update_products(updated_regression, block, column_range) for block in regression.fit),
-        test=tuple(_update_products(updated_regression, block, column_range) for block in regression.test),
-    )
-
-
-def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
-    """Append laws to a regression. Laws whose columns are zero or not finite are left out."""
-    added_laws, rows = [], [[part] for part in regression.columns]
-    ends = [regression.columns[0].shape[1]]
-    for law in laws:
-        columns = _make_law_columns(regression.motions, law)
-        if columns is not None:
-            added_laws.append(law)
-            ends.append(ends[-1] + columns[0].shape[1])
-            for column_parts, new_columns in zip(rows, columns, strict=True):
-                column_parts.append(new_columns)
-    extended = tuple(np.hstack(part) for part in rows)
-    fit_masks = [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
-    test_masks = [motion.mask_valid_samples(motion.test) for motion in regression.motions]
-    scale = np.concatenate([regression.scale, compute_scale([part[:, ends[0] :] for part in extended], fit_masks)])
-    mean = np.concatenate([target[mask] for target, mask in zip(regression.force, fit_masks, strict=True)]).mean()
-    normalisation = scale, float(mean)
-    return replace(
-        regression,
-        laws=(*regression.laws, *added_laws),
-        column_ranges=(*regression.column_ranges, *(slice(start, end) for start, end in pairwise(ends))),
-        scale=scale,
-        columns=extended,
-        fit=build_blocks(extended, regression.force, fit_masks, normalisation),
-        test=build_blocks(extended, regression.force, test_masks, normalisation),
-    )
-
-
-def keep_laws(regression: Regression, law_indices: Sequence[int]) -> Regression:
-    """Reduce a regression to the laws of these indices, in this order."""
-    columns = regression.select_columns(law_indices)
-    widths = [regression.column_ranges[k].stop - regression.column_ranges[k].start for k in law_indices]
-    ends = np.cumsum([regression.base_column_count, *widths]).tolist()
-    return replace(
-        regression,
-        laws=tuple(regression.laws[k] for k in law_indices),
-        column_ranges=tuple(slice(start, end) for start, end in pairwise(ends)),
-        scale=regression.scale[columns],
-        columns=tuple(part[:, columns] for part in regression.columns),
-        fit=tuple(_select_block_columns(block, columns) for block in regression.fit),
-        test=tuple(_select_block_columns(block, columns) for block in regression.test),
-    )
-
-
-def _select_block_columns(block: Block, columns: Sequence[int]) -> Block:
-    """Reduce a block to the products of these columns, in this order."""
-    return replace(block, gram=block.gram[np.ix_(columns, columns)], cross=block.cross[list(columns)])
-
-
-def _update_products(regression: Regression, block: Block, column_range: slice) -> Block:
-    """Recompute the products of a block's columns in `column_range`."""
-    scaled_columns = regression.columns[block.motion][block.rows] / regression.scale
-    gram, cross = block.gram.copy(), block.cross.copy()
-    gram[:, column_range] = scaled_columns.T @ scaled_columns[:, column_range]
-    gram[column_range, :] = gram[:, column_range].T
-    cross[column_range] = scaled_columns[:, column_range].T @ regression.force[block.motion][block.rows]
-    return replace(block, gram=gram, cross=cross)
 
 
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:

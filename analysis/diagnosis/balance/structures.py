@@ -11,20 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.change_laws import append_laws, copy_columns, keep_laws, overwrite_law, try_law
 from analysis.diagnosis.balance.given_model_base import GivenModelBase, build_regression_with_model, can_laws_explain
 from analysis.diagnosis.balance.judged_law import SIMULATED_AS
-from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, measure_scales
-from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
+from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.laws.law import BaseTerms, Law, Scales, measure_scales
+from analysis.diagnosis.balance.laws.motion_laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
-from analysis.diagnosis.balance.regression import (
-    Regression,
-    append_laws,
-    build_regression,
-    fit_all_laws,
-    keep_laws,
-    replace_law,
-)
+from analysis.diagnosis.balance.regression import Regression, build_regression, fit_all_laws
 from analysis.diagnosis.settings import (
     FURTHER_LAW_ERRORS,
     FURTHER_LAW_EXCESS,
@@ -213,13 +207,13 @@ def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequenc
 def refine_parameters(regression: Regression, structures: Sequence[Structure]) -> Regression:
     """Refine the nonlinear parameters of the structures' laws to the least cross-validated error, each law in the first
     structure that has it."""
-    refined: set[int] = set()
+    regression, refined = copy_columns(regression), set[int]()
     for structure in structures:
         for index_in_sum, law_index in enumerate(structure.laws):
             if law_index not in refined and regression.laws[law_index].bounds:
                 refined.add(law_index)
                 reduced = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
-                updated = replace_law(regression, law_index, _refine_law(reduced, index_in_sum))
+                updated = overwrite_law(regression, law_index, _refine_law(reduced, index_in_sum))
                 regression = updated or regression
     return regression
 
@@ -231,7 +225,7 @@ def _refine_law(regression: Regression, index_in_sum: int) -> Law:
     for _ in range(MOST_PASSES):
         trials = []
         for neighbour in _list_neighbours(regression.laws[index_in_sum]):
-            trial = replace_law(regression, index_in_sum, neighbour)
+            trial = try_law(regression, index_in_sum, neighbour)
             if trial is not None and _is_physical(trial, laws):
                 trials.append((float(trial.cross_validate(trial.select_columns(laws)).sum()), trial))
         if not trials or min(trials, key=lambda pair: pair[0])[0] >= least_error * (1 - 1e-4):  # converged

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.law import Formula
+from analysis.diagnosis.balance.laws.law import Formula
 from analysis.diagnosis.balance.structures import fit_values
 from analysis.diagnosis.confirm.require_gain import CONSTANT_FORCE
 from analysis.diagnosis.errors.hypothesis import (

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import filter_low_pass
+from analysis.diagnosis.balance.motion import filter_band_pass
 from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import RESPONSE_BAND_SHARE, RESPONSE_OVERSAMPLED
 from analysis.diagnosis.types import Mask
@@ -93,7 +93,7 @@ class AutoregressiveBase:
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
     """Low-pass filter samples (n, k) to 0.4 times the new rate, below its half (anti-aliasing), then keep every
     `step`-th one."""
-    return samples if step == 1 else filter_low_pass(samples, rate_hz, 0.4 * rate_hz / step)[::step]
+    return samples if step == 1 else filter_band_pass(samples, rate_hz, 0.4 * rate_hz / step, 0.0)[::step]
 
 
 def choose_decimation_step(parts: Sequence[Part]) -> int:

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Law, measure_scales
-from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
+from analysis.diagnosis.balance.change_laws import keep_laws
+from analysis.diagnosis.balance.laws.law import Law, measure_scales
+from analysis.diagnosis.balance.laws.motion_laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.motion import Motion, compute_motions, filter_band_pass
-from analysis.diagnosis.balance.regression import Regression, build_regression, keep_laws
+from analysis.diagnosis.balance.regression import Regression, build_regression
 from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import BASE_LAW_GAIN, MOST_BASE_LAWS
 from analysis.diagnosis.types import Mask

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
-from analysis.diagnosis.balance.law import smooth_sign
+from analysis.diagnosis.balance.laws.friction_laws import LEAST_WIDTH_SHARE
+from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, ParametersOf, Undo, Variant, scale_parameter
 from analysis.diagnosis.contrast.recording_part import Part

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import differentiate, filter_low_pass
+from analysis.diagnosis.balance.motion import differentiate, filter_band_pass
 from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import SENSOR_TAPS
 from analysis.diagnosis.types import Mask
@@ -52,7 +52,7 @@ class SensorBase:
     def _build_part_rows(self, part: Part) -> FloatArray:
         """Build the rows (rows, 1 + columns) of one part, see `build_rows`; the part must have a position."""
         assert part.position is not None
-        reading = filter_low_pass(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
+        reading = filter_band_pass(part.response[:, [self.channel]], part.rate_hz, self.band_hz, 0.0)[:: self.step]
         differentiated = differentiate(
             part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.differentiations
         )[:: self.step]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import smooth_sign
+from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.first_model.model_structures import (

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import measure_scales
+from analysis.diagnosis.balance.laws.law import measure_scales
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import is_free_motion, select_time_unit

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
-from analysis.diagnosis.balance.law import smooth_sign
+from analysis.diagnosis.balance.laws.friction_laws import LEAST_WIDTH_SHARE
+from analysis.diagnosis.balance.laws.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.free_motion import convert_free_motion

@@ -239,7 +239,7 @@ def _add_balance_results(effect: NamedEffect, law_and_share: "tuple[JudgedLaw, f
         is_delay = effect.effect in DELAY_EFFECTS
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *DELAY_EFFECTS)))) if is_delay else effect
     # Imported on demand: without balances it is not needed.
-    from analysis.diagnosis.balance.free_laws import FREE_LAWS
+    from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS
 
     law, share = law_and_share
     known_rivals = {rival.effect for rival in effect.rivals}

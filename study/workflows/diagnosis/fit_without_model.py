@@ -7,7 +7,7 @@ with a remedy. Called by `diagnose_recordings` and `study.evaluation.real.diagno
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from analysis.diagnosis.balance.free_laws import list_excluded_laws
+from analysis.diagnosis.balance.laws.free_laws import list_excluded_laws
 from analysis.diagnosis.data.input_checks import NothingToDiagnoseError
 from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fit_without_model

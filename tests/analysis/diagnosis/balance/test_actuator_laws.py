@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance import actuator_equivalents
-from analysis.diagnosis.balance.command_laws import IDEAL_ACTUATOR, vary_parameters
+from analysis.diagnosis.balance.laws.command_laws import IDEAL_ACTUATOR, vary_parameters
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from analysis.diagnosis.balance.free_laws import FREE_LAWS
+from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.laws.law import parse_law

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.laws import make_laws
+from analysis.diagnosis.balance.laws.motion_laws import make_laws
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signal
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BAND_WIDEST

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.law import Law, name_weights
+from analysis.diagnosis.balance.change_laws import copy_columns, keep_laws, overwrite_law, try_law
+from analysis.diagnosis.balance.laws.law import Law, name_weights
 from analysis.diagnosis.balance.motion import compute_motions
-from analysis.diagnosis.balance.regression import build_regression, fit_all_laws, keep_laws, replace_law
+from analysis.diagnosis.balance.regression import build_regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BALANCE_FOLDS
@@ -86,18 +87,25 @@ def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
 
 def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):
     wider = replace(SCALE, numbers=(0.2,))
-    changed = replace_law(regression, 0, wider)
+    before = regression.cross_validate(regression.select_columns((0,)))
+    changed = overwrite_law(copy_columns(regression), 0, wider)
+    tried = try_law(regression, 0, wider)
     anew = build_regression(regression.motions, 0, (wider, CUBE, PAIR), turns=False)
     for laws in ((0,), (0, 1, 2)):
         columns = anew.select_columns(laws)
         assert changed.cross_validate(columns) == pytest.approx(anew.cross_validate(columns))
         assert changed.compute_test_errors(columns) == pytest.approx(anew.compute_test_errors(columns))
         assert changed.fit_weights(columns) == pytest.approx(anew.fit_weights(columns))
+        assert tried.cross_validate(columns).tolist() == changed.cross_validate(columns).tolist()
+        assert np.vstack(changed.compute_residuals(columns)) == pytest.approx(
+            np.vstack(anew.compute_residuals(columns))
+        )
+    assert regression.cross_validate(regression.select_columns((0,))).tolist() == before.tolist()
     assert changed.cross_validate(changed.select_columns((0,))).sum() != pytest.approx(
         regression.cross_validate(anew.select_columns((0,))).sum()
     )
-    assert replace_law(regression, 0, PAIR) is None
-    assert replace_law(regression, 0, replace(SCALE, make_columns=lambda m, n: 0 * m.velocity[:, :1])) is None
+    assert overwrite_law(copy_columns(regression), 0, PAIR) is None
+    assert try_law(regression, 0, replace(SCALE, make_columns=lambda m, n: 0 * m.velocity[:, :1])) is None
 
 
 def test_some_laws_alone_leave_what_they_leave_among_the_others(regression):

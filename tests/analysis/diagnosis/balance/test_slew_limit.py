@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.command_laws import make_slew_laws
+from analysis.diagnosis.balance.laws.command_laws import make_slew_laws
 from analysis.diagnosis.settings import SLEW_REACHED_SHARE
 from tests.slow_instances import slow
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.laws import _make_stop_converter
+from analysis.diagnosis.balance.laws.motion_laws import _make_stop_converter
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.condition_laws import _make_formula
+from analysis.diagnosis.balance.laws.condition_laws import _make_formula
 from analysis.diagnosis.balance.motion import Condition
 from analysis.diagnosis.data.recorded_conditions import apply_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.laws.law import Law
 from analysis.diagnosis.result.candidates import _rank_law
 
 

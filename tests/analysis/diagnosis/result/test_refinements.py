@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.laws.law import Law
 from analysis.diagnosis.document import Estimate, NamedEffect
 from analysis.diagnosis.result.candidate_wording import format_class_noun
 from analysis.diagnosis.result.candidates import _add_balance_results, is_refinement_of

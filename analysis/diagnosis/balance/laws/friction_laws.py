@@ -21,7 +21,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import (
+from analysis.diagnosis.balance.laws.law import (
     Columns,
     Law,
     NonlinearParameters,

@@ -22,8 +22,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
-from analysis.diagnosis.balance.law import (
+from analysis.diagnosis.balance.laws.friction_laws import LEAST_WIDTH_SHARE
+from analysis.diagnosis.balance.laws.law import (
     Columns,
     Formula,
     Law,

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import compute_friction_widths
-from analysis.diagnosis.balance.law import Columns, Formula, Law, Scales, name_weights, smooth_sign
+from analysis.diagnosis.balance.laws.friction_laws import compute_friction_widths
+from analysis.diagnosis.balance.laws.law import Columns, Formula, Law, Scales, name_weights, smooth_sign
 from analysis.diagnosis.balance.motion import Condition, Motion
 from equalizer.signals.signal import FloatArray
 

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import make_damping_laws, make_friction_laws
-from analysis.diagnosis.balance.law import (
+from analysis.diagnosis.balance.laws.friction_laws import make_damping_laws, make_friction_laws
+from analysis.diagnosis.balance.laws.law import (
     Columns,
     Law,
     NonlinearParameters,
@@ -63,7 +63,7 @@ def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
             yield from make_dynamic_laws(channel, scales)
         if motions[0].conditions:
             # Imported here: few recordings have conditions.
-            from analysis.diagnosis.balance.condition_laws import make_condition_laws
+            from analysis.diagnosis.balance.laws.condition_laws import make_condition_laws
 
             yield from make_condition_laws(motions, channel, scales)
     if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
