@@ -27,7 +27,7 @@ class TrialStatus(Enum):
     """Valid, but without a measurement: answered before a full period of the steady stimulus was recorded, or the
     recording was lost."""
     SPOILED = "spoiled"
-    """Void: presented again as the next attempt of the same trial."""
+    """Void: to be presented again as the next attempt of the same trial."""
     OPEN = "open"
     """Presented and not answered yet."""
 

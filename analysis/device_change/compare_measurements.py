@@ -33,8 +33,7 @@ class ChangeLimits:
     friction_n: float = 0.12
     """Limit of friction: a step of 1 dB at the 1 N with which those staircases begin, 10^(1/20) - 1 = 0.12."""
     noise_factor: float = 2.0
-    """Limit of the noise, chosen by hand: no threshold depends on the noise, and a loose sensor or broken shield
-    multiplies it."""
+    """Limit of the ratio of the noise, chosen by hand: a loose sensor or broken shield multiplies the noise."""
     deviations: float = 3.0
     """Number of standard errors beyond which a change is more than the scatter of the measurements, and multiple of the
     noise power that is subtracted from the difference of a response; chosen by hand."""
@@ -123,7 +122,6 @@ def _compare_friction(accepted: DeviceMeasures, today: DeviceMeasures, limits: C
     for axis, channel in enumerate(accepted.response.input_channels):
         accepted_n, today_n = float(accepted.friction_n[axis]), float(today.friction_n[axis])
         error = float(np.hypot(accepted.friction_error_n[axis], today.friction_error_n[axis]))
-        # A handle that no longer moves has changed: its friction is unknown, and large.
         is_stuck = math.isnan(today_n) or math.isnan(accepted_n)
         changed = is_stuck or _is_significant(today_n - accepted_n, error, limits.friction_n, limits)
         unclear = not changed and limits.deviations * error > limits.friction_n
@@ -160,8 +158,8 @@ def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, li
 
 
 def _find_lost_bands(accepted: FrequencyResponse, today: FrequencyResponse, limits: ChangeLimits) -> Iterator[Change]:
-    """Find the bands in which more than half of the lines that were reliable at the acceptance are not reliable today:
-    they are reported as unclear."""
+    """Find the bands in which more than half of the lines that were reliable at the acceptance are not reliable
+    today."""
     accepted_hz = accepted.frequency_hz[accepted.reliable]
     is_lost = ~np.isin(accepted_hz, today.frequency_hz[today.reliable])
     band_numbers = _number_bands(accepted_hz, limits)

@@ -1,9 +1,8 @@
-"""Measure a free device (no hand on the handle) from one recording: friction from slow strokes, frequency response,
-noise at rest.
+"""Measure a free device (no hand on the handle) from one recording, for a daily check: friction from slow strokes,
+frequency response, noise at rest.
 
 The mean friction force (N) is the work dissipated in a closed stroke, the integral of F dx along its path, divided by
 the length of the path. Springs, weights and inertia do no net work over a closed path, so that no model is needed.
-Called by `compare_measurements` for the daily check of a device.
 """
 
 from dataclasses import dataclass, replace
@@ -22,8 +21,8 @@ STROKES_BELOW_HZ = 1.0
 stimulus of the shipped studies has 5 Hz."""
 
 MISSED_LIMIT = 0.02
-"""Largest share of missing samples (missed ticks of the control loop) of a signal: the `missed_ticks_limit` of the
-shipped protocols."""
+"""Largest share of missing samples (missed ticks of the control loop) of a signal: the default `missed_ticks_limit` of
+a protocol."""
 
 
 class NotMeasurableError(ValueError):

@@ -9,8 +9,8 @@ probes at the same level, and a reciprocal mechanism, its other properties cance
 dM, dC, dK: change of the hand's mass, damping and stiffness; g: relative change of the delivered force; T: added delay.
 Friction: its shapes S (force of 1 N along the measured motion) times its change, dFc_k A0_k S_k / (A0_j A_j), and times
 its initial value, because the shape changes with the motion. That value is estimated from the level dependence of the
-first responses. The noise is estimated from the differences between the first probes of a level. Of all causes and
-pairs of causes, those with the best penalised fit are selected. Called by `session_drift`."""
+first responses. The noise is estimated from the differences between the first probes of a level. Of no cause, single
+causes and pairs, those with the best penalised fit are selected. Begin at `find_drifts`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ IntArray = npt.NDArray[np.int64]
 
 AXES = "xyz"  # names of the axes, by index
 FIRST_PROBES = 2
-"""Number of reference probes at each level, before anything is compared: their differences give the noise."""
+"""Number of reference probes at each level; their differences give the noise."""
 PENALTY_PER_PARAMETER = 8.0
 """Penalty per parameter, in units of the squared misfit over noise: four times Akaike's, against false alarms."""
 MAX_CAUSES = 2
@@ -190,7 +190,7 @@ def _estimate_first_friction(
     apparent_mass: ComplexArray, shapes: ComplexArray, driven: tuple[ComplexArray, IntArray], count: int
 ) -> tuple[FloatArray, ComplexArray]:
     """Estimate the friction (N) of each axis at the `count` first probes, and its shapes (probes, lines, axes), with
-    the break-away length that best fits the apparent mass less its mean over the levels."""
+    the break-away length that best fits the apparent mass less its mean over these probes."""
     driven_acceleration, axes = driven
     apparent_mass = apparent_mass[:count]
     best_fit = (np.inf, np.zeros(3), shapes[0])

@@ -1,6 +1,5 @@
 """Spectra of a probe (a short multisine, with or without a hand on the handle): force, acceleration and position at
-each spectral line, and the spectrum of dry friction along the probe's motion. Called by `probe_drift`, which compares
-the probes of a session, by `study.workflows.results.session_drift` and by `study.workflows.trial.play_probe`.
+each spectral line, and the spectrum of dry friction along the probe's motion.
 
 Friction follows Dahl's law (P. R. Dahl, "A solid friction model", 1968) at a level of 1 N,
 
@@ -19,8 +18,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_DRIVEN_SHARE = 0.1
-"""Least amplitude of a driven line, relative to the strongest of its axis: weaker lines are due to rounding and to the
-virtual spring. Chosen by hand."""
+"""Amplitude above which a line counts as driven, relative to the strongest of its axis. Chosen by hand."""
 
 LOWEST_INTEGRATED_HZ = 3.0
 """Lower end of the lines at which the acceleration is integrated twice: below it, the result is the sensor's drift.
@@ -94,8 +92,8 @@ linkage above it. Chosen by hand."""
 
 def estimate_apparent_mass_kg(probe: ProbeLines) -> float:
     """Estimate the apparent mass in kg: median of the real part of force over acceleration, over the driven lines in
-    `MASS_BAND_HZ`, each on its driven axis. A hand on the handle adds to it. Raises ValueError where there is no such
-    line, or the median is not a positive number."""
+    `MASS_BAND_HZ`, on the axes that they drive. A hand on the handle adds to it. Raises ValueError where there is no
+    such line, or the median is not a positive number."""
     low_hz, high_hz = MASS_BAND_HZ
     in_band = (probe.frequency_hz >= low_hz) & (probe.frequency_hz <= high_hz)
     line_indices, axis_indices = np.nonzero(probe.driven & in_band[:, None])

@@ -8,8 +8,7 @@ The method depends on what is given:
 * clean recordings of the same device: faults are found by comparison with them (`contrast`) and, with a given model,
   by a search where it predicts them well or no fault explains the difference.
 
-Called by `study.workflows.diagnosis.diagnose_recordings` (the command `hapteq diagnose`), `diagnose_values` and the
-tests of `study.evaluation`.
+Called by `study.workflows.diagnosis.diagnose_recordings` (the command `hapteq diagnose`) and `diagnose_values`.
 """
 
 from collections.abc import Sequence
@@ -92,7 +91,7 @@ def _diagnose_by_balance(
     balances: "tuple[Balance, ...]",
 ) -> Findings | None:
     """Diagnose the laws that the force balances name; None where they name none, or simulations confirm none."""
-    # Imported on demand, to shorten the start of the program: a diagnosis with a given model does not need them.
+    # Imported on demand, to shorten the start of the program.
     from analysis.diagnosis.confirm.confirm_laws import has_open_parameter, search_by_balance
     from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measures
 
@@ -231,7 +230,7 @@ def _judge_with_model(
     result = outcome.result
     if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
         return outcome, ()
-    # Imported on demand: only needed where the search with a given model leaves a mismatch unexplained.
+    # Imported on demand: only some diagnoses need it.
     from analysis.diagnosis.confirm.decide_with_model import ResultWithModel, decide_with_model
 
     decide = partial(decide_with_model, recordings, fitting, result, settings.time_left)

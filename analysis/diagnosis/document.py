@@ -234,7 +234,7 @@ class Diagnosis:
 
 
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Convert the diagnosis to JSON values, without format and version. Empty optional entries are left out."""
+    """Convert the diagnosis to JSON values, without format, version, and empty class, gains, laws and candidates."""
     document: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
     effects, candidates = document["effects"], document["candidates"]
     optional_entries = [(effect, optional_key) for effect in effects for optional_key in ("class", "held_out_gain")]
@@ -271,7 +271,7 @@ def _list_inseparable(effect: NamedEffect) -> tuple[str, ...]:
 
 
 _PYDANTIC_MESSAGES = {"unexpected_keyword_argument": "this key is unknown", "missing": "this is missing"}
-"""Messages that replace those of pydantic, by pydantic's type of error."""
+"""Messages that replace those of pydantic, by type of error."""
 
 
 def _format_problem(entry_path: tuple[str | int, ...], message: str) -> str:

@@ -1,8 +1,7 @@
 """Plain words for the effects of the vocabulary and for laws that it lacks: nouns, places, units, and how their
 parameters are printed.
 
-Called for the sentences, tables and figures of a diagnosis, by `analysis.diagnosis.result`, `analysis.reports`,
-`analysis.figures.diagnosis` and others.
+For the sentences, tables and figures of a diagnosis.
 """
 
 from collections.abc import Mapping
@@ -108,7 +107,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "logger_offset": EffectWords("a delay of the logger", {"offset": _VALUE_ALONE}),
     "lost_samples": EffectWords("lost samples", {"fraction": "{} of all"}, ("fraction",)),
 }
-"""Words by name of the effect in the vocabulary; without parameters: the main parameter alone is printed."""
+"""Words by name of the effect in the vocabulary."""
 
 
 @dataclass(frozen=True, slots=True)

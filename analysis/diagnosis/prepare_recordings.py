@@ -3,8 +3,7 @@
 In this order: segments are found where a recording states none; commands and responses are brought into the form that a
 force balance needs (only where no model was given); recordings with an imposed motion become force-driven; short gaps
 in commands are interpolated and long ones cut out; unsuitable recordings are refused; positions and conditions that not
-all recordings contain are removed, then constant positions. Called by `diagnose_values`, `diagnosis_input`,
-`clean_recordings` and `study.evaluation.real.diagnose_real`.
+all recordings contain are removed, then constant positions.
 """
 
 from collections.abc import Sequence
@@ -108,7 +107,7 @@ def _keep_common_conditions(recordings: Sequence[Recording]) -> PreparedRecordin
 
 
 def _drop_constant_position(recordings: Sequence[Recording]) -> PreparedRecordings:
-    """Remove the positions of all recordings where a channel never changes in any of them, with a remark: its errors
+    """Remove the positions of all recordings where a channel is constant over all of them, with a remark: its errors
     cannot be normalised to its signal. Gaps (NaN) count as the channel's median."""
     positions = [recording.position for recording in recordings if recording.position is not None]
     if not positions:

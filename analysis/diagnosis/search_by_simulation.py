@@ -1,9 +1,8 @@
 """Search by simulation for the physical effects that a model lacks: select the effects to try, run `search`, and add
 rattling play (impacts within a clearance) where that explains a mismatch that remains.
 
-Where force balances were fitted first, only effects that a balance cannot observe are tried, and none where a balance
-names a law. With clean recordings (without the fault), the model error learned from these counts as noise. Called by
-`diagnose`.
+Where force balances were fitted first, only effects that they cannot observe are tried, if any. With clean recordings
+(without the fault), the model error learned from these counts as noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,8 +37,7 @@ BALANCE_TESTED_EFFECTS = ("force_deadband", "force_saturation", "force_nonlinear
 LOWEST_MAINS_HZ = 45.0
 """Lowest frequency (Hz) at which a tone is accepted as mains hum: power grids run at 50 or 60 Hz."""
 GAIN_EFFECTS = ("force_gain", "sensor_gain")
-"""Names of the effects that a model fitted to the recordings absorbs: a wrong gain shows only with a calibrated
-model."""
+"""Names of the effects that a model fitted to the same recordings absorbs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +53,7 @@ def make_search_context(
     recording: Recording, fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
     """Make the shared state of the search. recording: as given by the user, for names and units, because the records of
-    a measure that compares forces have others. map_: maps a function over items, possibly in parallel."""
+    a measure that compares forces have others."""
     measure = fitting.chosen.measure
     model = adopt_recording_units(
         fitting.model, recording.command.units, recording.response.units, select_time_unit(recording)
@@ -249,7 +247,7 @@ def _select_catalogue(settings: DiagnosisSettings, recording: Recording, exclude
 def _is_unobservable(name: str, place: str, is_complete_command: bool) -> bool:
     """Whether an effect is of the sensor or the actuator and a force balance cannot observe it. name, place: of the
     effect. is_complete_command: whether an actuator drives the device with the commands as recorded, neither reduced by
-    other forces nor with an imposed motion; otherwise effects of the actuator do not show at all."""
+    other forces nor with an imposed motion."""
     is_untested = name != "body_on_actuator" and name not in BALANCE_TESTED_EFFECTS
     return place == "sensor" or (place == "actuator" and is_complete_command and is_untested)
 

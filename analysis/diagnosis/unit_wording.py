@@ -1,6 +1,5 @@
 """Format physical values, errors, shares and probabilities for reports: SI prefixes, superscript exponents, and digits
-limited by the confidence interval. Called by the sentences, tables and figures of a diagnosis.
-"""
+limited by the confidence interval."""
 
 import re
 from dataclasses import dataclass
@@ -10,7 +9,6 @@ import numpy as np
 from analysis.wording import typeset
 
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
-"""SI prefixes with their factors."""
 _RANGE_WITHOUT_PREFIX = (0.01, 1e4)
 """Values from the first to below the second are shown in the unit itself. Chosen by hand."""
 _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
@@ -20,7 +18,6 @@ _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
 _NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
 """Units that are a reciprocal or begin with a power: the power would apply to a prefix as well."""
 _SUPERSCRIPTS = {"^2": "²", "^3": "³"}
-"""Superscript exponents by their ASCII notation."""
 _SYMBOLS = {"deg": "°"}
 """Symbols of units that are not shown by their ASCII name."""
 _MOST_DIGITS, _USUAL_DIGITS = 5, 3
@@ -38,7 +35,7 @@ class Scale:
 _INERTIA_SCALES = (Scale(1.0, "kg m²"), Scale(1e4, "kg cm²"), Scale(1e7, "g cm²"))
 """Displayed units of inertia, from the largest to the smallest."""
 _LEAST_INERTIA = 0.1
-"""Smallest value shown in a unit of inertia; below it the next smaller unit is used. Chosen by hand."""
+"""Value in a unit of inertia below which the next smaller unit, if any, is used. Chosen by hand."""
 
 
 def choose_scale(unit: str, magnitude: float) -> Scale:
@@ -79,8 +76,7 @@ def typeset_unit(unit: str) -> str:
 
 
 def format_value(value: float, unit: str, ci95: tuple[float, float] | None = None) -> str:
-    """Format a value with its 95 % interval, such as "54 µm [49, 60]"; at least three significant digits without an
-    interval. value, ci95: in `unit`, SI."""
+    """Format a value with its 95 % interval, such as "54 µm [49, 60]". value, ci95: in `unit`, SI."""
     scale = choose_scale(unit, value)
     scaled_value = value * scale.factor
     interval = None if ci95 is None else (ci95[0] * scale.factor, ci95[1] * scale.factor)
@@ -122,8 +118,8 @@ def format_share(share: float) -> str:
 
 
 def _choose_decimals(value: float, interval: tuple[float, float] | None) -> int:
-    """Choose the number of decimals: as many as give half the interval's width one significant digit, but at most
-    `_MOST_DIGITS` significant digits of the value; without an interval, `_USUAL_DIGITS` significant digits."""
+    """Choose the number of decimals, at least 0: as many as give half the interval's width one significant digit and
+    the value at most `_MOST_DIGITS`; without an interval, or with an empty one, `_USUAL_DIGITS` of the value."""
     order_of_magnitude = np.floor(np.log10(abs(value))) if value else 0.0
     if interval is None or not interval[1] > interval[0]:
         return int(max(0, _USUAL_DIGITS - 1 - order_of_magnitude))
@@ -134,7 +130,7 @@ def _choose_decimals(value: float, interval: tuple[float, float] | None) -> int:
 
 
 def _format_number(value: float, decimals: int) -> str:
-    """Format the value with this number of decimals; with three significant digits in exponent notation for a magnitude
+    """Format the value with this number of decimals; with up to three significant digits (format "g") for a magnitude
     from 1e6 on or more than five decimals (limits chosen)."""
     if value and (abs(value) >= 1e6 or decimals > 5):
         return typeset(f"{value:.3g}")

@@ -3,7 +3,6 @@ reliability.
 
 The outcomes are those of a bank of simulated devices with concealed effects. Vertical bars in the figure of detection
 thresholds mark an ideal observer, which compares the device with and without the effect and has no model to re-tune.
-Called by `write_proof`.
 """
 
 from collections.abc import Sequence

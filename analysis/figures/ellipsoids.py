@@ -1,8 +1,8 @@
 """Figure of acceleration ellipses by frequency, by second moments and by phasors.
 
 As figure 3 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices.
-`analysis.psychophysics.ellipsoid` defines both ellipses and the frame: the first axis is the test direction. Called by
-`study_pictures`. Sizes of the figure are chosen by eye.
+`analysis.psychophysics.ellipsoid` defines both ellipses and the frame: the first axis is the test direction. Sizes of
+the figure are chosen by eye.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """Figure of coupling, direction perception and control method over frequency, as in the published figure 1.
 
 Above: measured worst coupling and its onset. Below: where the axes of the device couple, where a person perceives
-directions, and which control method suits each frequency band (`frequency_response.frequency_bands`). Called by
-`identification_report` and `reproduction_pictures`.
+directions, and which control method suits each frequency band (`frequency_response.frequency_bands`).
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,6 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.octave_bins import average_octave_bins
 
 _BAND_COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
-"""Colour of each frequency band, by its name."""
 _HALF_HEIGHT, _EXTRA_HALF_HEIGHT = 0.4, 0.35
 """Half the height of a row, and additional half height of the row of control methods, in units of the ordinate. Chosen
 by hand."""
@@ -70,7 +68,7 @@ def draw_frequency_bands(
 
 
 def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset) -> None:
-    """Draw the worst coupling of the reliable lines in per cent, averaged over 1/24 octave, with the threshold of the
+    """Draw the worst coupling, in per cent, of the reliable lines averaged over 1/24 octave, with the threshold of the
     onset."""
     style_axes(axes)
     reliable_lines = response.select_lines(response.reliable)

@@ -1,7 +1,6 @@
 """Figures of a recording before any model is fitted: time series, spectra, coherence, levels, derivatives.
 
-They show the values of `analysis.look.overview.Overview`; each figure is drawn only where the recording has its data.
-Called by `analysis.reports.look_report`.
+They show the values of `analysis.look.overview.Overview`; a figure without data is left out.
 """
 
 from collections.abc import Sequence
@@ -31,7 +30,6 @@ _FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 _SHOWN_DECADES = 8
 """Decades of amplitude that a spectrum shows, from its largest value down."""
 _ROLE_COLOURS = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
-"""Colour of a channel by its role."""
 
 
 def make_look_pictures(overview: Overview, recording_number: int) -> tuple[Picture, ...]:
@@ -88,8 +86,8 @@ def _make_signals_picture(overview: Overview, name: str) -> Picture:
 def compute_envelope(
     samples: FloatArray, rate_hz: float, most_columns: int = ENVELOPE_COLUMNS
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute start times (s), lowest and highest samples of equally long columns, (k,) each, k at most `most_columns`;
-    each range is extended to touch that of the column before. Missing samples (NaN) are ignored."""
+    """Compute start times (s), lowest and highest samples of about equally long columns, (k,) each, k at most
+    `most_columns`. Missing samples (NaN) are ignored."""
     starts = np.unique(np.linspace(0, len(samples), min(most_columns, len(samples)), endpoint=False).astype(int))
     low = np.fmin.reduceat(samples, starts)
     high = np.fmax.reduceat(samples, starts)

@@ -2,8 +2,8 @@
 estimates, and the limit of direction perception.
 
 The values come from a hierarchical psychometric model (`analysis.psychophysics.hierarchy`). Thresholds are force
-amplitudes in N. Above the cap, the largest force of the staircase, only a lower bound is known. Called by
-`study_pictures` for the report of a study. The constants below set the layout; chosen by eye.
+amplitudes in N. Above the cap, the largest force of the staircase, at most a lower bound is known. The constants below
+set the layout; chosen by eye.
 """
 
 import numpy as np
@@ -42,8 +42,8 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     """Draw thresholds in N on a logarithmic axis, by frequency.
 
     A threshold above the cap has no known size: participants are drawn on a common line with an arrow, and a median as
-    an arrow that begins at its one-sided lower bound, without one at the lower end of the axis. cap_n: largest force
-    of the staircase, N."""
+    an arrow that begins at its one-sided lower bound (below it near the end of the axis), without one at the lower end
+    of the axis. cap_n: largest force of the staircase, N."""
     figure = create_figure(PAGE_WIDTH_IN, 4.2)
     axes = figure.add_subplot()
     style_axes(axes)
@@ -69,8 +69,8 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
 
 
 def _compute_upper_limit_n(primary: PrimaryAnalysis, cap_n: float) -> float:
-    """Compute the upper end of the axis in N: above all intervals and arrows, but at most `_LARGEST_TOP_RATIO` times
-    the cap, so that the rest stays readable."""
+    """Compute the upper end of the axis in N: above the known bounds of all medians, but at most `_LARGEST_TOP_RATIO`
+    times the cap, so that the rest stays readable."""
     upper_ends_n = [median.upper_n or _LEAST_ARROW_RATIO * (median.lower_n or 0.0) for median in primary.medians]
     return min(
         max(_SMALLEST_TOP_RATIO * cap_n, *(1.1 * upper_end_n for upper_end_n in upper_ends_n)),

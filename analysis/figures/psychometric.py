@@ -1,8 +1,8 @@
 """Figures of psychometric functions: observed shares of right answers over level, and the fitted curves.
 
 Shares come in bins of levels with Wilson's 95 % interval (`hierarchy.observed_shares`); the curves are those of the
-hierarchical model (`hierarchy.curve`). One panel per frequency; one figure for all people together, one per person.
-Called by `study_pictures`.
+hierarchical model, or of each person alone. One panel per frequency; one figure for all people together, one per
+person.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 Dots and crosses are right and wrong answers, rings are reversals. The threshold is the mean of the levels at the last
 reversals (black rings), or, for the Psi method, the mean of the posterior. A dashed line is the cap, the highest level
-allowed. Called by `analysis.figures.study_pictures`.
+allowed.
 """
 
 from collections.abc import Sequence

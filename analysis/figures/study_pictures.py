@@ -1,8 +1,7 @@
 """All figures of one study with titles and captions, in the order of its report (`analysis.reports.study_report`).
 
 Thresholds by frequency and in other units, medians and psychometric functions of the model, delivered acceleration,
-staircases, and acceleration ellipses. A figure without data is left out; in the report, those of single participants
-are collapsed. Called by `study.workflows.results.analyze_data` and `reproduction_pictures`; exported as
+staircases, and acceleration ellipses. A figure without data is left out. Begin at `draw_study_pictures`, exported as
 `analysis.study_pictures`.
 """
 
@@ -180,7 +179,7 @@ def _make_delivered_picture(analysis: StudyAnalysis) -> Picture:
 
 
 def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """Make a picture per participant with the levels of all runs, collapsed in the report."""
+    """Make a picture per participant with the levels of all runs."""
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(

@@ -1,8 +1,7 @@
 """Figure of individual thresholds and group means by frequency (the published figure 2).
 
 Thresholds that the cap cut (censored) are hollow with an arrow upwards; runs that the trial limit stopped have no
-threshold and are drawn above the cap. Called by `study_pictures`; `thresholds_by_unit` and `medians` call
-`draw_threshold` alone.
+threshold and are drawn above the cap.
 """
 
 import numpy as np
@@ -96,7 +95,7 @@ def draw_threshold(axes: Axes, position: float, threshold: float, participant: i
 
 
 def _draw_stopped_runs(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
-    """Draw a hollow marker above the cap for each stopped run, which has no threshold."""
+    """Draw a hollow marker above the cap where a stopped run left no threshold."""
     offsets = np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, max(2, len(table.subjects)))
     for person, row in enumerate(table.stopped):
         for position, is_stopped in enumerate(row):

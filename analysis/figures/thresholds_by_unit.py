@@ -1,9 +1,5 @@
 """Figure of direction thresholds over frequency, one panel per unit: commanded force (N), delivered acceleration
-(m/s²), displacement (mm), and dB above the detection threshold.
-
-The shape of the thresholds over frequency differs between the units, because the response of the device varies with
-frequency. Called by `study_pictures`.
-"""
+(m/s²), displacement (mm), and dB above the detection threshold."""
 
 from collections.abc import Sequence
 
@@ -32,7 +28,6 @@ _AXIS_LABELS: dict[Quantity, str] = {
     "threshold_mm": "Displacement (mm)",
     "above_detection_db": "Above detection (dB)",
 }
-"""Label of the vertical axis, by quantity."""
 _MARKER_SPREAD_TICKS = 0.4
 """Width over which the participants' markers are spread at each frequency, in distances between ticks. Chosen."""
 _MEDIAN_HALF_LENGTH = 0.32

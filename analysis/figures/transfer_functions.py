@@ -2,7 +2,7 @@
 
 Magnitude over frequency, both logarithmic, a panel per entry of the transfer matrix. Lines are averaged over bins of
 1/24 octave (`octave_bins`); the range of single lines and their expected noise are drawn as well, and on request the
-response of a fitted model. Called by `identification_report` and `reproduction_pictures`.
+response of a fitted model.
 """
 
 from collections.abc import Sequence
@@ -24,9 +24,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 _BIN_WIDTH_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves. Chosen; the caption states it."""
 _UNRELIABLE_COLOUR = "#B8B8B8"
-"""Colour (grey) of bins that are not reliable."""
 _BAND_COLOUR = "#EEF3E6"
-"""Colour (light green) of a marked frequency band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

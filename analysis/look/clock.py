@@ -2,8 +2,7 @@
 
 A straight line is fitted by least squares to the stamps over the sample numbers (gaps counted as lost samples). Its
 slope gives the true period, hence the drift in ppm; the deviations from it are the jitter. Without stamps only the
-plausibility of the rate, and the notes of a resampling at import, can be checked. Called by `analysis.look.overview`,
-and by `build_recording` for the plausibility of the rate. Limits without a source were chosen by hand.
+plausibility of the rate, and the notes of a resampling at import, can be checked. All limits are chosen by hand.
 """
 
 from collections.abc import Sequence
@@ -15,7 +14,6 @@ from analysis.look.check import Check
 from equalizer.signals.recording import Recording
 
 CLOCK = "clock"
-"""Name of these checks."""
 GAP_PERIODS = 1.5
 """Difference of two successive stamps, in sample periods, above which samples were lost between them."""
 NOTICE_JITTER_PERIODS, WRONG_JITTER_PERIODS = 0.02, 0.2

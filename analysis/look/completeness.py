@@ -1,4 +1,4 @@
-"""Checks of a recording for missing samples, constant channels and copies of other channels. Called by `overview`.
+"""Checks of a recording for missing samples, constant channels and copies of other channels.
 
 A constant sensor or two identical sensors usually mean an unplugged cable or a wrong channel map. A channel is a copy
 of another if it equals that channel, scaled and shifted (least squares), within the rounding of single precision.
@@ -14,7 +14,6 @@ from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, find_runs
 
 MISSING_CHECK, CONSTANT_CHECK, COPIES_CHECK = "missing samples", "constant channels", "copied channels"
-"""Names of the checks of this module."""
 _WRONG_MISSING_SHARE = 0.2
 """Share of missing samples above which the check is "wrong" instead of a notice: most analyses cannot use the channel.
 Chosen by hand."""
@@ -22,8 +21,7 @@ _COPY_TOLERANCE = 1e-6
 """Largest rms difference between a channel and its copy, relative to the rms of the copy: rounding in single
 precision."""
 _SUBSET_SIZE = 1000
-"""Approximate number of samples, evenly spaced, that are compared first to save time: most pairs differ in these.
-Chosen."""
+"""Least number of samples, evenly spaced, that are compared first to save time: most pairs differ in these. Chosen."""
 
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:

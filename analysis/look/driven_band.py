@@ -1,6 +1,5 @@
 """Checks of the excitation: driven frequency band of each excitation or command, multiple coherence of each response
-with all commands, and segments without excitation. Called by `overview`; `study.workflows.files` calls
-`find_silent_segments`.
+with all commands, and segments without excitation.
 
 The multiple coherence of a response with q inputs is S_xy^H S_xx^-1 S_xy / S_yy at each spectral line, between 0 and 1.
 Source: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010, chapter 7. Unrelated signals have, for n averaged
@@ -19,7 +18,6 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_CHECK, COHERENCE_CHECK = "driven axes", "coherence"
-"""Names of the checks of this module."""
 LEAST_RELATIVE_DENSITY = 1e-2
 """Power spectral density, relative to the highest of the command, above which a line is driven. All limits of this
 module are chosen."""
@@ -41,9 +39,7 @@ class DrivenBand:
     command: str
     """Name of the channel: of a command, or of an excitation."""
     low_hz: float
-    """Frequency of the first driven line."""
     high_hz: float
-    """Frequency of the last driven line."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +48,6 @@ class ResponseCoherence:
     lowest."""
 
     response: str
-    """Name of the response channel."""
     multiple: FloatArray
     """(lines,): share of the response's power that is linear in all commands together, 0 to 1."""
     share: float

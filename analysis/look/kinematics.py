@@ -3,7 +3,6 @@
 An acceleration should be the second derivative of the position that was recorded with it. The check differentiates one
 channel by central differences and estimates gain and lag of the other against it over the coherent spectral lines: a
 gain other than 1 indicates a wrong unit or sign, a lag indicates a filter or a delay.
-Called by `analysis.look.overview`; `analysis.figures.look_pictures` draws the pairs.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,11 +19,9 @@ from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
 KINEMATICS, LAGS = "derivatives", "lag between channels"
-"""Names of the two checks, as shown in reports."""
 _DERIVATIVE_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^2": 2}
 """Order of the time derivative of position or angle, by unit."""
 _DERIVATIVE_NAMES = {1: "the derivative", 2: "the second derivative"}
-"""Name of the derivative in a finding, by order."""
 LEAST_COHERENT_SHARE = 0.3
 """Least coherent share of a channel's power; below it, the channel measures a different motion and is not compared.
 Chosen, as are the limits below."""
@@ -32,7 +29,7 @@ SAME_QUANTITY_SHARE, SAME_QUANTITY_SPREAD = 0.8, 0.2
 """Least coherent share, and largest spread of the ratio, of two channels that measure the same quantity."""
 LARGEST_GAIN_ERROR, WRONG_GAIN_ERROR = 0.05, 0.2
 """Deviation of the gain's magnitude from 1 above which it is reported (also the tolerance for factors of unit errors),
-and above which it counts as wrong."""
+and above which it counts as wrong, unless a lag indicates a filter."""
 LARGEST_LAG_SAMPLES = 0.6
 """Largest lag (samples) that is not reported: a zero-order hold of the force delays the acceleration by half a sample,
 and a backward difference delays a derivative by as much."""
@@ -161,7 +158,6 @@ def _check_pair(pair: KinematicPair, rate_hz: float) -> Check:
         and agreement.lag_samples > LARGEST_LAG_SAMPLES
         and not _describe_unit_error(agreement.gain)
     ):
-        # A wrong unit or factor causes no delay; a gain below 1 with a lag is typical of a filter or a flexible part.
         return Check(KINEMATICS, "notice", finding_text, _FILTER_ADVICE)
     if gain_error > WRONG_GAIN_ERROR:
         return Check(
@@ -204,7 +200,7 @@ def _describe_unit_error(gain: float) -> str:
 
 def check_lags(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
     """Check the lags between channels that measure the same quantity, such as a command and its measurement or two
-    sensors of one motion; where there are none, the result is a single check with the level "fine"."""
+    sensors of one motion; a single "fine" check where there are none."""
     checks = tuple(_generate_lag_checks(channels, spectra, rate_hz))
     return checks or (Check(LAGS, "fine", "No two channels measure the same quantity, so no lag can be measured."),)
 

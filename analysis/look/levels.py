@@ -2,7 +2,7 @@
 
 In a linear device the response grows in proportion to the command. A gain (rms of the response over rms of the command)
 that differs between the weakest and the strongest segment indicates a nonlinearity (friction, end stops, hardening,
-saturation), or noise. Called by `analysis.look.overview`.
+saturation), or noise.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from analysis.wording import typeset
 from equalizer.signals.recording import Recording, Segment
 
 LEVELS = "levels"
-"""Name of the check in a report."""
 _LEAST_LEVEL_RATIO = 1.5
 """Ratio of the strongest to the weakest command above which gains are compared. Chosen."""
 NOTABLE_GAIN_CHANGE, LARGE_GAIN_CHANGE = 0.05, 0.3
@@ -33,11 +32,9 @@ class SegmentLevel:
     kind: str
     """Kind of excitation (`Segment.kind`)."""
     role: str
-    """Role of the segment (`Segment.role`)."""
     start_s: float
     """Start from the first sample of the recording (s)."""
     duration_s: float
-    """Duration (s)."""
     period: int
     """Samples per period; 0 = not periodic."""
     rms: tuple[float, ...]

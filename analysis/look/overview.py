@@ -2,9 +2,8 @@
 
 The checks find missing samples, constant or copied channels, clock errors, wrong units, inconsistent kinematics, lags
 between channels, clipping, coarse quantization, offsets, axes without excitation, low coherence, levels out of
-proportion and poor repeatability; each gives a sentence, and advice where needed. Called by
-`study.workflows.recording.look_at_recordings`, exported as `analysis.overview`; `analysis.reports.look_report` shows
-it.
+proportion and poor repeatability; each gives a sentence, and advice where needed. Begin at `make_overview`, exported as
+`analysis.overview`.
 """
 
 from collections.abc import Sequence
@@ -37,11 +36,10 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summary, SummaryDisplay
 
 RESOLUTION = "resolution"
-"""Name of the check of quantization."""
 HIDDEN_STEPS, ROUGH_STEPS, FINE_STEPS = 3.0, 30.0, 1000.0
 """Limits of a channel's rms over its quantization step. Below the first, the check is "wrong"; below the second, it is
-a notice; from the last on, nothing is reported. Chosen: the quantization noise of a step q has the rms q / sqrt(12),
-that is 10 %, 1 % and 0.03 % of the signal's rms at these limits."""
+a notice; from the last on, the channel is not reported. Chosen: the quantization noise of a step q has the rms
+q / sqrt(12), that is 10 %, 1 % and 0.03 % of the signal's rms at these limits."""
 _SENSOR_ROLES = ("response", "position")
 """Roles of channels that are measured."""
 
@@ -88,11 +86,8 @@ class ChannelSummary:
     quantity: str
     unit: str
     lowest: float
-    """Smallest sample."""
     highest: float
-    """Largest sample."""
     mean: float
-    """Mean of the samples."""
     rms: float
     """Rms about the mean."""
     missing: int
@@ -106,9 +101,7 @@ class Overview(SummaryDisplay):
     name: str
     """Name of the recording's file."""
     recording: Recording
-    """The recording itself."""
     channels: tuple[Channel, ...]
-    """All channels of the recording."""
     stretches: tuple[Stretch, ...]
     """Parts of the recording that are analysed separately (`find_parts`)."""
     summaries: tuple[ChannelSummary, ...]
@@ -148,8 +141,7 @@ class Overview(SummaryDisplay):
 
 
 def make_overview(name: str, recording: Recording) -> Overview:
-    """Make the overview of a recording: channels, spectra, levels and checks. name: name of the file, for tables and
-    figures."""
+    """Make the overview of a recording. name: name of the file, for tables and figures."""
     channels, stretches, rate_hz = list_channels(recording), find_parts(recording), recording.sample_rate_hz
     spectra = estimate_cross_spectra(channels, stretches, rate_hz)
     bands = find_driven_bands(spectra, channels) if spectra else ()
@@ -204,7 +196,7 @@ def _restate_in_samples(check: Check) -> Check:
 
 
 def _summarise_channel(channel: Channel) -> ChannelSummary:
-    """Summarise the finite samples of a channel; without any, range and mean are NaN, and the rms is 0."""
+    """Summarise the finite samples of a channel."""
     finite_samples = channel.finite_samples if channel.finite_samples.size else np.array([np.nan])
     return ChannelSummary(
         channel.role,

@@ -1,7 +1,4 @@
-"""Periodicity checks of a recording: declared periods, detection of an undeclared period, and noise between periods.
-
-Called by `overview`: `find_repeats`, then `check_repeats`.
-"""
+"""Periodicity checks of a recording: declared periods, detection of an undeclared period, and noise between periods."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +14,6 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 CHECK_NAME = "repeats"
-"""Name of these checks in the overview."""
 ACCEPTED_DIFFERENCE, WRONG_DIFFERENCE = 0.02, 0.2
 """Limits of the relative difference (`_check_period`) of the excitation between declared periods: up to the first the
 period is accepted, above the second it is an error, in between a notice is given. Heuristic."""
@@ -90,8 +86,8 @@ def _compute_repeat_noise(recording: Recording, *, declared: bool) -> tuple[Repe
 
 
 def check_repeats(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
-    """Check the declared periods, an undeclared period, and the noise between repeats. A notice is given where nothing
-    repeats and no period is objected to."""
+    """Check the declared periods, an undeclared period, and the noise between repeats. Where nothing repeats and no
+    period is objected to, a single notice says so."""
     checks = [check for check in _check_periods(recording) if check is not None]
     if repeats.undeclared_period:
         repeat_count = (repeats.period_range[1] - repeats.period_range[0]) / repeats.undeclared_period

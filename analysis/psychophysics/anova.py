@@ -8,8 +8,6 @@ tested at every frequency), the differences between participants stay in the err
     omega² = (SS_between - (k - 1) MS_within) / (SS_total + MS_within)
 
 References: Fisher, Statistical Methods for Research Workers (1925); Hays, Statistics (1963), for omega².
-Called by `study_analysis`, by `comparisons`, whose tests use its error term, and by `power.power_curve` for simulated
-studies.
 """
 
 import math
@@ -29,7 +27,6 @@ class GroupSummary:
     name: str
     """Name of the group, such as its frequency."""
     n: int
-    """Number of values."""
     mean: float | None
     """None without values."""
     sd: float | None
@@ -119,7 +116,7 @@ def _select_finite_values(values: Sequence[float | None]) -> FloatArray:
 
 
 def _summarise_group(name: str, sample: FloatArray) -> GroupSummary:
-    """Summarise a group's values (n,); mean None below one value, standard deviation None below two."""
+    """Summarise a group's values (n,)."""
     return GroupSummary(
         name=name,
         n=len(sample),

@@ -7,7 +7,7 @@ Two groups differ significantly when their comparison intervals are disjoint: ex
 approximately for unequal ones. The intervals are NOT confidence intervals of the means.
 
 Source: Y. Hochberg, A. C. Tamhane, Multiple Comparison Procedures (1987), equation 3.32; C. Y. Kramer,
-Biometrics 12 (1956), 307-310. Called by `study_analysis`.
+Biometrics 12 (1956), 307-310.
 """
 
 import itertools
@@ -43,7 +43,6 @@ class ComparisonInterval:
     """A group's mean and its comparison interval, which is not a confidence interval."""
 
     name: str
-    """Name of the group."""
     mean: float
     lower: float
     upper: float

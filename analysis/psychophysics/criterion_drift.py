@@ -7,7 +7,6 @@ of freedom nu (P. McCullagh, J. A. Nelder, Generalized Linear Models, 2nd ed. (1
 nu = 3, too few for a precise estimate. A session's dispersion is therefore moderated by the dispersion s0 of all
 sessions of the study, with d0 prior degrees of freedom (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article
 3): (chi squared + d0 s0) / (nu + d0). Above 1 it is an estimate, and the slope is tested by Student's t; else by z.
-Called by `study_warnings`.
 """
 
 import math
@@ -36,8 +35,7 @@ MIN_RUNS = 4
 """Smallest number of runs with a criterion. With a run left out (`p_without_a_run`), three remain; a line fits two
 points exactly."""
 PRIOR_DEGREES_OF_FREEDOM = 6
-"""Prior degrees of freedom of the dispersion of all sessions (d0 of Smyth), chosen by hand. A session of five runs has
-3 of its own."""
+"""Prior degrees of freedom of the dispersion of all sessions (d0 of Smyth), chosen by hand."""
 
 _RegressionPoint = tuple[float, float, float]
 """A run: number of trials before its middle, criterion c, and weight (inverse of the criterion's binomial variance)."""

@@ -1,8 +1,8 @@
 """The declared (preregistered) result: contrast, sample and exclusions that the protocol fixed before data collection.
 
 The contrast is the threshold at one frequency minus that at another, by two analyses: the hierarchical model of all
-answers (dB, t interval over participants) and the published one-way analysis (N, Tukey's interval). The protocol states
-which is primary; both are reported. Called by `analysis.psychophysics.study_analysis`.
+answers (dB, t interval over participants) and the published one-way analysis (N, Tukey's interval). The protocol may
+state which is primary; both are reported.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ class ContrastResult:
     """Whether this analysis is the declared primary one."""
     unit: Literal["dB", "N"]
     participants: tuple[int, int]
-    """Number of participants at the first and at the second frequency."""
+    """Number at the first and at the second frequency; for the hierarchical model the same number twice."""
     difference: float | None
     """In `unit`, as the interval. Difference, interval and p are None where the data do not determine them; `notes`
     state the reason."""

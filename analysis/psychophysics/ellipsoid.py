@@ -10,8 +10,7 @@ Two definitions, both for a sinusoidal force of constant amplitude along a test 
   lock-in. Noise averages out, harmonics are excluded, and a phase difference between axes widens the ellipse.
 
 Frame: first axis = test direction; third = the device axis most nearly perpendicular to it, made perpendicular;
-second = third x first. For a direction in a plane of device axes the first two axes span that plane. Called by
-`study.workflows.results.analyze_data` and `study.evaluation.reproduction.reproduce_paper`.
+second = third x first. For a direction in a plane of device axes the first two axes span that plane.
 """
 
 import math
@@ -26,7 +25,8 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 MOST_HARMONICS = 5
-"""Largest number of harmonics that are fitted, the fundamental included; only those below half the sample rate are."""
+"""Largest number of harmonics that are fitted, the fundamental included; of the others only those below half the sample
+rate are."""
 ORTHONORMALITY_TOLERANCE = 1e-3
 """Largest error of an entry of R R' against the identity, R a rotation: allows entries written with three digits.
 Chosen."""
@@ -81,7 +81,6 @@ class EllipsoidResult:
     along: str
     """Name of the test direction."""
     amplitude_n: float
-    """Amplitude of the commanded force (N)."""
     moments: MomentEllipsoid
     phasor: PhasorEllipse
 

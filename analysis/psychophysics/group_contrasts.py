@@ -6,8 +6,7 @@ values is 0 where both have the same variance. Values are thresholds, or pseudo-
 
 Sources: S. Holm, Scand. J. Stat. 6 (1979), 65-70; D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987), 657-680 (two
 one-sided tests); E. J. G. Pitman, Biometrika 31 (1939), 9-12 and W. A. Morgan, Biometrika 31 (1939), 13-19 (equal
-spread of paired values). Called by `study_analysis`, `hierarchy.primary` and the simulated studies of `power`;
-`hierarchy.inference`, `tobit` and `cues.cue_findings` call single functions.
+spread of paired values).
 """
 
 import math
@@ -54,7 +53,7 @@ class Contrast:
     """Mean over standard deviation of the differences (Cohen's d_z); None where some of them rest on answers at other
     frequencies only."""
     p_equivalence: float | None
-    """p value of two one-sided tests against +-`EQUIVALENCE_DB`; None above `EQUIVALENCE_UP_TO_HZ`."""
+    """p value of two one-sided tests against +-`EQUIVALENCE_DB`; None if either is above `EQUIVALENCE_UP_TO_HZ`."""
     p_spread: float | None
     """p value of Pitman and Morgan's test: equal variance between people at both frequencies. None below three
     participants, where the sums of all participants are equal, and where `effect_size` is None."""

@@ -3,8 +3,7 @@ Friedman's rank test.
 
 Every participant is tested at every frequency (condition), so that differences between participants are removed from
 the error term: F = (SS_conditions / (k - 1)) / (SS_error / ((n - 1) (k - 1))) for n participants and k conditions.
-Participants with a missing value are left out. Called by `study_analysis` and by the primary analysis
-(`hierarchy.primary`).
+Participants with a missing value are left out.
 
 Sources: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
 Psychol. Methods 8 (2003), 434-447 (generalized eta squared); H. Huynh, L. S. Feldt, J. Educ. Stat. 1 (1976), 69-82;
@@ -74,7 +73,6 @@ class RepeatedMeasures:
     left_out: tuple[str, ...]
     """Participants with a missing value."""
     conditions: int
-    """Number of conditions, k."""
     df_conditions: int | None
     """k - 1."""
     df_error: int | None
@@ -89,7 +87,7 @@ class RepeatedMeasures:
     epsilon: float | None
     """Epsilon of Greenhouse and Geisser: 1 under sphericity, at least 1 / (conditions - 1)."""
     p: float | None
-    """p-value with both degrees of freedom multiplied by epsilon: the p-value to report."""
+    """p-value with both degrees of freedom multiplied by epsilon."""
     p_lower_bound: float | None
     """p-value with the smallest possible epsilon, 1 / (conditions - 1)."""
     partial_eta_squared: float | None
@@ -102,7 +100,7 @@ class RepeatedMeasures:
     p_huynh_feldt: float | None = None
     """p-value with both degrees of freedom multiplied by that epsilon."""
     mauchly_w: float | None = None
-    """W of Mauchly's test: 1 under sphericity. None where `compute_mauchly_test` returns None."""
+    """W of Mauchly's test: 1 under sphericity. Also None where `compute_mauchly_test` returns None."""
     mauchly_p: float | None = None
     """p-value of Mauchly's test; small where sphericity is violated."""
 

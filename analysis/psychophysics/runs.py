@@ -1,8 +1,6 @@
 """Recompute the runs of a study from the recorded answers, and check the recorded levels against them.
 
-The rule of the protocol (`protocols.procedure.staircase`: staircase or Psi) is replayed with the recorded answers. A
-level that differs from the replayed one, or a missing, doubled or surplus trial, raises InconsistentTrialsError. Called
-by `study_analysis`, `thresholds` and `detection`.
+The rule of the protocol (`protocols.procedure.staircase`: staircase or Psi) is replayed with the recorded answers.
 """
 
 import itertools
@@ -37,9 +35,7 @@ class Run:
     """One run (staircase or Psi) of one participant at one frequency."""
 
     subject: str
-    """Code of the participant."""
     session: str
-    """Identifier of the session."""
     run: int
     """Number of the run in its session."""
     frequency_hz: float
@@ -68,8 +64,8 @@ def recompute_runs(
     follow no staircase: a caller who passes TRAINING must leave them out of `trials` (see `study_analysis`).
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
-    answers before it lead to, a run has two frequencies, an answer has no `correct`, a catch trial was not played at
-    the cap, or a row between others is missing, or one is doubled or too many.
+    answers before it lead to, or lies outside its roving range, a run has two frequencies, an answer has no `correct`,
+    a catch trial was not played at the cap, or a row between others is missing, or one is doubled or too many.
     """
     phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
     trials_by_run: dict[tuple[str, str, int], list[Trial]] = {}

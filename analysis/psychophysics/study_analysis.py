@@ -1,9 +1,9 @@
 """Complete analysis of a study's trials: thresholds, statistics and warnings.
 
-The published analysis (one-way ANOVA of reversal means between groups, with Tukey-Kramer comparisons) is reproduced and
-compared with analyses that fit the design: repeated measures, Friedman's test, and, as primary analysis, a hierarchical
-model of all answers. Equations and sources are in the modules that are called here. Levels are in N, contrasts in dB.
-Called by `study.workflows.results.analyze_data`, `study.workflows.views.view_session` and `reproduce_paper`.
+The published analysis (one-way ANOVA of the thresholds of runs between groups, with Tukey-Kramer comparisons) is
+reproduced and compared with analyses that fit the design: repeated measures, Friedman's test, and, as primary analysis,
+a hierarchical model of all answers. Equations and sources are in the modules that are called here. Begin at
+`analyse_study`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -118,7 +118,7 @@ class StudyAnalysis(SummaryDisplay):
     single_persons: SinglePersons | None
     """Each person's thresholds by maximum a posteriori; None where there is a hierarchical model, or no answer."""
     mean_contrasts: tuple[Contrast, ...]
-    """Differences of reversal means (dB) from the lowest frequency (of `primary`, if any), within participants."""
+    """Differences of runs' thresholds (dB) from the lowest frequency (of `primary`, if any), within participants."""
     tobit: tuple[Contrast, ...]
     """The same contrasts by a Tobit model (sensitivity analysis); empty where `compute_tobit_contrasts` gives none."""
     declaration: str
@@ -220,8 +220,8 @@ def _fit_models(
 def _compute_mean_contrasts(
     thresholds: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
 ) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
-    """Compute the contrasts of the reversal means and of the Tobit model of them (dB); both empty without thresholds.
-    They use the frequencies of the primary model where it exists, so that all have the same reference frequency."""
+    """Compute the contrasts of runs' thresholds (dB) and of the Tobit model of them; both empty without runs. They use
+    the frequencies of the primary model where it exists, so that all have the same reference frequency."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
     table = tabulate_thresholds(thresholds, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:

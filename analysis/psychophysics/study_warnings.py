@@ -1,4 +1,4 @@
-"""Warnings about the results of a study, as sentences for its report. Called by `study_analysis`.
+"""Warnings about the results of a study, as sentences for its report.
 
 They cover runs without a threshold, thresholds censored by the cap, small or unequal samples, performance at chance,
 response bias and its drift, trials that were spoiled (void, presented again), flagged or not measured, lapses in catch
@@ -29,7 +29,7 @@ STRONG_BIAS = 0.6
 right answers by 0.04. An unbiased observer exceeds it by chance in about one of 250 complete runs."""
 BIAS_Z = 2.58
 """Standard errors by which a criterion must also differ from 0 (two-sided 1 % normal quantile): in unfinished runs of
-3 to 12 trials, one in ten of an unbiased observer exceeds `STRONG_BIAS`. From 45 trials on that is the stricter one."""
+3 to 12 trials, one in ten of an unbiased observer exceeds `STRONG_BIAS`."""
 DRIFT_LEVEL, LEAVE_ONE_OUT_LEVEL = 0.02, 0.2
 """Significance levels of the test for a drift of the criterion in a session: of all runs, and of the worst result with
 one run left out. Together they flag 3 of 1000 simulated sessions with a constant criterion, and 438 of
@@ -196,8 +196,8 @@ def _warn_of_bias(thresholds: Sequence[Threshold]) -> str:
 
 
 def _is_biased(run: Threshold, criterion: float) -> bool:
-    """Whether the magnitude of the criterion exceeds `STRONG_BIAS` and `BIAS_Z` standard errors, both directions having
-    been shown equally often."""
+    """Whether the magnitude of the criterion exceeds `STRONG_BIAS` and `BIAS_Z` standard errors, as if both directions
+    had been shown equally often."""
     n_each, correct = run.trials / 2.0, round(run.trials * (run.percent_correct or 0.0) / 100.0)
     return abs(criterion) > max(STRONG_BIAS, BIAS_Z * math.sqrt(compute_criterion_variance(correct, n_each, n_each)))
 

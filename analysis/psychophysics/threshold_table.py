@@ -1,7 +1,4 @@
-"""Table of thresholds by participant and frequency, the input of the analyses of variance; missing ones are gaps.
-
-`analysis.psychophysics.study_analysis` and `analysis.figures.study_pictures` call `tabulate_thresholds` with the rows
-of `thresholds`."""
+"""Table of thresholds by participant and frequency, the input of the analyses of variance; missing ones are gaps."""
 
 import math
 from collections.abc import Sequence

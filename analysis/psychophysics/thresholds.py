@@ -1,8 +1,7 @@
 """Threshold of each run: mean of its last reversal levels, or posterior mean of Psi, and whether the cap cut it.
 
 A run also has its response bias (d', criterion), counts of trials, and the threshold as measured acceleration and
-displacement. Runs are recomputed from the answers (`runs`). The rows are those of the table `thresholds.csv`. Called
-by `study_analysis`, `detection`, `study.workflows.results.session_results` and `figures.staircases`.
+displacement. Runs are recomputed from the answers (`runs`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -43,7 +42,6 @@ class Threshold:
     subject: str
     """Code of the participant."""
     frequency_hz: float
-    """Frequency of the stimulus (Hz)."""
     threshold_n: float | None
     """Arithmetic mean of the averaged reversal levels in newtons; for Psi, the posterior mean (taken in dB)."""
     threshold_db: float | None
@@ -52,19 +50,16 @@ class Threshold:
     """Whether the cap cut into the threshold (`is_censored`; Psi: `CUT_PROBABILITY`). The value is then no bound: the
     true threshold may lie above or below it."""
     reversals: int
-    """Number of reversals of the run."""
     trials: int
     """Number of answered trials that count, without catch trials."""
     cap_reversals: int
     """Number of averaged reversals that are peaks at the cap; 0 for Psi."""
     trials_at_cap: int
-    """Number of trials answered at the cap."""
     pushes_against_cap: int
     """Number of times the up-down rule asked for a level above the cap."""
     complete: bool
     """Whether the run has a threshold by its rule."""
     session: str
-    """Identifier of the session."""
     run: int
     """Number of the run in its session."""
     percent_correct: float | None
@@ -76,8 +71,8 @@ class Threshold:
     spoiled_trials: int
     """Number of spoiled presentations, without those of catch trials."""
     threshold_mps2: float | None
-    """Mean measured acceleration amplitude along the direction (m/s²) in the trials of the averaged reversals; for Psi,
-    in the last trials, each scaled in proportion to the threshold."""
+    """Mean measured acceleration amplitude along the direction (m/s²) in the trials of the averaged reversals, scaled
+    in proportion to the staircase's level; for Psi, in the last trials, scaled to the threshold."""
     threshold_mm: float | None
     """Mean measured displacement amplitude (mm) in the same trials."""
     measured_reversals: int

@@ -14,7 +14,7 @@ the cap are biased low even in uncensored runs. The model therefore removes only
 holds the coverage that its intervals reach in simulations.
 
 Sources: J. Tobin, Econometrica 26 (1958), 24-36; quadrature: J. C. Pinheiro, D. M. Bates, J. Comput. Graph. Stat. 4
-(1995), 12-35. Called by `analysis.psychophysics.study_analysis`.
+(1995), 12-35.
 """
 
 import math

@@ -1,9 +1,8 @@
 """Comparison of the published and the primary analysis as text for reports.
 
-The published analysis is a one-way analysis of variance of reversal means with Tukey's comparisons; the primary
+The published analysis is a one-way analysis of variance of the thresholds of runs with Tukey's comparisons; the primary
 analysis is the hierarchical model of all answers. The text states which analysis the protocol declared, where estimates
 differ by 1 dB or more, where significance at the 5 % level differs, and the measured coverage near the cap.
-Called by `analysis.psychophysics.study_analysis`, the tables of `analysis.reports` and `study.cli.protocol`.
 """
 
 from collections.abc import Sequence
@@ -29,12 +28,10 @@ NOTHING_DECLARED_NOTE = (
     "first because the cap distorts it least; a choice made after the data were seen is not a "
     "declaration."
 )
-"""Sentence where the protocol declares nothing."""
 NEAR_CAP_WARNING = (
     "Near the cap the published intervals do not have their stated coverage, and the published 'not significant' is "
     "weak evidence."
 )
-"""Sentence where the cap cut thresholds."""
 
 
 _ANALYSIS_NOUNS = {
@@ -132,7 +129,7 @@ def describe_comparison(
 
 
 def describe_measured_coverage(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """Describe the measured coverage of the intervals of these analyses (names of `coverage_words.INTERVAL_TITLES`).
+    """Describe the measured coverage of the intervals of these analyses (keys of `coverage_words.INTERVAL_TITLES`).
     Empty where neither the cap nor the trial limit affected a threshold, and for a rule other than `SIMULATED_RULE`."""
     if not table.coverage_warning or rule != SIMULATED_RULE:
         return ()

@@ -2,7 +2,7 @@
 
 Wrong answers come first, each with the concealed effects and the diagnosis; then the scores with 95 % intervals, the
 further experiments on ambiguous answers, the controls, figures, and the method. `analysis.evaluation.blind_test`
-computes the scores. Called by `study.evaluation.bank.write_proof`.
+computes the scores.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,9 +45,8 @@ class BlindTestMetadata:
     labels_sha256: str
     """SHA-256 of labels.sha256, the file with the hashes of the labels."""
     commit: str
-    """Hash of the source code's commit."""
     engines: tuple[str, ...]
-    """Versions of the code of the diagnosis."""
+    """Digests of the source code of the diagnosis."""
     remarks: tuple[str, ...]
     """Sentences for the banner of the report."""
     controls: tuple[ControlOutcome, ...] = ()

@@ -4,7 +4,6 @@ The experiment asks for the direction of a vibration. The device may deliver the
 amplitudes, harmonics or motion across the direction, and a participant may answer by such a difference instead. Two
 tables with a row per cue and frequency: the sensitivity d' that the cue alone would give (`cue_sensitivity`), and
 whether the answers depended on the cue (`answers_on_delivery`, logistic regression).
-Called by `analysis.reports.study_report`.
 """
 
 from collections.abc import Sequence
@@ -24,13 +23,12 @@ _INTRODUCTION = (
     "direction (coupling). Each is in dB; harmonics and motion across count by the most that they can add to the "
     "amplitude."
 )
-"""First paragraph of the section."""
 
 
 def make_cue_sections(findings: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
-    """Make the section on cues other than the direction; empty where no trial was measured. findings: a finding per cue
-    and frequency. gaps: trials without a measurement of a cue. rule: the staircase rule, which determines a note on d'
-    of the answers."""
+    """Make the section on cues other than the direction; empty without findings. findings: one per cue and frequency.
+    gaps: trials without a measurement of a cue. rule: the staircase rule, which determines a note on d' of the
+    answers."""
     if not findings:
         return []
     sentences = (
@@ -65,8 +63,7 @@ def _describe_no_cue(findings: Sequence[CueFinding]) -> str:
 
 
 def _tabulate_sensitivity(findings: Sequence[CueFinding], d_prime_note: str) -> Table:
-    """Tabulate d' by each cue alone, a row per cue and frequency. d_prime_note: sentence on the d' of the answers that
-    the staircase keeps."""
+    """Tabulate d' by each cue alone, a row per cue and frequency. d_prime_note: sentence on the d' of the answers."""
     return Table(
         caption="Sensitivity that each cue alone would give",
         header=(

@@ -1,8 +1,7 @@
 """First section of a study report: the contrast declared in the protocol, by both analyses, with sample and exclusions.
 
 The section shows the result that was fixed before the data were collected (`declared_result`), so that a reader can
-distinguish it from results chosen afterwards. Called by `analysis.reports.study_report`;
-`study.workflows.results.analyze_data` shows the sentences of `describe_declared` alone.
+distinguish it from results chosen afterwards.
 """
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult

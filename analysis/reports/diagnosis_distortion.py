@@ -1,6 +1,4 @@
-"""Report sections on nonlinear distortion by channel, input and level, measured without a model.
-
-Called by `analysis.reports.diagnosis_report`; the distortions are those of `diagnosis.localisation.distortion`."""
+"""Report sections on nonlinear distortion by channel, input and level, measured without a model."""
 
 from collections.abc import Mapping, Sequence
 

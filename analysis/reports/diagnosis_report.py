@@ -2,7 +2,6 @@
 
 This module decides the sections and their order; most sentences come from `analysis.diagnosis`, tables from
 `diagnosis_tables`, the section on distortion from `diagnosis_distortion`, that on the method from `diagnosis_method`.
-Called by `study.workflows.diagnosis.write_diagnosis`.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,7 @@
 """Tables of a diagnosis report: parameters, rivals and candidates of the missing physics, model errors, mismatches.
 
 Errors are given for the model as given, for the model with re-tuned parameters, and for the model with the effects that
-were found, each on the fitted and on held-out data. Called by `analysis.reports.diagnosis_report`, which
-arranges the tables.
+were found, each on the fitted and on held-out data.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +25,6 @@ _SHARE_NOTE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
     "is named, the share of the mismatch's power that occurs in it."
 )
-"""Note below a table of mismatches."""
 _PART_NAMES: Mapping[str, str] = {"fit": "the fitted data", "test": "held-out data"}
 """Name of each part of the data in captions and rows, by its key."""
 

@@ -1,8 +1,7 @@
 """HTML report of an identified device: measured transfer functions, resonances, fitted state-space model and its order.
 
 The responses map commanded forces (N) to accelerations of the handle (m/s²). The figures are laid out as the published
-figures 1 (frequency bands) and 4 (transfer functions); a third shows the held-out error of each model order. Called by
-`study.workflows.equalizer.report_identification`, which computes the findings.
+figures 1 (frequency bands) and 4 (transfer functions); a third shows the held-out error of each model order.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +34,6 @@ class IdentificationFindings:
     estimate: FrequencyResponse
     """Frequency response estimated from the recordings, m/s² per N."""
     model: IdentifiedModel
-    """State-space model fitted to the estimate."""
     resonances: tuple[Resonance, ...]
     """Resonances of the estimate; empty where none was found."""
     onset: CouplingOnset

@@ -1,8 +1,7 @@
 """HTML report of recordings before any model is fitted: per recording its checks, channels, segments and figures.
 
-A banner counts the checks with the level "wrong" and quotes the first. `analysis.look.overview` computes the checks and
-summaries; here they become tables. Called by `study.workflows.recording.look_at_recordings` (the page) and
-`study.cli.look` (`summarise_overview`, for the terminal).
+`render_look_report` makes the page from the checks and summaries of `analysis.look.overview`; a banner counts the
+checks with the level "wrong" and quotes the first.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +22,7 @@ def render_look_report(
 ) -> str:
     """Render the page about recordings as HTML. pictures_by_recording: the pictures of each recording in the order of
     the overviews, from `make_recording_pictures`. provenance: versions and inputs by name. generated: local time of the
-    report. The summary quotes at most three recordings."""
+    report."""
     wrong_checks = [
         (overview.name, check) for overview in overviews for check in overview.checks if check.level == "wrong"
     ]
@@ -72,8 +71,7 @@ def summarise_overview(overview: Overview) -> str:
 def _make_recording_sections(
     overview: Overview, pictures: Sequence[Picture], all_overviews: Sequence[Overview]
 ) -> tuple[Section, ...]:
-    """Make the sections of one recording: checks, channels, and pictures with the table of segments. Headings name the
-    recording where the page shows several."""
+    """Make the sections of one recording, with its name in the headings where the page shows several."""
     title_suffix = f" of {overview.name}" if len(all_overviews) > 1 else ""
     return (
         Section(f"Checks{title_suffix}", tables=(_make_check_table(overview.checks),)),
@@ -83,13 +81,13 @@ def _make_recording_sections(
 
 
 def _make_check_table(checks: Sequence[Check]) -> Table:
-    """Make the table of the checks: name, level, finding and advice."""
+    """Make the table of the checks."""
     rows = tuple((check.name, check.level, check.finding, check.advice) for check in checks)
     return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
 
 def _make_channel_table(overview: Overview) -> Table:
-    """Make the table of range, mean, rms about the mean and number of missing samples of each channel, in its unit."""
+    """Make the table of the statistics of each channel, in its unit."""
     header = ("Channel", "Quantity", "Unit", "Lowest", "Highest", "Mean", "Rms about it", "Missing")
     rows = tuple(
         (
@@ -108,9 +106,8 @@ def _make_channel_table(overview: Overview) -> Table:
 
 
 def _make_segment_table(overview: Overview) -> Table:
-    """Make the table of the segments with start and length (s, or samples where the recording has no time axis), period
-    (samples; empty where not periodic) and the rms of each channel; folded with more than 12 rows, which keeps a page
-    readable."""
+    """Make the table of the segments. Start and length are in s, or in samples where the recording has no time axis;
+    the period in samples, empty where not periodic."""
     header = (
         "Segment",
         "Role",

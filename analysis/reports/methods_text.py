@@ -1,7 +1,7 @@
 """Methods section of a study report: task, stimulus, schedule, levels, threshold and statistics as paragraphs.
 
-The text is generated from the protocol, so that its numbers are those of the study. Sources of the methods are in the
-modules of `analysis.psychophysics` and in docs/statistics.md. Called by `study_report` and `supplementary_tables`.
+`compose_methods_text` generates the text from the protocol. Sources of the statistical methods are in
+docs/statistics.md.
 """
 
 from analysis.psychophysics.thresholds import CUT_PROBABILITY
@@ -48,12 +48,12 @@ _STATISTICS_PARAGRAPH = (
     "and the Huynh-Feldt correction, and Friedman's test on ranks. Thresholds that the cap cut enter as plain numbers; "
     "intervals and effect sizes that include them have no stated coverage."
 )
-"""Paragraph on the statistical analyses, the same for every study."""
+"""The same for every study."""
 _SENSITIVITY_SENTENCE = (
     "Sensitivity d' and criterion are those of one-interval identification over all trials of a run, with the "
     "log-linear correction; the criterion is positive for a bias towards the answer 2."
 )
-"""Sentence on the measures of sensitivity and response bias of a run."""
+"""Last sentence on the threshold, for staircases and for Psi."""
 
 
 def compose_methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
@@ -72,8 +72,7 @@ def compose_methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
 
 
 def _describe_task(protocol: StudyProtocol) -> str:
-    """Describe the directions, the answer, feedback, void trials and swapped numbers. The two directions are at
-    45 degrees to either side of the line of symmetry."""
+    """Describe the directions, the answer, feedback, void trials and swapped numbers."""
     trial, directions = protocol.trial, protocol.directions
     first_angle, second_angle, symmetry_angle = (
         typeset(f"{directions.symmetry_deg + offset_deg:g}") for offset_deg in (45, -45, 0)

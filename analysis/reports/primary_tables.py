@@ -1,9 +1,8 @@
 """Section of a study report on the primary analysis, a hierarchical psychometric model of all answers.
 
-Tables: median thresholds by frequency, contrasts between frequencies, likelihood thresholds of single runs, estimates
-per person, and goodness of fit. Forces are in N, level differences in dB. `psychophysics.hierarchy.primary` computes
-the values, this module formats them. Called by `study_report`; `study.workflows.results.analyze_data` uses two of its
-formatters for the terminal.
+Tables: median thresholds by frequency, contrasts between frequencies, likelihood thresholds of single persons,
+estimates per person, and goodness of fit. Begin with `make_primary_section`. This module only formats; the values come
+from `analysis.psychophysics`.
 """
 
 import math
@@ -30,18 +29,17 @@ INTRODUCTION = (
     "likelihood. Threshold: the level at which an attentive answer without a bias towards one direction is right in "
     "79.37 %."
 )
-"""Introduction of the section on the model of all answers."""
 RUN_NOTE = (
     "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the model. "
     "Above the cap, or below the levels played (right answers only): no size, a one-sided bound."
 )
-"""Note below the thresholds of single runs, where the model of all answers was fitted."""
+"""Note below the thresholds of single persons, where the model of all answers was fitted."""
 SINGLE_RUN_NOTE = (
     "From the answers at this frequency alone. What a run does not determine is averaged over typical participants: "
     "slopes within a factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels "
     "played (right answers only): no size, a one-sided bound."
 )
-"""Note below the thresholds of single runs, where the model of all answers could not be fitted."""
+"""Note below the thresholds of single persons, where there is no model of all answers."""
 CAP_NOTE = "* (†): first (second) median above the cap; the interval has only its lower (upper) end; with both, none."
 """Note below the contrasts by the model, where a median is above the cap."""
 TOBIT_NOTE = (
@@ -52,8 +50,8 @@ TOBIT_NOTE = (
 
 
 def make_primary_section(analysis: StudyAnalysis) -> Section:
-    """Make the section on the model of all answers: medians, contrasts, runs, persons and goodness of fit. Without that
-    model, the section holds the thresholds by likelihood of single persons, or the reason why there are none."""
+    """Make the section on the model of all answers; without that model, on the thresholds by likelihood of single
+    persons, or on the reason why there are none."""
     primary, means = analysis.primary, analysis.mean_contrasts
     if primary is None:
         return _make_single_section(analysis)
@@ -133,7 +131,7 @@ def describe_far_above(primary: PrimaryAnalysis) -> str:
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
     """Describe the standard deviations between persons whose search ended at its upper bound: sentences with a leading
-    space; else empty. With few persons, slopes of 2 and of 20 are almost equally likely."""
+    space; empty without any."""
     sds = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
     quantity_names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
     undetermined = [
@@ -232,7 +230,7 @@ def _make_contrast_table(
 
 
 def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
-    """Make the folded table of the maximum-likelihood thresholds (N) of single runs. confidence: 0 to 1."""
+    """Make the folded table of the maximum-likelihood thresholds of single persons by frequency. confidence: 0 to 1."""
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
         header=("Participant", "Frequency", "Trials", "Threshold", f"{100 * confidence:g} % likelihood interval"),
@@ -243,7 +241,8 @@ def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tup
 
 
 def format_run(run: RunLikelihood) -> tuple[str, str]:
-    """Format threshold and likelihood interval of a run (N), one-sided without one end, `MISSING` without both."""
+    """Format a person's threshold at a frequency and its likelihood interval (N): one-sided without one end, `MISSING`
+    without both."""
     lower_n, upper_n = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)
     if run.below:
         threshold_text = "below the levels played"
@@ -257,7 +256,7 @@ def format_run(run: RunLikelihood) -> tuple[str, str]:
 
 
 def _make_person_table(primary: PrimaryAnalysis) -> Table:
-    """Make the folded table of the model's estimates per person: thresholds (N), slope, criterion (units of d')."""
+    """Make the folded table of the model's estimates per person; the criterion is in units of d'."""
     return Table(
         caption="Thresholds of the participants by the model (N)",
         header=("Participant", *(f"{hz:g} Hz" for hz in primary.frequencies_hz), "Slope", "Criterion"),

@@ -2,8 +2,7 @@
 an injected effect.
 
 Per recording: verdict, named effects, fitted parameters, errors on held-out data, and the objections an expert may
-raise. Called by `study.evaluation.real.write_real`; `real_folder` makes `UnusableInput`, and `real_summary` uses
-`VERDICT_WORDS`.
+raise. Begin with `render_real_report`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,12 +25,12 @@ VERDICT_WORDS = {
     "unexplained": "unexplained",
     "refused": "refused",
 }
-"""Words for the verdict, by its value in `RealAnswer.verdict`."""
+"""Words for the verdict, by `RealAnswer.verdict`."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnusableInput:
-    """A folder of recordings that could not be used; made by `study.evaluation.real.real_folder`."""
+    """A folder of recordings that could not be used."""
 
     location: str
     """Name of the sub-folder, or of the folder itself where it has no sub-folders."""
@@ -78,8 +77,8 @@ def render_real_report(
 
 
 def make_overview_table(answers: Sequence[RealAnswer]) -> Table:
-    """Make the table of all recordings: verdict, named effects, held-out errors of each model as shares of the signal,
-    and duration of the diagnosis in s."""
+    """Make the table of all recordings: verdict, named effects, held-out errors as shares of the signal, and duration
+    of the diagnosis in s."""
     header = (
         "recording",
         "verdict",
@@ -133,9 +132,7 @@ def _describe_unusable_inputs(unusable_inputs: Sequence[UnusableInput]) -> str:
 
 
 def _make_recording_section(real_answer: RealAnswer, picture: Picture | None) -> Section:
-    """Make the section of one recording: title, verdict, model, error measure and what remains as paragraphs; location
-    of the mismatch, named effects, parameters, a change of the device, candidates, further tests, remarks and
-    objections as a list; errors by stretch as a table. The picture is shown only where it has rows of errors."""
+    """Make the section of one recording. The picture is left out where the answer has no rows of errors to draw."""
     points = (
         *real_answer.where,
         *real_answer.named,
@@ -184,8 +181,8 @@ def _make_stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
 
 
 def describe_parameter(parameter: OwnParameter) -> str:
-    """Describe a fitted parameter of the model in a sentence, with its 95 % interval where both ends are known and,
-    where its value is known by other means, with its deviation from it in %, which a known value of 0 does not have."""
+    """Describe a fitted parameter of the model in a sentence, with its 95 % interval where both ends are known and with
+    the value known by other means, if any; the deviation in % is left out where that value is 0."""
     interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
     value_text = (
         f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after the last fit"
@@ -220,8 +217,7 @@ def _describe_pair(pair: PairOutcome | None) -> tuple[str, ...]:
 
 
 def _list_further_tests(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
-    """List the arguments of `_describe_further_test` for each further test: recording, error measure, errors of the
-    re-tuned model and of the model with the named effects, and problem."""
+    """List the arguments of `_describe_further_test` for each further test."""
     return [(test.recording, test.error, test.retuned, test.after, test.problem) for test in real_answer.further]
 
 
@@ -237,7 +233,7 @@ def _describe_further_test(recording: str, error: str, retuned: float | None, af
 
 
 def _format_recording_title(real_answer: RealAnswer) -> str:
-    """Format the title of a recording: folder and name, or the name alone where both are the same."""
+    """Format folder and name of a recording, or the name alone where both are the same."""
     return (
         real_answer.recording
         if real_answer.recording == real_answer.folder

@@ -1,9 +1,7 @@
 """HTML report of the reproduction of the five published figures on a simulated omega.3.
 
 Per figure: what the paper states, what came out here, whether both agree by a stated rule, and what differs in the
-method. The errors of the identified models come first, because the results depend on them; figure 5 has tables of
-flatness, coupling and axis error of the played accelerations. `analysis.evaluation.reproduction` computes the findings;
-`study.evaluation.reproduction.write_reproduction` calls this module.
+method. `analysis.evaluation.reproduction` computes the findings; `render_reproduction_report` formats them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,10 +17,9 @@ BANNER = (
     "omega.3. It shows only that the methods run from end to end, and which results they give on a device of this "
     "kind."
 )
-"""Warning at the top of the page."""
 
 _AGREEMENT_WORDS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
-"""Text for whether a finding is as published; None: not compared."""
+"""Text by `Finding.as_published`; None: not compared."""
 
 _MEASURE_HEADINGS = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
 """Column headings of the values of `_format_measures`."""
@@ -32,7 +29,6 @@ _MODEL_NOTE = (
     "not see. Expected: with the misfit to the fitted lines and the scatter that their noise leaves; never below the "
     "held-out error."
 )
-"""Note below the table of model errors."""
 _ROW_NOTES = (
     "Over every line of the band, worst axis: flatness is the largest deviation from the target level; coupling the "
     "largest off-axis response over that along the axis; axis error the largest angle between the target axis and what "
@@ -89,7 +85,7 @@ def summarise_figures(reproduction: Reproduction) -> tuple[str, ...]:
 
 
 def _make_model_sections(reproduction: Reproduction) -> list[Section]:
-    """Make the section on the models' errors, placed before the results that depend on them; empty without models."""
+    """Make the section on the errors of the identified models; empty without models."""
     if not reproduction.models:
         return []
     rows = tuple(
@@ -132,8 +128,7 @@ def _make_overview_section(reproduction: Reproduction) -> Section:
 
 
 def _make_figure_section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[Table, ...]) -> Section:
-    """Make the section on one figure: what was published, differences in the method, pictures, the given tables, and
-    the remarks."""
+    """Make the section on one figure; the table of its remarks follows the given tables."""
     return Section(
         f"Figure {figure.figure}: {figure.title}",
         paragraphs=(

@@ -1,10 +1,7 @@
 """Report of a psychophysical study as one self-contained HTML page.
 
-This module decides which sections the page has and in which order: declared contrast, quality of the device model,
-warnings, thresholds and their comparison, detection, catch and practice trials, delivered stimuli, cues, acceleration
-ellipses, single runs, methods. The tables come from `study_tables`, `primary_tables` and `supplementary_tables`, the
-statistics from `analysis.psychophysics.study_analysis`; no statistic is computed here. Called by
-`study.workflows.results.analyze_data`.
+`render_study_report` decides which sections the page has and in which order. The tables come from `study_tables`,
+`primary_tables` and `supplementary_tables`, the statistics from `analysis.psychophysics.study_analysis`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +40,7 @@ _BANNER_BY_POPULATION = {
     Population.NOT_FELT: "Nothing was felt: people answered while a simulated device moved nothing. These numbers are "
     "a rehearsal and must not be used as measurements of people.",
 }
-"""Banner at the top of the page, by kind of respondents; empty where people felt the stimuli."""
+"""Banner by kind of respondents; empty where people felt the stimuli."""
 
 
 def render_study_report(
@@ -110,16 +107,14 @@ def _summarise_detection_runs(analysis: StudyAnalysis) -> str:
 
 
 def _make_declared_sections(analysis: StudyAnalysis) -> list[Section]:
-    """Make the section on the declared (preregistered) contrast, the first of the report; empty where the protocol has
-    no test frequencies."""
+    """Make the section on the declared (preregistered) contrast; empty where the protocol has no test frequencies."""
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
     return [make_declared_section(analysis.declaration, analysis.declared_result)]
 
 
 def _make_model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
-    """Make the section on the quality of the models that converted accelerations to forces, placed before all values
-    that depend on them; empty without models."""
+    """Make the section on the quality of the models that converted accelerations to forces; empty without models."""
     if not qualities:
         return []
     points = tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities)

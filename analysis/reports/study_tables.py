@@ -1,8 +1,7 @@
 """Tables of the report of a threshold study: thresholds, one-way ANOVA, Tukey-Kramer pairs, tests within participants,
 runs, and acceleration ellipses.
 
-This module only formats values as text; tests and effect sizes are computed in `analysis.psychophysics.study_analysis`,
-ellipses in `analysis.psychophysics.ellipsoid`. Forces are in N, levels in dB re 1 N. Called by `study_report`.
+This module only formats values as text; `analysis.psychophysics` computes them.
 """
 
 from collections.abc import Callable, Sequence
@@ -138,8 +137,8 @@ def make_one_way_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_pair_table(analysis: StudyAnalysis) -> Table:
-    """Make the table of all pairs of frequencies: difference of the means (second minus first, N), simultaneous
-    interval and p value."""
+    """Make the table of pairs of frequencies: difference of the means (second minus first, N), simultaneous interval
+    and p value."""
     comparisons = analysis.comparisons
     confidence_text = f"{100 * comparisons.confidence:g} %"
     return Table(
@@ -260,17 +259,16 @@ def _format_threshold(row: Threshold) -> str:
 
 
 def _format_repeats(row: Threshold) -> str:
-    """Format number and percentage of the presentations that the participant made void; "0" without any; "!" where they
-    are frequent (`VOID_LIMITS_TEXT`)."""
+    """Format number and percentage of the presentations that the participant made void, with "!" where they are
+    frequent (`VOID_LIMITS_TEXT`)."""
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"
 
 
 def make_ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
-    """Make the table of acceleration ellipses: ratio of the axes and tilt (degrees), from second moments and from
-    phasors at the driven frequency; ratio of off-axis to on-axis acceleration; energy of the harmonics in % of that of
-    the fundamental."""
+    """Make the table of acceleration ellipses: ratio of the axes and tilt, from second moments and from phasors at the
+    driven frequency; off-axis over on-axis acceleration; energy of the harmonics in % of that of the fundamental."""
     return Table(
         caption="Acceleration ellipses",
         header=(

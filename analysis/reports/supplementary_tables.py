@@ -1,8 +1,7 @@
 """Supplementary tables of a study report: detection, delivered acceleration, catch trials and practice.
 
-They supplement the tables of direction thresholds. Detection thresholds: the level from which a vibration is felt at
-all. Delivered over requested acceleration: whether the stimulus was as intended. Catch trials: the participants'
-attention. A threshold is "cut" where the force cap limited it (censored). Called by `study_report`.
+Detection threshold: the level from which a vibration is felt at all, in contrast to that from which its direction is
+felt. A threshold is "cut" where the force cap limited it (censored).
 """
 
 from collections.abc import Iterator
@@ -47,8 +46,7 @@ def make_detection_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_detection_run_table(analysis: StudyAnalysis) -> Table:
-    """Make the folded (collapsed) table of all detection runs: thresholds (N), reversals (for staircases only), trials,
-    proportion correct (%), d' of two intervals, and criterion."""
+    """Make the folded (collapsed) table of all detection runs; only staircases have a column of reversals."""
     reversal_header = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
@@ -115,8 +113,7 @@ def make_catch_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_practice_table(analysis: StudyAnalysis) -> Table:
-    """Make the folded (collapsed) table of practice runs, with numbers of correct answers and the outcome: passed, not
-    passed or broken off."""
+    """Make the folded (collapsed) table of practice runs."""
     settings = analysis.protocol.practice
     return Table(
         caption="Practice runs",
@@ -150,8 +147,7 @@ def _format_detection_cells(
     analysis: StudyAnalysis, subject: str, frequency_hz: float, detection_n: float | None, is_detection_cut: bool
 ) -> Iterator[str]:
     """Format the cells of detection threshold, direction threshold and their ratio in dB; the ratio is `MISSING` where
-    either is missing or cut. detection_n: detection threshold (N), None = missing. is_detection_cut: whether it is
-    cut."""
+    either is missing or cut. detection_n: detection threshold (N), None = missing."""
     direction_n, is_direction_cut = _find_direction_threshold(analysis, subject, frequency_hz)
     yield mark_cut(detection_n, is_detection_cut)
     yield mark_cut(direction_n, is_direction_cut)

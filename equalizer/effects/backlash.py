@@ -2,7 +2,7 @@
 
 The moving mass along the driven axis is split: the motor becomes a separate body, which the command drives, and acts
 on the handle through a spring and a damper that only push. The gap and the displacement r of motor minus handle are in
-m (a rotation: rad). An entry of `catalogue`, which simulation and diagnosis look up by name.
+m (a rotation: rad). An entry of `catalogue`.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import estimate_spectral_density
 
 STEPS_PER_SAMPLE = 20
-"""Integration steps per sample, chosen because a contact lasts only about a millisecond."""
+"""Integration steps per sample, chosen because a contact with the defaults below lasts only about a millisecond."""
 MOTOR_SHARE, CONTACT_HZ, CONTACT_DAMPING_RATIO = 0.3, 300.0, 0.03
 """Defaults of parameters that a file leaves out: the motor's share of the moving mass; natural frequency (Hz) of the
 motor mass on the contact's spring; damping ratio of that oscillator. Chosen for a stiff, lightly damped contact."""
@@ -35,7 +35,7 @@ length (s) of each simulated excerpt; length (s) of a spectrum's window. Chosen.
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Compute the mean force (N) of the contact's spring and damper over the step, solved for implicitly; the contact
     never pulls. parameters: gap (m), stiffness (N/m), damping (N s/m). step_motion: motion of motor minus handle
-    (`instant`); the force at the step's end is written to it. memory is not used."""
+    (`instant`); under contact, the force at the step's end is written to it."""
     half_gap, stiffness, damping_over_step = 0.5 * parameters[0], parameters[1], parameters[2] / step_motion[STEP_S]
     for side in (1.0, -1.0):
         start_penetration, end_penetration = (

@@ -4,9 +4,8 @@
 
 The sample with time stamp t was taken at t (1 + ppm 1e-6): later than t for ppm > 0, by a clock that runs slow. A file
 may have been resampled from one clock to the other: `interpolated` is the share (0 to 1) of linear interpolation in the
-resampling; the rest is band-limited and does not change the spectrum. `with_position` is 1 where the position has the
-clock of the response and 0 where it has that of the commands. An entry of `catalogue`, which simulation and diagnosis
-look up by name.
+resampling, the rest being band-limited. `with_position` is 1 where the position has the clock of the response and 0
+where it has that of the commands. An entry of `catalogue`.
 """
 
 import numpy as np
@@ -43,7 +42,7 @@ def _apply_position_drift(position: FloatArray, sample_rate_hz: float, values: V
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find ppm from the slope of the response's time shift over time. Two sets of values, with band-limited and with
     linear interpolation, the better fit first: only linear interpolation lowers peaks. Empty where the slope is not
-    known, not significant or too large, and for a channel other than the first (the clock is common to all)."""
+    known, not significant or too large, and for a channel above 0 (the clock is common to all)."""
     shift_rate = _estimate_significant_shift_rate(evidence) if channel <= 0 else None
     if shift_rate is None:
         return ()
@@ -64,8 +63,7 @@ def _compute_misfit(evidence: Evidence, values: Values) -> float:
 
 def _detect_position_drift(evidence: Evidence, response_shift_rate: float) -> float:
     """Detect the clock of the measured position: 1 where it drifts as the response does, or where this cannot be
-    determined; 0 where its time shift is nearer to none, so that it has the clock of the commands. response_shift_rate:
-    s per s."""
+    determined; 0 where the slope of its time shift is nearer to 0. response_shift_rate: s per s."""
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
     position_noise = evidence.position_noise

@@ -3,8 +3,7 @@
     F = A sin(2 pi x / p + phase)        A in N, pitch p in m (a rotation: N m, rad)
 
 For starting values the pitch is found in the spectrum of the missing force over position, amplitude and phase by linear
-least squares. An effect of the catalogue (`equalizer.effects.catalogue`). Reference: Hanselman, Brushless Permanent
-Magnet Motor Design, chapter 5.
+least squares. An entry of `catalogue`. Reference: Hanselman, Brushless Permanent Magnet Motor Design, chapter 5.
 """
 
 import numpy as np
@@ -23,7 +22,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 TRAVEL_CELLS = 4096
-"""Number of cells into which the travel is divided, chosen by hand; pitches longer than four cells are found."""
+"""Number of cells into which the travel is divided, chosen by hand; pitches up to four cells are not found."""
 PITCH_COUNT = 3
 """Number of pitches that are tried, strongest peak of the periodogram first. Chosen by hand."""
 _ZERO_PADDING = 8
@@ -32,8 +31,8 @@ found. Chosen by hand."""
 _MIN_PERIODS = 2
 """Smallest number of periods over the travel: fewer cannot be distinguished from a nonlinear spring."""
 _ITERATIONS = 4
-"""Fixed-point iterations of the implicit step: each multiplies the error by the force's slope over the position times
-the step's motion per newton, below 1 unless a pitch is crossed within a step. Chosen by hand."""
+"""Fixed-point iterations of the implicit step. They converge where the amplitude, held over a step, moves the axis by
+less than 0.3 pitches. Chosen by hand."""
 
 
 @compile_law

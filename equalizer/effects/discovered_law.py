@@ -1,9 +1,8 @@
 """Discovered law as an effect: a formula that is added to the force at an axis, or replaces a command or a response.
 
-A law (`equalizer.laws.law`) is found in recordings (`analysis.diagnosis.discovery`) or written in a model file, and has
-no name in the vocabulary. This module binds the signals of its formula (x, vx, ax, fx, t, channel names) to the columns
-of a recording, compiles it, and derives the fit parameters p0, p1, … from their roles in the formula. Called by
-`placing`, `law_entry`, `command_sign`, the diagnosis, `analysis.evaluation.laws` and `equalizer.tracking.compensation`.
+A law (`equalizer.laws.law`) is found in recordings (`analysis.diagnosis.discovery`) or written in a model file.
+`make_law_effect` binds the signals of its formula (x, vx, ax, fx, t, channel names) to the columns of a recording,
+compiles it, and derives the fit parameters p0, p1, … from their roles in the formula.
 """
 
 import re
@@ -70,9 +69,8 @@ def make_law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     """Make the effect of a law, to be placed at the axis (force, command) or channel (response) that `law.axis` names.
     Its values are p0, p1, …
 
-    A formula names its signals by axis and quantity (x, vx, ax, fx; y, …) or by the recording's channel names. Where
-    the channel names do not end in x, y, z, these letters denote the axes in their order. The effect has no starting
-    values. Raises LawError for a signal that the recording lacks.
+    A formula names its signals by axis and quantity (x, vx, ax, fx; y, …; letters: `derive_axis_letters`) or by the
+    recording's channel names. The effect has no starting values. Raises LawError for a signal that the recording lacks.
     """
     action_makers: dict[str, Callable[[Law, Channels], Action]] = {
         "force": _make_force_action, "command": _make_command_action, "response": _make_response_action
@@ -152,7 +150,8 @@ def make_law_parameters(law: Law) -> tuple[Parameter, ...]:
 
 
 def _adds_to_signal(tree: Node) -> bool:
-    """Whether the formula is the signal itself plus terms: with all terms zero, it changes nothing."""
+    """Whether the formula is a signal plus or minus terms, so that its factors can vanish; the signal is taken for that
+    on which the law acts."""
     while isinstance(tree, Apply) and tree.name in ("+", "-"):
         tree = tree.arguments[0]
     return isinstance(tree, Variable)
@@ -182,13 +181,13 @@ def _format_left_hand_side(law: Law) -> str:
 
 
 def has_memory(law: Law) -> bool:
-    """Whether the formula has an operator with memory: lag, play, delay or integral."""
+    """Whether the formula has an operator with memory (`MEMORY_OPERATORS`)."""
     return any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree))
 
 
 def derive_axis_letters(channels: tuple[str, ...]) -> tuple[str, ...]:
     """Derive the letters of the axes in a formula: the last letters of the channel names where these are distinct and
-    in "xyz", else x, y, z in the order of the channels."""
+    in "xyz", else x, y, z for the first three channels."""
     last_letters = tuple(channel[-1:] for channel in channels)
     if len(set(last_letters)) == len(last_letters) and set(last_letters) <= set(AXIS_LETTERS):
         return last_letters
@@ -214,7 +213,7 @@ def index_force_signals(channels: Channels) -> dict[str, int]:
 
 def _iterate_motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
     """Iterate over the names of the axes' signals and their indices after the time; response channels are named only
-    where there is one per axis."""
+    where there is one per axis, of a quantity in `DERIVATIVE_OF_QUANTITY`."""
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
     for axis, letter in enumerate(derive_axis_letters(channels.inputs)):
         for signal_index, prefix in enumerate((*DERIVATIVE_PREFIXES, COMMAND_PREFIX)):
@@ -258,8 +257,8 @@ def _make_force_action(
 
 
 def _make_command_action(law: Law, channels: Channels) -> OnCommand:
-    """Make the action of a law that replaces the command of its axis. Raises LawError for a signal that is no
-    command."""
+    """Make the action of a law that replaces the command of its axis. Raises LawError for a signal that is
+    neither a command nor the time."""
     signals = {COMMAND_PREFIX + letter: axis for axis, letter in enumerate(derive_axis_letters(channels.inputs))}
     signals |= {name: axis for axis, name in enumerate(channels.inputs)}
     # Compiled only to raise LawError now, not in the first simulation: the columns, such as -1 of t, are not read.
@@ -277,8 +276,8 @@ def _make_command_action(law: Law, channels: Channels) -> OnCommand:
 
 
 def _make_response_action(law: Law, channels: Channels) -> OnResponse:
-    """Make the action of a law that replaces its response channel. Raises LawError for a signal that is no response
-    channel."""
+    """Make the action of a law that replaces its response channel. Raises LawError for a signal that is neither
+    a response channel nor the time."""
     signals = _index_response_signals(channels)
     compile_program(law.tree, {**signals, "t": -1})
 

@@ -3,8 +3,8 @@
 An effect acts in one of five ways: it changes the linear structure (`Structure`), adds a motion-dependent force at a
 driven axis (`AxisForce`) or within a joint (`JointForce`), changes the command before it becomes a force (`OnCommand`),
 or changes the sensed response (`OnResponse`). Sizes: n samples or coordinates, m commands, p response channels. SI
-units; on rotational axes N stands for N m and m for rad. Each module of `catalogue` makes an `Effect`, as does
-`discovered_law`; `placing` binds it to axes, `simulation` evaluates it, and the search of `analysis.diagnosis` fits it.
+units; on rotational axes N stands for N m and m for rad. `catalogue` lists the effects, `placing` binds them to axes,
+and `simulation` evaluates them.
 """
 
 from collections.abc import Callable, Mapping
@@ -105,13 +105,12 @@ class OnCommand:
     """Action that changes one channel of the command before it becomes a force."""
 
     change: Callable[[FloatArray, float, Values], FloatArray]
-    """Arguments: the command (n,), one value per integration step; length of a step in seconds; values. A value is the
-    mean over its step, or that at its end where `at_end` is None."""
+    """Arguments: the command (n,), one value per integration step; length of a step in seconds; values. It is called
+    with the means over the steps and, where `at_end` is None, also with the values at their ends."""
     fine: bool = False
     """Whether the force changes between samples, so that it is computed in several steps per sample."""
     at_end: Callable[[FloatArray, float, Values], FloatArray] | None = None
-    """The force at the end of each step, computed from the same means, where it changes between samples; None: `change`
-    gives both."""
+    """The force at the end of each step, computed from the same means; None: `change` gives both."""
     of_all: Callable[[FloatArray, int, float, Values], tuple[FloatArray, FloatArray]] | None = None
     """Used instead of `change` and `at_end` where the force depends on other channels too. Arguments: commands (n, m)
     as for `change`, channel, length of a step in seconds, values. Returns two arrays (n,): mean over each step, and
@@ -135,11 +134,11 @@ class OnResponse:
     """Changes the positions (n, p) that the same clock samples. Arguments: positions, sample rate in Hz, values. None:
     the effect leaves positions unchanged."""
     conditioned: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
-    """For a random effect, the response conditioned on a measurement: samples (n, p), measured (n, p), its noise (p,),
-    channels, values. Without a measurement `change` draws a realisation."""
+    """Used instead of `change` under a measurement: the response conditioned on it. Arguments: samples (n, p), measured
+    (n, p), its noise (p,), channels, values."""
     conditioned_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
-    """For a random effect, the positions conditioned on a measurement. Arguments: response before and after the effect,
-    position, measured position, (n, p) each."""
+    """The positions conditioned on a measurement. Arguments: response before and after the effect, position, measured
+    position, (n, p) each."""
 
 
 Action = Structure | AxisForce | JointForce | OnCommand | OnResponse
@@ -161,8 +160,8 @@ class Effect:
     parameters: tuple[Parameter, ...]
     action: Action
     starts: Callable[[Evidence, int], tuple[Values, ...]]
-    """Arguments: evidence, index of an axis or channel (or ALL_SITES). Returns sets of starting values, the likeliest
-    first; empty where none were found, as where the data contradict the effect."""
+    """Arguments: evidence, index of an axis or channel (or ALL_SITES). Returns sets of starting values; empty where
+    none were found, as where the data contradict the effect."""
     sites: tuple[Literal["one", "all", "each"], ...] = ("one",)
     """Where the effect can act. one: a single axis or channel; all: every one, with the same parameters; each: every
     one, with its own parameters."""
@@ -173,7 +172,7 @@ class Effect:
     near_equivalents: Callable[[Values], tuple[Values, ...]] = lambda values: ()
     """Other values with almost the same effect, at which a fit may have converged by mistake."""
     law: Law | None = None
-    """Formula of an effect that has no name in the vocabulary."""
+    """Law of a discovered law's effect; None for an entry of the catalogue."""
     of_time: bool = False
     """Whether the effect depends on time within a recording, or on rare events, so that no excerpt represents the whole
     recording."""
@@ -191,7 +190,7 @@ _live_effects: WeakValueDictionary[int, Effect] = WeakValueDictionary()
 
 
 def list_effects_by_address() -> dict[int, Effect]:
-    """List all effects in this process by address (`id`): those of the catalogue and those of discovered laws.
+    """List all effects in this process by address (`id`).
 
     Effects hold functions, which cannot be pickled for another process; a forked process has them at the same
     addresses, so that the address identifies them there.

@@ -3,8 +3,7 @@
     F = -k (x - x_s) where x lies beyond the stop x_s, else 0        k in N/m (a rotation: N m/rad)
 
 A second stop at -x_s has the stiffness `opposite` times k (0 = none). Beyond means away from zero, unless `side` states
-the direction (1: upwards, -1: downwards); there is no second stop then. An entry of `catalogue`, which simulation and
-diagnosis look up by name.
+the direction (1: upwards, -1: downwards); there is no second stop then. An entry of `catalogue`.
 """
 
 import numpy as np
@@ -90,8 +89,8 @@ def _find_best_stop(
     """Find the best stop on the side `stop_sign` (1 or -1), with a second stop at the same distance on the other side
     where the motion goes beyond it. A trial whose second stop is more than 10 % stiffer (chosen) is left out, because
     the stiffer stop is found from the other side; up to 10 % stiffer counts as equal. Returns the share of the missing
-    force that both explain, and the values; None where every trial is left out: not reached by the motion, or without a
-    positive stiffness. stop_distances: distances (m) to try."""
+    force that both explain, and the values; None where every trial is left out, as where the motion reaches none or no
+    stiffness is positive. stop_distances: distances (m) to try."""
     candidates: list[tuple[float, Values]] = []
     for stop_distance in stop_distances.tolist():
         penetration, opposite_penetration = (

@@ -1,9 +1,8 @@
 """Library entry of a discovered law, from which effects are made that a diagnosis searches for in other recordings.
 
 A law was found at one axis of one device. An entry yields one effect per axis (or response channel) of the new
-recording, with the axis letters of its formula permuted cyclically, and starting values by linear regression. Called by
-`analysis.diagnosis.search_by_simulation`; `study.workflows.diagnosis.effect_file` reads the entries from a file and
-tries them on a recording.
+recording, with the axis letters of its formula permuted cyclically; for the law of a force, starting values come from
+linear regression.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -8,8 +8,7 @@ Over a step the spring's force is the weighted mean of the forces at both ends (
 = -k ((1 - theta) p + theta p+), with p the deflection of the spring at the start and p+ = p_free + c F the deflection
 at the end, which depends on F through the compliance c of the structure over the step. theta is 1/2 (trapezoidal rule)
 where k c is small, and tends to 1 (backward Euler) where the spring is too stiff for the step and the trapezoidal rule
-would ring. Friction is solved last, for the velocity that results with the spring's force. An entry of `catalogue`,
-which simulation and diagnosis look up by name.
+would ring. Friction is solved last, for the velocity that results with the spring's force. An entry of `catalogue`.
 """
 
 from itertools import product
@@ -81,8 +80,8 @@ def find_joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
 
     The joint connects the axis to the undriven body that would have the largest kinetic energy if it followed the axis
     quasi-statically (mass times squared static displacement per displacement of the axis). Where no undriven body with
-    a spring is coupled to the axis, the joint connects the axis to the ground. A coordinate is undriven where all its
-    components of the driven axes are below 1e-9 (rounding).
+    a spring is coupled to the axis, the joint connects the axis to the ground. A coordinate is undriven where the norm
+    of its components of the driven axes is below 1e-9 (rounding).
     """
     direction, axes = compute_driven_axes(model)[:, axis], compute_driven_axes(model)
     is_undriven = np.linalg.norm(axes, axis=1) < 1e-9

@@ -3,8 +3,8 @@
     y[k] = y[k-1] for a random fraction of all samples, else y[k] = x[k]
 
 Without a measurement, a simulation draws the lost samples at random. With a measurement, the samples are lost for which
-the measured value is likelier under repetition than under the simulated value (likelihood ratio test, equation in
-`simulation.logger_kernel`). An entry of `catalogue`, which simulation and diagnosis look up by name.
+the measured value is likelier under repetition than under the simulated value (likelihood ratio test with prior odds,
+equation in `simulation.logger_kernel`). An entry of `catalogue`.
 """
 
 import math
@@ -98,7 +98,7 @@ def _repeat_rows(position: FloatArray, is_lost: BoolArray) -> FloatArray:
 def _find_clear_repetitions(position: FloatArray, measured: FloatArray) -> BoolArray:
     """Mark the samples (n,) whose measured position is clearly nearer to the simulated position of the preceding sample
     than to their own: the difference of the squared distances, in units of the noise (1.4826 times the median absolute
-    deviation), exceeds half of `DISTINGUISHABLE_SIGMA` squared."""
+    error), exceeds half of `DISTINGUISHABLE_SIGMA` squared."""
     error = measured - position
     noise = 1.4826 * np.nanmedian(np.abs(error), axis=0)
     position_step = np.diff(position, axis=0, prepend=position[:1])

@@ -3,7 +3,7 @@
     y = x + A sin(2 pi f t + phase)        A in the unit of the response, f in Hz, phase in rad
 
 Starting values come from spectral lines of the residual that are strong, steady over the recording, and not commanded.
-An entry of `catalogue`, which simulation and diagnosis look up by name.
+An entry of `catalogue`.
 """
 
 import math
@@ -22,12 +22,12 @@ LEAST_PEAK_RATIO = 12.0
 NEIGHBOURHOOD_HZ = 3.0
 """Half-width (Hz) of the band around a line over which that median is taken."""
 FREQUENCY_STEPS = 4
-"""Number of Gauss-Newton steps for the frequency."""
+"""Largest number of Gauss-Newton steps for the frequency."""
 BLOCK_COUNT, LEAST_STEADINESS = 12, 0.8
 """Number of blocks of the recording that are compared in amplitude and phase, and least steadiness (0 to 1) of a
 tone."""
 COMMANDED_RATIO = 0.1
-"""Half the amplitude of a tone in a command, over the command's rms, above which the tone counts as commanded."""
+"""Half a steady tone's amplitude in a command, over the command's rms, above which the tone counts as commanded."""
 DOMINANT_RATIO, HIGHEST_HARMONIC = 0.5, 9
 """That ratio for a tone with half of a command's power, and highest order up to which harmonics of such a tone
 count as commanded."""

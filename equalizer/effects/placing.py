@@ -2,8 +2,7 @@
 values).
 
 A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
-file, `convert_to_model_effects` back. Called by `analysis.diagnosis` and its figures, by `command_sign`, and by
-`study.workflows.files.check_model_channels` to check a model.
+file, `convert_to_model_effects` back.
 """
 
 from collections.abc import Iterator
@@ -65,8 +64,7 @@ def convert_to_model_effects(
 
 
 def find_place(effect: Effect) -> Place:
-    """Find the place where an effect sits (mechanism, hand, actuator, sensor); for a discovered law, by the quantity it
-    acts on."""
+    """Find the place where an effect sits; for a discovered law, by the quantity it acts on."""
     return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
 
 

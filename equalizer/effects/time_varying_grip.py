@@ -2,10 +2,9 @@
 
     F = -depth sin(2 pi rate_hz t + phase) (D v + stiffness_share K x)
 
-D (N s/m) and K (N/m) are the model's damping and stiffness to the ground along the axis, mainly those of the hand. v
-and x are the velocity (m/s) and position (m) of the axis, t the time (s) from the start of the recording. Starting
-values: least squares of the missing force on the modulated forces, at every modulation frequency. An entry of
-`catalogue`, which simulation and diagnosis look up by name.
+D (N s/m) and K (N/m) are the model's damping and stiffness to the ground along the axis, those of the hand included. v
+and x are the velocity (m/s) and position (m) of the axis, t the time (s) from the start of the recording. An entry of
+`catalogue`.
 """
 
 import numpy as np
@@ -51,8 +50,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 def condense_to_ground(matrix: FloatArray, driven_axes: FloatArray, axis: int) -> float:
     """Compute the damping (N s/m) or stiffness (N/m) between a driven axis and the ground; coordinates on which no
-    command acts (components of `driven_axes` below 1e-9, rounding) are eliminated by static condensation (Guyan 1965).
-    matrix: (n, n), of damping or stiffness; driven_axes: (n, m)."""
+    command acts (rows of `driven_axes` with a norm below 1e-9, rounding) are eliminated by static condensation
+    (Guyan 1965). matrix: (n, n), of damping or stiffness; driven_axes: (n, m)."""
     is_undriven = np.linalg.norm(driven_axes, axis=1) < 1e-9
     condensed_matrix = matrix[np.ix_(~is_undriven, ~is_undriven)]
     if is_undriven.any():

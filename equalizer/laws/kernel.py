@@ -2,8 +2,7 @@
 
 A time step has a start and an end. Between them the signals of operators with memory (lag, play, delay, integral) are
 linear in time; at a start they may jump, as commands do. `run_program` may be called several times for a step;
-`commit_step` then stores its end as the start of the next step. Times are in seconds. Called by `laws.evaluate` (along
-samples) and `effects.simulation.law_kernel` (in a simulation).
+`commit_step` then stores its end as the start of the next step. Times are in seconds.
 """
 
 from typing import Any

@@ -1,7 +1,6 @@
 """A law: a formula with free parameters, and the quantity on which it acts (force, command or response).
 
-Called by the reader of model files (`plant.mechanical_model_toml`), the simulation of effects
-(`effects.discovered_law`) and the search for formulas (`analysis.diagnosis.discovery`).
+`parse_law` reads one from text; `find_parameter_roles` tells a fit how each parameter enters the formula.
 """
 
 from collections.abc import Sequence
@@ -12,7 +11,6 @@ from equalizer.laws.parse import LawError, parse_formula
 from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable, format_formula, iterate_nodes
 
 ActsOn = Literal["force", "command", "response"]
-"""Quantity on which a law acts, see `Law.acts_on`."""
 ACTS_ON_VALUES: tuple[ActsOn, ...] = get_args(ActsOn)
 """All values of `ActsOn`."""
 

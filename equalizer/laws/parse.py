@@ -3,8 +3,6 @@ The text is parsed to a syntax tree by Python's `ast` and never executed.
 
 Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters, which a fit may change. Whole numbers (`2`) and
 `pi` are part of the form. A template contains the names `p0`, `p1`, … of the free parameters instead of their values.
-Called by `laws.law` and `analysis.diagnosis.discovery.evaluate_shape`; further modules use `FUNCTIONS`,
-`MEMORY_OPERATORS` and `LawError`.
 """
 
 import ast

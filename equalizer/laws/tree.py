@@ -1,8 +1,5 @@
-"""Expression tree of a force law's formula, and its formatting in Python's syntax, with parentheses where operator
-precedence needs them.
-
-`parse` builds the tree, `program` compiles it, `law.Law` holds it.
-"""
+"""Expression tree of a law's formula, and its formatting in Python's syntax, with parentheses where operator precedence
+needs them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

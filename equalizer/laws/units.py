@@ -2,7 +2,7 @@
 
 Terms of a sum have the same dimension, in a product the exponents of the dimensions add, and arguments of functions
 such as sin and exp are dimensionless. The required dimension of the value is passed down the expression tree to each
-parameter. Called by `equalizer.effects.discovered_law`.
+parameter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,7 +68,7 @@ def _format_dimension(dimension: Dimension, symbols: tuple[str, str, str]) -> st
 
 
 def _format_power(symbol: str, power: float) -> str:
-    """Format a unit's symbol with its exponent (three digits), in brackets where it is a product."""
+    """Format a unit's symbol with its exponent (three digits), 1 left out; a product with an exponent is bracketed."""
     if power == 1:
         return symbol
     return f"{f'({symbol})' if ' ' in symbol else symbol}^{power:.3g}"

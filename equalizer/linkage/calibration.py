@@ -1,6 +1,6 @@
 """Calibration of a linkage: the Jacobian, inertia and gravity that a device reports over a grid of positions, and the
-plausibility checks of these readings. `calibrate_linkage` (`hapteq calibrate`) makes it; `twin_calibration` (`hapteq
-twin`) uses it. Mirror lines are the traces of the arms' planes of symmetry in the plane y-z, see `mirror_lines`.
+plausibility checks of these readings. Mirror lines are the traces of the arms' planes of symmetry in the plane y-z, see
+`mirror_lines`.
 
 J is the Jacobian of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong,
 Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 4). Inertia M(x) is that at the handle (operational space).

@@ -3,7 +3,7 @@
 The plane of each arm, which contains the base's axis x, is a plane of symmetry with the reflection R: at the mirrored
 position the inertia is R M R, the Jacobian R J P and the joint angles P q, where P swaps the other two joints. A mirror
 line is where such a plane meets the plane y-z. At a position in the plane, two directions that are mirror images have
-the same apparent mass; the study's two directions are such a pair. Called by `calibrate_linkage`.
+the same apparent mass.
 """
 
 import numpy as np
@@ -12,8 +12,7 @@ from equalizer.linkage.calibration import LinkageReading
 from equalizer.signals.signal import FloatArray
 
 LEAST_WARNED_ASYMMETRY = 0.02
-"""Relative difference of inertia above which a warning is given. It changes an acceleration by 2 % (0.17 dB), a small
-part of the staircases' finest step (1 dB)."""
+"""Relative difference of inertia above which a warning is given. It changes an acceleration by 2 % (0.17 dB)."""
 
 SAME_POSITION_M = 1e-6
 """Distance (m) below which two positions count as the same. Chosen above rounding errors."""

@@ -1,10 +1,8 @@
 """Vocabulary of the physical effects in mechanical model files: their names, places, parameters and units.
 
-Model files, `equalizer.effects` and the diagnosis use these names. `equalizer.effects` has a module for each effect,
-with its equation and the meaning of the parameters that are not described here: `gap` is the total play, `width` half
-the dead band, `gain` a factor (1 = no effect), `degrees` the total rotation angle; `ppm` > 0 takes the response at
-t (1 + ppm 1e-6); `per_m` is in the mass M (1 + per_m x); `total` of a drift and `amplitude` of a hum are those of the
-largest channel, where all channels share the effect.
+`equalizer.effects` has a module for each effect, with its equation and the meaning of the parameters that are not
+described here: `gap` is the total play, `width` half the dead band, `gain` a factor (1 = no effect), `degrees` the
+total rotation angle; `ppm` > 0 takes the response at t (1 + ppm 1e-6); `per_m` is in the mass M (1 + per_m x).
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
     x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]         x (n,), u (m,) commands, y (p,) responses
 
-`equalizer.identification.state_space` fits such models; `equalizer.tracking` computes feedforward forces from them.
+`equalizer.identification.state_space` fits such models.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,7 +37,7 @@ class IdentifiedModel(SummaryDisplay):
     C: FloatArray
     """(p, n)"""
     D: FloatArray
-    """(p, m): not zero in a model of a limited band, where it approximates the modes outside the band."""
+    """(p, m)"""
     sample_rate_hz: float
     """Rate (Hz) at which commands are written and responses are sampled."""
     band_hz: tuple[float, float]

@@ -2,8 +2,7 @@
 
 M q'' + D q' + K q = B u + P f has the state x = (q, v) and x' = F x + G (u, f), with commands u and forces f at the
 ports P. With both held constant over a step T, x[k+1] = A x[k] + H (u, f)[k] exactly, where [A H] are the upper rows of
-exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units. Called by the simulation
-(`equalizer.effects.simulation.stepping`), by effects and by the diagnosis.
+exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units.
 """
 
 from dataclasses import dataclass

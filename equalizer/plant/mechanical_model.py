@@ -3,8 +3,8 @@
     M a + D v + K q = B u,     y = C q, C v or C a, by `quantity`
 
 q (n,) are the coordinates, v and a their first and second time derivatives, u (m,) the forces, y (p,) the responses.
-Limits of sensor and actuator, and nonlinear effects of `effect_vocabulary`, are stated in addition.
-`mechanical_model_toml` reads and writes the model as text; `effects.simulation` simulates it.
+Limits of sensor and actuator, and effects of `effect_vocabulary`, are stated in addition. `mechanical_model_toml` reads
+and writes the model as text; `effects.simulation` simulates it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,7 +39,7 @@ class SensorLimits:
     bandwidth_hz: float = 0.0
     """Bandwidth f of a first-order low pass per channel, at the sample rate: y += (1 - exp(-2 pi f / rate)) (x - y)."""
     range: float = 0.0
-    """Largest magnitude that the sensor measures, in the response's SI unit."""
+    """Largest magnitude that the sensor measures, in the response's unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class MechanicalModel(SummaryDisplay):
     sensor: SensorLimits = SensorLimits()
     actuator: ActuatorLimits = ActuatorLimits()
     effects: tuple[ModelEffect, ...] = ()
-    """Nonlinear effects, in addition to the linear model."""
+    """Effects in addition to the linear model."""
     tolerance: Tolerance | None = None
     """Calibration uncertainty; None = not stated."""
     rotational: bool = False

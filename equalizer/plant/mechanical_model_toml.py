@@ -1,4 +1,4 @@
-"""Parsing and formatting of mechanical models as TOML text. Called by `study.store.formats.mechanical_model_file`.
+"""Parsing and formatting of mechanical models as TOML text.
 
 Tables: [model] (name, quantity, matrices as lists of rows), [sensor], [actuator], [[effect]] (kind, axis, parameters),
 [tolerance], [provenance]. The parser collects all problems of the text before it raises an error; only a text without
@@ -83,8 +83,8 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
 
 
 def format_mechanical_model(model: MechanicalModel) -> str:
-    """Format a model as TOML text, from which `parse_mechanical_model` reads the same values, apart from None in the
-    provenance, which is left out. Raises TypeError for a value of the provenance that `_format_value` does not take."""
+    """Format a model as TOML text, for `parse_mechanical_model`; None in the provenance and the units of a law are left
+    out. Raises TypeError for a value of the provenance that `_format_value` does not take."""
     lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
         lines.append("rotational = true")

@@ -5,8 +5,7 @@ For signals a and b without their means, on one grid, at lag l:
     r(l) = sum a(k + l) b(k) / sqrt(sum a(k + l)² sum b(k)²),    sums over the samples where both overlap.
 
 The offset is the lag of the largest |r|, interpolated by a spline. It is rejected where |r| is small, where the maximum
-lies at the end of the searched range, and where another peak is about as high, as with periodic signals. Called by
-`study.importing.alignment`.
+lies at the end of the searched range, and where another peak is about as high, as with periodic signals.
 """
 
 from dataclasses import dataclass

@@ -3,7 +3,7 @@
 The method must suit the signal. Zero-order hold is exact for a command that is held until the next command.
 Band-limited interpolation (a Kaiser-windowed low pass; for uneven times, a spline) is accurate up to `PASSBAND` for a
 signal that was sampled behind an anti-aliasing filter; a hold would add spectral images. Missing samples (NaN, gaps in
-the time stamps) remain missing. Called by `clock_offset` and `study.importing`.
+the time stamps) remain missing.
 """
 
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class Grid:
 def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
     """Resample to the times of the grid: (count,), in the unit of the samples; NaN where samples are missing. Raises
     ValueError where fewer than two samples are finite, or the grid begins before the first or ends after the last
-    sample by more than `TIME_TOLERANCE`. At least one sample and one instant."""
+    sample by more than `TIME_TOLERANCE`. Neither may be empty."""
     times_s = grid.compute_times_s()
     tolerance_s = TIME_TOLERANCE / grid.rate_hz
     if times_s[0] < samples.times_s[0] - tolerance_s or times_s[-1] > samples.times_s[-1] + tolerance_s:

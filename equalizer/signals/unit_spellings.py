@@ -3,7 +3,7 @@
 
 Symbols are rewritten only where a spelling is listed; signs, powers and products are rewritten in any text (`foo2`
 becomes `foo^2`), and `units.normalise_unit` restores a text that is no unit afterwards. The meaning of a unit is not
-examined. For an unknown symbol the nearest known one can be suggested. Called by `signals.units`.
+examined. For an unknown symbol the nearest known one can be suggested.
 """
 
 import re
@@ -69,7 +69,7 @@ _TORQUE_BY_SPELLING = {
     "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
     "kg cm": "kgf cm", "g cm": "gf cm",
 }  # fmt: skip
-"""Torques written with a unit of mass: no recorded quantity is a mass times a length, and `oz in^2` is an inertia."""
+"""Torques written with a unit of mass; `oz in^2`, an inertia, is not listed."""
 _SUGGESTED_UNIT = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "nm": "N m"}
 _SUGGESTED_WHOLE_UNIT = {"c": "degC", "f": "degF", "g": "g"}
 """Suggested unit of a word, and of a word that is the whole unit. They are suggested to the user but not applied:

@@ -1,8 +1,7 @@
 """Parse ASCII units and convert them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity).
 
 A unit is a product of symbols with exponents; each symbol after a slash divides. Factors are exact by definition: inch,
-pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi (BIPM, SI Brochure; NIST SP 811). Called by the
-readers of recordings, models and import maps, among others.
+pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi (BIPM, SI Brochure; NIST SP 811).
 """
 
 import math
@@ -137,8 +136,8 @@ NO_UNIT = "1"
 """SI unit of numbers without a unit or of unknown scale (`counts`); they are not converted, except `%`."""
 
 MAX_UNIT_TEXT_LENGTH = 100
-"""Largest number of characters of a text for which other spellings are tried. Chosen: longer than any unit; bounds the
-duration of the search."""
+"""Largest number of characters of a text for which other spellings are tried. Chosen; bounds the duration of the
+search."""
 
 _SYMBOLS = frozenset(_UNPREFIXED_UNITS) | {
     prefix + base for prefix in ("", *_PREFIX_FACTORS) for base in _PREFIXABLE_DIMENSIONS
@@ -258,7 +257,8 @@ def _format_power(symbol: str, power: int) -> str:
 
 
 def suggest_unit(text: str) -> str:
-    """Find the accepted unit of the most similar spelling to a text that is not a unit; empty where none is similar."""
+    """Find the accepted unit of the most similar spelling to a text that is not a unit; empty where none is similar,
+    and for a text above `MAX_UNIT_TEXT_LENGTH`."""
     respelled_text = normalise_unit(text)
     if respelled_text != text:
         return respelled_text
@@ -270,10 +270,10 @@ def suggest_unit(text: str) -> str:
 
 def normalise_unit(text: str) -> str:
     """Rewrite a unit in the spelling of this module (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is
-    not a unit is returned unchanged."""
+    not a unit, or longer than `MAX_UNIT_TEXT_LENGTH`, is returned unchanged."""
     if len(text) > MAX_UNIT_TEXT_LENGTH:
         return text
-    # Imported here, because only files of other origin need it.
+    # Imported on demand: a unit in the spelling of this module does not need it.
     from equalizer.signals.unit_spellings import respell
 
     respelled_text = respell(text, _SYMBOLS)

@@ -16,7 +16,7 @@ from protocols.definition.staircase_rule import STRICT
 Sentence = Annotated[str, Field(min_length=1, max_length=500)]
 """Text that a participant reads in one piece, such as a question or a statement of consent."""
 Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
-"""Name of a question's answer in the log: a lower-case letter, then up to 39 letters, digits and underscores."""
+"""Name of a question's answer in the log: a lower-case letter, then up to 39 such letters, digits and underscores."""
 MAX_SCALE_STEPS = 11
 """Largest number of steps of a rating scale. Chosen: 0 to 10."""
 
@@ -101,7 +101,7 @@ class Question:
 
 
 def _find_answer_problems(question: Question) -> tuple[Problem, ...]:
-    """Find contradictions between the fields of a question, and invalid limits of its number or scale."""
+    """Find contradictions between the fields of a question, repeated entries, and invalid limits of number or scale."""
     problems = []
     if sum(map(bool, (question.choices, question.number, question.scale))) > 1:
         problems.append(

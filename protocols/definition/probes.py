@@ -1,7 +1,7 @@
 """Settings of probes: short known forces, played between trials, that measure how device and grip change in a session.
 
-A probe is a multisine on all three axes. It shows the response of the device with the hand; a reference, the same
-multisine without a hand, shows that of the device alone. The settings are the table `probes` of a `StudyProtocol`;
+A probe is a multisine on all three axes. It shows the response of the device with the hand; a reference, played without
+a hand, shows that of the device alone. The settings are the table `probes` of a `StudyProtocol`;
 `study.session.stimulus.probe_stimulus` computes the forces.
 """
 
@@ -110,7 +110,7 @@ class ProbeSettings:
 def find_probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
     """Find contradictions of the probes with other settings of the protocol: a cap not below that of the trials, a
     reference force above it, a slope above the slew limit, and kept recordings that are shorter than a period. Empty
-    where no probes are played. Called by `study_contradictions`."""
+    where no probes are played."""
     probes, cap_n = protocol.probes, protocol.staircase.cap_n
     if not probes.is_enabled:
         return []

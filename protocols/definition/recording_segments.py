@@ -1,7 +1,7 @@
 """Excitation segments of a recording protocol: sinusoids, swept sines, multisines.
 
 Each class is a table of the TOML file; Pydantic checks its values. Part of `recording_protocol`; the signals are made
-by `study.session.stimulus.recording_pieces`; `study.session.stimulus.limits` calls `find_highest_hz`.
+by `study.session.stimulus.recording_pieces`.
 """
 
 import math
@@ -21,8 +21,7 @@ AxisName = Annotated[
     Field(description="A device axis, or one of the two test directions."),
 ]
 Period = Annotated[float, Field(gt=0, le=600, description="One period.")]
-"""Duration of a period in seconds. This upper limit and the others of this module are chosen, wide enough for any
-recording."""
+"""Duration of a period in seconds. The upper limits of this module are chosen, except 3 N."""
 Periods = Annotated[
     int,
     Field(

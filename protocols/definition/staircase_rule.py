@@ -4,8 +4,7 @@ A transformed up-down rule (Levitt, Journal of the Acoustical Society of America
 a number of wrong answers in a row and lowers it after a number of right ones; its levels settle where both are equally
 likely (1 up, 3 down: 79.4 % right). The rule is computed by `protocols.procedure.staircase`, Psi by
 `protocols.procedure.psi`. Field of `study_protocol.StudyProtocol`; the descriptions are printed in docs/formats.md and
-in the JSON schema. 3 N is the safety limit of a stimulus with a hand (docs/safety.md); the other bounds are chosen,
-wide enough for any study.
+in the JSON schema. 3 N is the safety limit of a stimulus with a hand (docs/safety.md); the other bounds are chosen.
 """
 
 from enum import Enum

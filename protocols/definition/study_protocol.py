@@ -1,8 +1,8 @@
 """Schema of a study protocol (pydantic): all settings of a session, with units, bounds, defaults and their reasons.
 
 Built from TOML by `protocols.document.loading`; a protocol whose settings contradict each other is refused with
-`problem.InconsistentError`. Classes and descriptions are the source of docs/formats.md and of the JSON schema. The
-bounds of the fields are chosen, wide enough for any study.
+`problem.InconsistentError`, which Pydantic wraps in its ValidationError. Classes and descriptions are the source of
+docs/formats.md and of the JSON schema. The bounds of the fields are chosen.
 """
 
 from typing import Annotated, Literal, Self

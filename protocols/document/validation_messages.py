@@ -1,8 +1,7 @@
 """Translate pydantic's validation errors into messages for the author of a protocol file: key, problem, allowed values.
 
 Keys are written as in the file, with list entries counted from 1. A misspelt key is reported once, with the known key
-that was probably meant. Called by `loading` for protocols; `explain` and `study.importing.map_format.map_toml` use
-the formatting of keys and values.
+that was probably meant. Called by `loading`.
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ from protocols.document.schema import (
 
 _MAX_COMPARED_LENGTH = 60
 """Number of leading characters of a text that are compared with known keys; chosen, because the comparison of long
-texts takes minutes."""
+texts is slow."""
 
 
 def collect_problems(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:

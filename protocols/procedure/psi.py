@@ -33,9 +33,9 @@ SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
 """Slopes (Weibull exponents) of the psychometric function over newtons, equally probable a priori, spaced geometrically
 about 2. Chosen by hand."""
 LAPSE_RATE = 0.02
-"""Share of trials in which the participant guesses at any level; half of these answers are wrong, so that
-P(right) ends at 0.99, a lapse rate of 0.01 in the sense of `analysis.psychophysics.hierarchy.curve`. Chosen by hand:
-without it a single lapse at a high level could never be outweighed."""
+"""Share of trials in which the participant guesses at any level; half of these answers are wrong, so that P(right) ends
+at 0.99, a lapse rate of 0.01 in the sense of `analysis.psychophysics.hierarchy.curve`. Chosen by hand: without it a
+single lapse at a high level could hardly be outweighed."""
 THRESHOLD_SHARE_RIGHT = 0.5 ** (1 / 3)
 """Share of right answers at the threshold, lapses apart, 0.794: that to which the 1 up, 3 down rule of the published
 staircase converges."""

@@ -1,9 +1,9 @@
 """Order of a session's runs and random draws of its trials, each from its own key (counter-based random numbers).
 
-A draw depends only on the seed and its key (run, trial, attempt), not on earlier draws: a repeated trial, a resumed
-session or a replay changes no later draw. The random 64-bit words come directly from numpy's SeedSequence, whose output
-is guaranteed never to change, so that a session can be checked years later. Called by `study.session`,
-`study.workflows` and `study_plan`.
+A draw depends only on the seed and its key (such as run, trial, attempt), not on earlier draws: a repeated trial, a
+resumed session or a replay changes no later draw. The random 64-bit words come directly from numpy's SeedSequence,
+whose output is guaranteed never to change, so that a session can be checked years later. Called by
+`study.session.state`, among others.
 """
 
 from dataclasses import dataclass
@@ -159,12 +159,10 @@ catch trials end in `_CATCH_KEY` and 0. A key of four elements never gives the s
 
 
 def are_labels_swapped(settings: ScheduleSettings, frequency_count: int, participant_number: int) -> bool:
-    """Whether the numbers 1 and 2 are exchanged for this participant.
-
-    True for every second participant, and for the other half on the next pass through the Williams rows, so that each
-    order of the frequencies occurs with both labellings. frequency_count: number of stimulus frequencies;
-    participant_number: from 0.
-    """
+    """Whether the numbers 1 and 2 are exchanged for this participant: unless labels are fixed, for every second
+    participant, and for the other half on the next pass through the Williams rows, so that each order of the
+    frequencies occurs with both labellings. frequency_count: number of stimulus frequencies; participant_number: from
+    0."""
     if settings.labels == "fixed":
         return False
     completed_passes = (

@@ -1,7 +1,7 @@
 """English help pages of the participant's screens (F1), in Markdown, by key.
 
-A key is `help_` and the name of the screen; `help_everywhere` is appended to every page. Merged into `english.ENGLISH`;
-a translation has the same keys (`translation`; German and Spanish: de.toml, es.toml).
+The key of a page is `help_` and the name of the screen; `help_title` is the title of all, `help_everywhere` is appended
+to each. Merged into `english.ENGLISH`; a translation has the same keys (`translation`).
 """
 
 HELP_PAGES: dict[str, str] = {

@@ -1,7 +1,8 @@
 """Table of the commands of `hapteq` in groups, each imported only when it is looked up (lazy loading).
 
-A command's module and the function in it have the name of the command, with "_" for "-"; a command with subcommands is
-a typer application `app`. `main` uses `CommandTable`, the commands with subcommands (`kit`, `protocol`) `Subcommands`.
+A command's module and the function in it have the name of the command, with "_" for "-" (exceptions:
+`KEYWORD_MODULES`); a command with subcommands is a typer application `app`. `main` uses `CommandTable`, the commands
+with subcommands (`kit`, `protocol`) `Subcommands`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -116,8 +117,7 @@ class Subcommands(TyperGroup):
     """A command with subcommands, which lists them in `--help` with their complete short help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the subcommands under one title, each with its short help; no help is longer than the limit of 200
-        characters, so that none is cut."""
+        """Write the subcommands under one title, each with up to 200 characters of its help."""
         with formatter.section("Commands"):
             formatter.write_dl(
                 [(name, command.get_short_help_str(limit=200)) for name, command in self.commands.items()]

@@ -2,7 +2,7 @@
 
 Checks, in this order, the installation, the device with its sensor, and the timing of the 1 kHz loop, and prints the
 findings; by option it also calibrates the device or its accelerometer, accepts the device for use with a hand, or runs
-the daily check. Calls `study.workflows.checks` and `study.devices.opening`. Loaded by `command_table`.
+the daily check. Loaded by `command_table`.
 """
 
 import json
@@ -100,10 +100,8 @@ def doctor(
 
 def _prepare_device(device: str, calibrate: bool, daily: bool, will_move: bool, hands_off: bool) -> None:
     """Check, before the examination, that the options are allowed, and calibrate the device if this is requested.
-
     will_move: whether --accept or --daily makes the device move. Raises WrongUseError where its motion cannot be
-    confirmed, or the device is not a real one (--daily), and DeviceError where the calibration fails.
-    """
+    confirmed, or the device is not a real one (--daily), and DeviceError where the calibration fails."""
     from study.devices.opening import needs_real_time
 
     if daily:

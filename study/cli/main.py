@@ -1,8 +1,8 @@
 """Entry point of the command `hapteq`: runs a subcommand, and maps errors to messages and exit codes.
 
 The subcommands are listed in `command_table`, a file for each. Results are written to stdout, messages and progress to
-stderr. Modules are imported in the bodies of the commands, so that `--help` is fast. `main` is called by the console
-script `hapteq` (`study/launcher/hapteq_launcher.py`).
+stderr. Commands import most modules in their bodies, so that `--help` is fast. `main` is called by
+`study/launcher/hapteq_launcher.py`.
 """
 
 import io

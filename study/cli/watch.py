@@ -82,8 +82,8 @@ def _find_last_changed(data: Path) -> Path:
 
 def _find_running(data: Path) -> Path:
     """Find the folder of the session in `data` for which a request without a name is: the one that runs, or where none
-    is known to run, the one that changed last. Raises WrongUseError where several run: a stop that reached another
-    session would leave the force on, and say that it is off."""
+    is known to run, the one that changed last. Raises WrongUseError where there is none, or several run: a stop that
+    reached another session would leave the force on, and say that it is off."""
     from study.store.sessions.log_lock import is_log_locked
 
     running = [log.parent for log in sorted(data.glob(f"*/{LOG_NAME}")) if is_log_locked(log)]

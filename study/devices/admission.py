@@ -50,8 +50,8 @@ RATES_HZ = (100.0, 10_000.0)
 """Lowest and highest accepted rate of a device's control loop (Hz). Chosen around the usual 1 kHz."""
 
 MAX_EFFECTIVE_MASS_KG = 10.0
-"""Largest accepted effective mass (kg), above that of any handle of a desktop device. The stiffness of the centring
-spring is proportional to the mass that the device reports."""
+"""Largest accepted effective mass (kg), chosen above that of a desktop device. The stiffness of the centring spring is
+proportional to the mass that the device reports."""
 
 MAX_FORCE_DROP_S = 1.0
 """Longest accepted time (s) after the last command until the hardware itself drops the force. Chosen."""
@@ -99,8 +99,8 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
     """Check fades (known shape, 0 to 10 s, chosen), format, force and slew rate of a repeated stimulus. Its slew rate
     includes the steps from the loop's last sample to its first and, with an onset, from zero through the onset into the
-    loop; without one, the fade-in begins at zero. rate_hz: rate of the device. Raises `DeviceError` for a stimulus that
-    is not within the limits."""
+    loop; without one, the start is left to the fade-in. rate_hz: rate of the device. Raises `DeviceError` for a
+    stimulus that is not within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
         raise _make_refusal_error(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for setting_name, fade_s in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):

@@ -31,7 +31,6 @@ class DeviceInfo:
     """Properties of an opened device: name, rate, maximum force and mass."""
 
     name: str
-    """Name of the device."""
     simulated: bool
     """Whether there is no hardware, as for a simulation or a replay."""
     sample_rate_hz: float
@@ -175,18 +174,14 @@ class Device(Protocol):
         ...
 
     def hold(self, stimulus: HeldStimulus) -> None:
-        """Fade the stimulus in and repeat its loop until `release`. Returns at once.
-
-        Raises `DeviceError`, before anything moves, for a stimulus that is not within the limits, while another is
-        held, after `stop`, and for a lost or closed device.
-        """
+        """Fade the stimulus in and repeat its loop until `release`. Returns at once. Raises `DeviceError`, before
+        anything moves, for a stimulus that is not within the limits, while another is held, after `stop`, and for a
+        lost or closed device."""
         ...
 
     def keep_alive(self) -> None:
-        """Restart the watchdog. Without a call for `watchdog_s` the force fades to zero and the fault is STALLED.
-
-        Also checks that the control loop responds: if it hangs, the force is switched off and the fault is LOST.
-        """
+        """Restart the watchdog. Without a call for `watchdog_s` the force fades to zero and the fault is STALLED. Also
+        checks that the control loop responds: if it hangs, the force is switched off and the fault is LOST."""
         ...
 
     def fault(self) -> Fault:
@@ -200,11 +195,8 @@ class Device(Protocol):
 
     def release(self) -> PlaybackResult:
         """Fade out, wait until no force acts, and return recording and counters. To be called after a fault as well.
-
         Raises `DeviceError` where nothing is held, but not for a lost device, so that the trial can be logged as void;
-        the next `hold` or `play` does. After FORCE_LEFT the force may still be on: the program then warns the person at
-        the handle.
-        """
+        the next `hold` or `play` does. After FORCE_LEFT the force may still be on."""
         ...
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
@@ -216,11 +208,9 @@ class Device(Protocol):
         ...
 
     def look(self) -> Look:
-        """Present state of the handle, at any time and from any thread; no force is commanded for it.
-
-        Fast enough for 20 calls per second. A device that is lost, closed or late gives a `Look` without a reading; a
-        loop that hangs delays only the first caller, by 0.1 s.
-        """
+        """Present state of the handle, at any time and from any thread; no force is commanded for it. Fast enough for
+        20 calls per second. A device that is lost, closed or late gives a `Look` without a reading; a loop that hangs
+        delays only the first caller, by 0.1 s."""
         ...
 
     def simulate_hand(self, on_handle: bool) -> None:
@@ -229,11 +219,8 @@ class Device(Protocol):
         ...
 
     def stop(self) -> None:
-        """Emergency stop: no force from the next tick on, until the device is opened again.
-
-        May be called from any thread. Waits a few milliseconds for the loop; if the loop hangs, another thread writes
-        the zero force.
-        """
+        """Emergency stop: no force from the next tick on, until the device is opened again. May be called from any
+        thread. Waits a few milliseconds for the loop; if the loop hangs, another thread writes the zero force."""
         ...
 
     def close(self) -> None:

@@ -1,5 +1,4 @@
 """Calls of C functions (system, device libraries) from numba code without the interpreter lock: clock, sleep, lock.
-Used by the compiled loops of `study.devices.drive` and by the compiled driver of `study.devices.force_dimension`.
 
 A function is given by its address, in an array of int64. Arguments are int32, int64 (also addresses) and float64; on
 64-bit computers these are passed as C expects char, int, pointers and double.

@@ -1,9 +1,8 @@
 """Trigger pulse at the onset of each trial's force, for an external recorder (EEG, EMG, a camera).
 
 The pulse is a byte or a control line (DTR, RTS) of a serial port, or the data lines of a parallel port; `Line` is their
-common interface. A line that fails does not interrupt a trial: the pulse is reported as lost (`Pulse.at_s` is None),
-and the next request opens the line again. Opened by `opening.open_lab_onset_line` for `conduct_session`;
-`force_dimension.lab` reads the settings (`PulseSettings`).
+common interface. A line that cannot begin a pulse does not interrupt a trial: the pulse is reported as lost
+(`Pulse.at_s` is None), and the next request opens the line again. Begin at `open_onset_line`.
 """
 
 import contextlib

@@ -1,5 +1,5 @@
-"""Open devices by name; other packages (`study.workflows`, `study.cli`, `study.tui`, `study.evaluation`) and the
-process of the control loop (`loop_process.serve`) access a device only through this module.
+"""Opens devices by name, for the packages outside `study.devices` and the process of the control loop
+(`loop_process.serve`). Begin at `open_device`.
 
 Every device that it returns for playing forces is behind the safety layer (`study.devices.safe`); only `accept_device`
 also sends commands without it, to test the force cap of the vendor's library. Modules with a slow import (numba above
@@ -36,7 +36,7 @@ REAL_DEVICES = tuple(MODELS)
 """Names of the real devices, which need the vendor's library and a real-time clock."""
 
 LARGEST_DEVICE_FORCE_N = max(model.max_force_n for model in MODELS.values())
-"""Largest force (N) of all real devices: a force limit above it is refused as an error."""
+"""Largest force (N) of all real devices."""
 
 DEVICES = (SIMULATED, *REAL_DEVICES)
 """Names of the devices that are offered for studies and recordings."""
@@ -46,12 +46,12 @@ FRICTIONLESS = "simulated-frictionless"
 `DEVICES`."""
 
 SIMULATIONS = (SIMULATED, FRICTIONLESS)
-"""Names of the simulated devices, which run in virtual time."""
+"""Names of the simulated devices, which can run in virtual time."""
 
 
 def needs_real_time(name: str) -> bool:
-    """Whether the device with this name runs in real time; simulated devices, also those from a recording or a
-    calibration file, run in virtual time."""
+    """Whether the device with this name needs real time; simulated devices, also those from a recording or a
+    calibration file, can run in virtual time."""
     return name not in SIMULATIONS and not name.startswith((REPLAY_PREFIX, CALIBRATED_PREFIX))
 
 
@@ -81,8 +81,8 @@ def open_device(
     name: str, settings: DeviceSettings, clock: Clock, seed: int, *, own_process: bool = True, telemetry: str = ""
 ) -> Device:
     """Open a device behind the safety layer. seed: of the random numbers of a simulated device. own_process: run the
-    control loop of a real device in a separate process; False within that process, and in tests. telemetry: path of the
-    caller's telemetry ring; empty: a new ring if the clock is not virtual and own_process is True, else none. Raises
+    control loop of a real device in a separate process; False within that process. telemetry: path of the caller's
+    telemetry ring; empty: a new ring if the clock is not virtual and own_process is True, else none. Raises
     `DeviceError`, and `StudyError` for a recording or calibration that cannot be used."""
     if name not in SIMULATIONS and name not in REAL_DEVICES and not name.startswith((REPLAY_PREFIX, CALIBRATED_PREFIX)):
         raise _make_unknown_device_error(name)
@@ -263,8 +263,8 @@ def accept_device(
 ) -> str:
     """Test the force limit of a real device without a hand on the handle: command more than the cap, hold the force of
     the cap, stop the loop; write the acceptance if the force stayed within the cap and was switched off. Returns a
-    sentence with the results. Raises `DeviceError`. The caller (`study.workflows.checks.examine_setup`) has made all
-    other checks. operator: name of the person; baseline: file name and SHA-256 of the recording for the daily check."""
+    sentence with the results. Raises `DeviceError`. operator: name of the person; baseline: file name and SHA-256 of
+    the recording for the daily check."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_limit_check import (
         COMMAND_TO_CAP_RATIO,

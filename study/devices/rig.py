@@ -1,11 +1,11 @@
 """Interfaces of a bare haptic device ("rig"), which need not limit its force. Only the safety layer
 (`study.devices.safe`) may drive it, apart from the acceptance test; drivers and simulations of devices implement it.
 
-A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits (by the safety layer), `write` (held until t_(k+1)).
-`Rig` is called from Python at each tick; `CompiledIo` and `CompiledRig` are called from compiled loops.
+A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits (by the safety layer), `write` or `advance` (held until
+t_(k+1)). `Rig` is called from Python at each tick; `CompiledIo` and `CompiledRig` are called from compiled loops.
 
-The indices below are compiled into the safety layer and the drivers. A change of this file compiles them anew, because
-its fingerprint is part of theirs (`study.devices.governor.compiling`).
+The indices below are compiled into the safety layer and the drivers, which a change of this file compiles anew
+(`study.devices.governor.compiling`).
 """
 
 from collections.abc import Callable
@@ -35,9 +35,9 @@ READING_SIZE = 10
 class Rig(Protocol):
     """Interface of a device that is driven tick by tick from Python: a real or a scripted device.
 
-    A single thread calls `sense`, `write` and `buttons` in turn. While any of these hangs, another thread calls `write`
-    with zero force, and `close`. A driver must serve these calls even if its library is not made for threads, and must
-    exert no force after them.
+    A single thread calls `sense`, `write` and `buttons` in turn. At the end, and while any of these hangs, other
+    threads call `write` with zero force, and `close`. A driver must serve these calls even if its library is not made
+    for threads, and must exert no force after them.
     """
 
     @property
@@ -60,8 +60,7 @@ class Rig(Protocol):
         ...
 
     def buttons(self) -> frozenset[int]:
-        """Read the numbers of the pressed buttons. Called after every reading in the same thread: it must not take
-        longer than `sense`."""
+        """Read the numbers of the pressed buttons. Called after readings: it must not take longer than `sense`."""
         ...
 
     def write(self, force_n: FloatArray) -> None:
@@ -77,8 +76,8 @@ class Rig(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledIo:
-    """Compiled `sense` and `write` of a rig's driver: a `Rig` with an attribute `halves` of this type is driven by a
-    compiled loop, without the Python interpreter.
+    """Compiled `sense` and `write` of a rig's driver: a `Rig` with an attribute `halves` of this type can be driven by
+    a compiled loop, without the Python interpreter.
 
     Both functions do exactly what the rig's methods of the same names do, including errors; the rig's `buttons` may
     then be called from any thread. See `study.devices.drive.compiled_drive` for the signatures."""

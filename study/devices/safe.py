@@ -1,5 +1,4 @@
 """Safety layer: implements the `Device` port over any rig, compiled or driven from Python, in real or virtual time.
-Made by `study.devices.opening`, for every device that a session or a recording drives.
 
 `governor.govern` limits the force at each tick; `admission` refuses unsafe settings and stimuli before anything moves;
 `drive.virtual_drive` and `drive.realtime_drive` decide when ticks run. The limits and their reasons: docs/safety.md.
@@ -47,7 +46,7 @@ STOP_TIMEOUT_S = 1.0
 
 class SafeDevice:
     """The `Device` port (`study.devices.device.Device`) over a rig. The constructor raises `DeviceError` for settings
-    that are not safe; all calls raise as the port states."""
+    that are not safe; the port's methods raise as it states."""
 
     def __init__(
         self, rig: Rig | CompiledRig, settings: DeviceSettings, clock: Clock, ring: Ring | None = None
@@ -89,7 +88,7 @@ class SafeDevice:
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
         """Hold a stimulus of valid shape that `hold` refuses, to test that the caps hold at each tick. Raises
-        `DeviceError` with a hand on the handle."""
+        `DeviceError` with a hand on the handle, and where `hold` would for the state of the device."""
         if self._hand_on_handle:
             raise _make_usage_error("A hand is on the handle.", "Open it without.")
         self._require_idle()
@@ -139,7 +138,7 @@ class SafeDevice:
         return make_commands_recording(self._governor, self._info, self._own_clock_sensor)
 
     def look(self) -> Look:
-        """Wait for the loop's next reading, at most `realtime_drive.READING_TIMEOUT_S`."""
+        """In real time, while nothing moves, wait for the next reading, at most `realtime_drive.READING_TIMEOUT_S`."""
         self._drive.check()
         has_reading = not self._closing and self._drive.refresh()
         missed_ticks = self._governor.missed if self._held_stimulus is not None or self._runner.moving else 0
@@ -172,7 +171,7 @@ class SafeDevice:
         self._closed = True
         atexit.unregister(self._close_at_exit)
         if not (self._runner.force_off and self._runner.disconnected):
-            # `close` never raises and may be the program's last action, so stderr must warn the person at the handle.
+            # This may be the program's last action, so stderr must warn the person at the handle.
             warning = CLOSING_UNCONFIRMED if self._runner.force_off else Fault.FORCE_LEFT.value
             with contextlib.suppress(OSError):
                 sys.stderr.writelines([f"{warning}\n"])

@@ -8,9 +8,6 @@ process is killed.
 
 The first row is a header: format, rate, number of rows written so far. Row k of the loop is in row 1 + k mod size, with
 its own number k and a checksum: a reader recognises by them a row that is being overwritten.
-
-`Ring` is used by `safe`, `opening` and `loop_process.remote_device`, `TelemetryReader` by `opening` and
-`study.workflows.views.stream_signals`.
 """
 
 import contextlib
@@ -33,8 +30,7 @@ RING_ROWS = 16384
 """Rows of a ring: 16 s at 1 kHz, for which a reader may pause and loses nothing. Chosen."""
 
 FORMAT_VERSION = 2.0
-"""Version of the rows. In version 1 the checksum was the exclusive or of the cells' bits, which does not detect equal
-changes in two cells."""
+"""Version of the row format."""
 RING_FILE_PREFIX, RING_FILE_SUFFIX = "hapteq-", ".ring"
 """Beginning and end of a ring's file name."""
 ROW_BYTES = 8 * cells.RING_WIDTH
@@ -103,7 +99,7 @@ class Telemetry:
     """Readings and forces of successive ticks, oldest first. Each array has a row per tick; vectors are (n, 3)."""
 
     time_s: FloatArray
-    """(n,) time of the tick's reading on the session's monotonic clock."""
+    """(n,) time of the tick's reading on the session's monotonic clock; without a time stamp, when the tick was due."""
     tick: FloatArray
     """(n,) number of the tick in its stimulus, from 0; negative while the handle is brought to rest before it."""
     position_m: FloatArray

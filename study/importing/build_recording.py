@@ -2,8 +2,7 @@
 
 For each part (one file, or one run in it): arrays are read, the clocks of its loggers aligned, and its channels put
 onto one time grid (`resample_part`). The parts are then concatenated and converted to SI units; where the map states no
-segments, they are found if the excitation repeats. Called by `study.workflows.recording.import_recording` and
-`study.evaluation.real.diagnose_real`.
+segments, they are found if the excitation repeats. Begin at `build_recording`.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -2,7 +2,7 @@
 in `time [s], force [N], displacement_mm`.
 
 `find_header_problems` lists what the names do not determine; without problems, `make_header_map` makes the map and
-`describe_header_choices` reports the choices. Called by `import_recording` and `map_library`.
+`describe_header_choices` reports the choices.
 """
 
 import re

@@ -1,8 +1,7 @@
 """Find the import map for recorded files: by its name or path, in the files' folder, or from the headers of the files.
 
-A map in the folder comes first, then shipped maps (`maps/`) that match file names and arrays, then
-`make_map_from_headers`. Called by `workflows.recording.import_recording`, `workflows.files.importing_docs` (shipped
-maps) and `study.evaluation.real`.
+A map in the folder comes first, then shipped maps (`maps/`) that match file names and arrays
+(`find_maps_for_folder`), then a map from headers (`make_map_from_headers`).
 """
 
 import re

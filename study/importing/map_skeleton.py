@@ -1,8 +1,7 @@
 """Make an incomplete import map for a file of which only the arrays are known, to be completed by the user.
 
 Clocks, channels and runs are proposed from names, units, shapes and data; `hold` and the segment are a common choice.
-Other unknown values are left empty or described in a comment. Called by `study.workflows.recording.import_recording`
-and `map_library` where a map is missing.
+Other unknown values are left empty or described in a comment.
 """
 
 import json
@@ -44,8 +43,8 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 
 
 def make_map_skeleton(arrays: Arrays) -> str:
-    """Make the map as TOML text. An unknown device, role or unit of time is an empty text, with which an import fails
-    and names the key; an empty unit of a channel stands for a plain number."""
+    """Make the map as TOML text. The device, and an unknown role or unit of time, are empty texts, with which an import
+    fails and names the key; an empty unit of a channel stands for a plain number."""
     return "\n".join(_write_lines(arrays)) + "\n"
 
 
@@ -141,8 +140,8 @@ def _match_clock(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
 
 
 def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
-    """Write a comment, in lines of up to 110 characters, that says whether the force or the motion is taken for the
-    command; nothing where names and quantities determine it."""
+    """Write a comment that says whether the force or the motion is taken for the command; nothing where names and
+    quantities determine it."""
     parsed_names = [parse_signal_name(_strip_value_suffix(name)) for name in roles]
     if may_be_imposed_motion(parsed_names):
         force_roles = [
@@ -261,8 +260,8 @@ def _write_clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
 
 
 def _write_table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
-    """Write a channel per line of a table; a table [time, value] gives one channel, with the name and role of the
-    table."""
+    """Write a channel per line of a table, except its line of times; a table [time, value] gives one channel, with the
+    name and role of the table."""
     has_time = has_time_line(array)
     for line_index in range(int(has_time), min(array.shape)):
         is_single = has_time and min(array.shape) == 2

@@ -1,4 +1,4 @@
-"""Channels of one part of a recording, resampled to one uniform time grid. Called by `build_recording`.
+"""Channels of one part of a recording, resampled to one uniform time grid (`resample_part`).
 
 The grid covers the time range in which all channels have samples, within the limits of the part. Channels whose samples
 lie on the grid are copied; all others are resampled as the map states. Computed channels are then evaluated on the
@@ -111,7 +111,7 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
 
 def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     """Count the samples of a clock: those of its time stamps, otherwise those of its first channel that is not
-    constant; 0 without one."""
+    a single number; 0 without one."""
     if logger.base.stamps_s is not None:
         return len(logger.base.stamps_s)
     first_clock = import_map.clock[0].name

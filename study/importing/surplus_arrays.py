@@ -1,7 +1,7 @@
 """Recognise the arrays of a file that a proposed map omits: arrays without numbers, row numbers and repeated times.
 
 Time columns, tables whose first row or column is the time, and sample rates are recognised as well. The limits below
-were chosen by hand. Called by `header_map` and `map_skeleton`.
+were chosen by hand.
 """
 
 import re
@@ -29,7 +29,7 @@ _ROW_NUMBER_NAME = re.compile(
 _RATE_NAME = re.compile(
     r"((.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)|rate)(( in)? ?k?hz)?"
 )
-"""Name of a sample rate, in lower case without punctuation; the rate of an excitation does not match."""
+"""Name of a sample rate, in lower case without punctuation; "excitation rate" does not match."""
 _SAMPLING_INTERVAL_WORDS = {"ts", "dt"}
 """Words in the name of a sampling interval."""
 _USUAL_UNIT_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
@@ -145,7 +145,7 @@ def has_time_line(array: Array) -> bool:
     steps = np.diff(lines[0].astype(float))
     has_even_steps = bool(
         np.ptp(steps) <= _MAX_STEP_RANGE * abs(np.median(steps))
-    )  # accepted even where all values increase
+    )  # accepted even where all lines increase
     return len(lines) > 1 and is_growing[0] and (has_even_steps or not all(is_growing))
 
 

@@ -1,10 +1,9 @@
 """Time base of a logger's channels: a stated rate, or time stamps, which are checked and brought to a uniform grid.
 
 Stamps are refused where they are missing, run backwards (a counter that wraps around, a clock that is set back),
-repeat, or jump by an hour or too far (`MAX_SAMPLES`); the message names the first such sample and, where there is one,
-the remedy. Stamps that are uniform apart from rounding and skipped rows give a rate and the index of each sample
-(`uniform_stamps`). Rows that a logger wrote twice are removed (`drop_doubled_rows`). Called by `build_recording`,
-`alignment` and `part_signals`.
+repeat, jump ahead once by an hour while other steps are short, or span too many samples (`MAX_SAMPLES`); the message
+names a sample and, where there is one, the remedy. Stamps that are uniform apart from rounding and skipped rows give a
+rate and the index of each sample (`uniform_stamps`). `drop_doubled_rows` removes rows that a logger wrote twice.
 """
 
 from dataclasses import dataclass, replace
@@ -32,8 +31,8 @@ such as the microseconds or nanoseconds of a second."""
 PLACEHOLDER_RATE_HZ = 1.0
 """Placeholder rate (Hz) of samples whose time is unknown."""
 MAX_SAMPLES = 10**8
-"""Most samples of a part of a recording (28 hours at 1 kHz). A wrong stamp would otherwise fill the memory with missing
-samples. Chosen."""
+"""Largest number of samples of a part of a recording (28 hours at 1 kHz). A wrong stamp would otherwise fill the memory
+with missing samples. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +44,7 @@ class TimeBase:
     rate_hz: float
     """Sample rate (Hz); 0 if stamps are not uniform."""
     stamps_s: Value | None
-    """(n,) as logged, in seconds; None for a clock with a rate only."""
+    """(n,) as logged, in seconds; None for a clock without stamps."""
     sample_index: IntArray | None
     """(n,): index of each stamp's sample at the uniform rate; None if stamps are not uniform, or there are none."""
     gap_s: float
@@ -69,8 +68,8 @@ class TimeBase:
         return self.stamps_s
 
     def describe_gaps(self) -> str:
-        """Describe the number of gaps in the stamps, and the key that declares that nothing is missing, in a sentence;
-        empty without gaps."""
+        """Describe the number of gaps in the stamps, and the key that declares that nothing is missing; empty without
+        gaps."""
         steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
         gaps_s = steps_s[steps_s > self.gap_s]
         if not len(gaps_s):
@@ -84,7 +83,7 @@ class TimeBase:
 
     def describe_wander(self) -> str:
         """Describe the deviation of the stamps from the uniform grid that was fitted, in a sentence; empty where it is
-        within `GRID_TOLERANCE`."""
+        within `GRID_TOLERANCE` (in periods), or no grid was fitted."""
         if self.stamps_s is None or self.sample_index is None:
             return ""
         deviation_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))

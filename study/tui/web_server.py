@@ -51,7 +51,7 @@ class ScreenServer(Server):
         self._downloads_in_progress: set[str] = set()
 
     def initialize_logging(self) -> None:
-        """Log warnings only: a log of requests would hide important lines and show the token."""
+        """Log from warnings on: a log of requests would hide important lines and show the token."""
         logging.basicConfig(level=logging.WARNING, format="%(message)s")
         logging.getLogger("aiohttp.access").disabled = True
 
@@ -62,9 +62,8 @@ class ScreenServer(Server):
         )
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
-        """Run the application for the page that opens this connection, until either ends. Raises HTTPForbidden for a
-        page of another origin, and HTTPConflict where another window is still open after `RELOAD_TIMEOUT_S`."""
-        # A browser states the page that opens a WebSocket; other pages must not drive the device.
+        """Run the application for the page that opens this connection, until either ends. Raises HTTPForbidden for
+        another origin or none, and HTTPConflict where another window is still open after `RELOAD_TIMEOUT_S`."""
         if request.headers.get("Origin") not in self._allowed_origins:
             raise web.HTTPForbidden(text="Only the page of this server may drive the device.")
         try:
@@ -173,8 +172,7 @@ def _format_origin(host_name: str, port: int) -> str:
 
 
 def _find_inline_scripts(page_html: str) -> Iterator[str]:
-    """Find the inline scripts and event handlers (on... attributes) of an HTML page, each of which needs its own
-    hash."""
+    """Find the inline scripts and event handlers (on... attributes) of an HTML page."""
     yield from re.findall(r"<script>(.*?)</script>", page_html, re.DOTALL)
     yield from dict.fromkeys(re.findall(r'\bon[a-z]+="([^"]*)"', page_html, re.IGNORECASE))
 

@@ -1,7 +1,7 @@
 """Execution of work on the workers of a dask cluster, by the `Executor` interface that local processes also have.
 
 Each worker imports its own installation of hapteq. All must have the same version, because other code could give other
-numbers. `hapteq power` and `study.cli.scheduler` open the executor where the option --scheduler is given.
+numbers. `open_cluster_workers` opens the executor.
 """
 
 import threading
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SCHEDULER_TIMEOUT_S = 10.0
 """Longest wait (s) for an answer of the scheduler (chosen)."""
 WORKER_TIMEOUT_S = 60.0
-"""Longest time (s) that work waits while the scheduler has no worker or does not answer; also the time limit of the
+"""Time (s) without a worker or an answer of the scheduler after which work is given up; also the time limit of the
 first request. Chosen: long enough for either to restart."""
 POLL_INTERVAL_S = 1.0
 """Interval (s) at which the workers are counted (chosen: short beside `WORKER_TIMEOUT_S`)."""
@@ -119,8 +119,8 @@ def _watch_workers(client: "Client", executor: Executor, address: str, loss_erro
 def _watch_until_loss(
     client: "Client", executor: Executor, address: str, loss_errors: list[StudyError], stop_event: threading.Event
 ) -> None:
-    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or there was none for `WORKER_TIMEOUT_S`;
-    then append the cause to `loss_errors` and cancel all tasks. Runs in the thread of `_watch_workers`."""
+    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or there was none for `WORKER_TIMEOUT_S`; in
+    the second case, append the cause to `loss_errors` and cancel all tasks."""
     last_seen_s = time.monotonic()
     while not stop_event.wait(POLL_INTERVAL_S):
         workers, error = _count_workers(client)
@@ -135,7 +135,7 @@ def _watch_until_loss(
 
 
 def _count_workers(client: "Client") -> tuple[int, Exception | None]:
-    """Count the scheduler's workers; 0 and the error where it does not answer within `SCHEDULER_TIMEOUT_S`."""
+    """Count the scheduler's workers; 0 and the error where asking fails or takes longer than `SCHEDULER_TIMEOUT_S`."""
     try:
         return len(client.nthreads(callback_timeout=SCHEDULER_TIMEOUT_S)), None
     except Exception as error:  # noqa: BLE001 — distributed has many for a lost scheduler, and none may end the watch
@@ -205,11 +205,10 @@ def _request_worker_setup(client: "Client") -> _WorkerSetup:
 
 def _request_setup_with_timeout(client: "Client", address: str) -> _WorkerSetup:
     """Call `_request_worker_setup` with the time limit `WORKER_TIMEOUT_S`: distributed waits without a limit for a
-    scheduler or a worker that does not answer. Raises StudyError."""
+    scheduler or a worker that does not answer. Raises StudyError for a TimeoutError; its other errors escape."""
     setup_future = Future[_WorkerSetup]()
 
     def store_setup() -> None:
-        """Store the setup of the workers, or the exception, in the future."""
         try:
             setup_future.set_result(_request_worker_setup(client))
         except BaseException as error:  # noqa: BLE001 — raised where the result is waited for

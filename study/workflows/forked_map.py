@@ -1,9 +1,8 @@
 """Parallel `map` over forked processes, for work in Python code, where threads would wait for the global interpreter
 lock.
 
-`map_forked` is used by the diagnosis workflows, `study.evaluation.real` and `picture_files`. A forked process inherits
-all data; results return through a pipe. The worker processes and the calling process take tasks one after another from
-a shared pipe of tokens until it is empty (dynamic scheduling). Nested calls run serially.
+A forked process inherits all data; results return through a pipe. The worker processes and the calling process take
+tasks one after another from a shared pipe of tokens until it is empty (dynamic scheduling). Nested calls run serially.
 
 Forking is safe together with numba here: no kernel has `parallel=True` or `prange`, so numba starts no threads whose
 locks a forked process would inherit.
@@ -131,12 +130,11 @@ class _SharedTasks:
         return self._order_results(results_by_task)
 
     def _order_results(self, results_by_task: dict[int, tuple[Any, Exception | None]]) -> list[Any]:
-        """Order the results by their tasks; tasks without a result are computed here. Raises the error of the first
-        task that failed."""
+        """Order the results by their tasks. Tasks without a result, at which a process died or whose result it could
+        not send, are computed here. Raises the error of the first task that failed."""
         results = []
         for index, task in enumerate(self._tasks):
             if index not in results_by_task:
-                # Results that a process could not send, or tasks at which it died, are computed here.
                 _unforkable.add(_identify_function(self._function))
                 results_by_task[index] = self._function(*task), None
             result, error = results_by_task[index]

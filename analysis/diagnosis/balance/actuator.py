@@ -1,12 +1,12 @@
 """Laws of the actuator (such as dead band, saturation and curvature), found with the force balance inverted.
 
-A law of the command cannot be a column of a regression of that command, because it would reproduce the command. In the
-balance solved for the acceleration, the command is a regressor without noise:
+A law of the command would reproduce the command as a column of its regression. In the balance solved for the
+acceleration, the command is a regressor without noise:
 
     a = (g(u) - B v - K x - sum of w phi) / M
 
 with the command's rate of change as a further regressor, for a short lag. g(u) is tried in place of u, together with
-the best sums of laws of the motion, and is named where it explains most of their residual. Called by `balances`.
+the best sums of laws of the motion, and is named only where it explains most of their residual. Called by `balances`.
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 MOST_PASSES = 8
-"""Largest number of passes of the coordinate search over a law's nonlinear parameters; chosen by hand."""
+"""Largest number of passes of the coordinate search over a law's parameters; chosen by hand."""
 UNNECESSARY_REASON = "a law of the command reaches as small an error without it"  # objection to a law of the motion
 CURVE_LIKE_LAW = "quadratic_damping"
 """Law of the motion that resembles an actuator's curve when the speed follows the command."""
@@ -57,7 +57,7 @@ HOLDING_LAWS = (*SLIDING, "presliding_hysteresis")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActuatorFit:
-    """The law of the command that fits best, with its test on held-out data and comparisons with laws of the motion."""
+    """The law of the command that fits best, with its test and comparisons with laws of the motion."""
 
     law: CommandLaw
     judged_law: JudgedLaw
@@ -84,7 +84,7 @@ def find_balance(
     motions: Sequence[Motion], driven: DrivenAxis, excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> Balance:
     """Find the balance of one axis: laws of the motion and, where significant, a law of the command. With a named one,
-    the laws of the motion are searched again for the force that it gives; else it may be listed, with an objection."""
+    the laws of the motion are searched again for the force that it gives."""
     axis, rotational = driven.number, driven.rotational
     balance = judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left))
     actuator = find_command_law(balance, driven, excluded, map_) if balance.tested else None
@@ -117,7 +117,7 @@ def _withdraw_if_curved(law: JudgedLaw, actuator: ActuatorFit) -> JudgedLaw:
 
 
 def _pass_through_law(motion: Motion, axis: int, driven_channel: int, law: CommandLaw) -> Motion:
-    """Replace the command of an axis by the force that the law gives for it."""
+    """Replace the command of an axis by the force that the law gives."""
     force = motion.force.copy()
     force[:, [axis]] = law.compute_columns(force[:, axis], motion.position[:, driven_channel])
     return replace(motion, force=force)
@@ -140,7 +140,7 @@ def find_command_law(
     replacement = _replace_motion_laws(inverse, kinds, tuple(named_law.law_index for named_law in balance.named))
     if replacement is not None:
         return replacement
-    # Laws of the position are left out where the balance is solved for it: they would reproduce it.
+    # For a servo no laws of the motion are tried: those of the quantity that is solved for would reproduce it.
     sums = _list_sums(search) if target is None else [()]
     unchanged_error, motion_laws = min((inverse.sum_errors(IDEAL_ACTUATOR, law_sum), law_sum) for law_sum in sums)
     laws = _select_promising(inverse, kinds, (1 - FURTHER_LAW_SHARE / 2) * unchanged_error, motion_laws)
@@ -163,7 +163,7 @@ LawKinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
 
 
 def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozenset[str]) -> LawKinds:
-    """List the kinds of laws to try: electromagnets only with measured translations; none where the command is zero."""
+    """List the kinds of laws to try: magnets only with measured translational positions; none for a zero command."""
     motions, driven_channel = regression.motions, regression.base_terms.driven_channel
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     if not np.any(command):
@@ -198,7 +198,7 @@ def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: t
     smaller error than several, which had compensated for it, as a drag does for a falling gain; else None."""
     if not named_laws:
         return None
-    # Half of the gain required below, because the sums only approximate the laws.
+    # For one law half of the gain required below, because the sums only approximate the laws.
     error_share = 1 - COMMAND_LAW_GAIN / 2 if len(named_laws) == 1 else 1 / (1 - COMMAND_RIVAL_MARGIN)
     largest_error = error_share * inverse.sum_errors(IDEAL_ACTUATOR, named_laws)
     laws = _select_promising(inverse, kinds, largest_error, ())
@@ -221,8 +221,8 @@ def _scale_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
 
 
 def _list_sums(search: StructureSearch) -> list[tuple[int, ...]]:
-    """List the best sums of laws of the motion, first none. Laws that are linear in the motion are left out: as filters
-    of the acceleration they would reproduce it."""
+    """List the best sums of laws of the motion, first none. Sums with a linear law are left out: as a filter of the
+    acceleration it would reproduce it."""
     laws = search.regression.laws
     sums = [s.laws for s in search.ranked if s.laws and not any(laws[k].is_linear for k in s.laws)]
     return [(), *sums[:SUMS_BESIDE_COMMAND_LAW]]
@@ -231,7 +231,7 @@ def _list_sums(search: StructureSearch) -> list[tuple[int, ...]]:
 def _refine_best_per_effect(
     inverse: InverseBalance, laws: Sequence[CommandLaw], motion_laws: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
-    """Refine the best law of each effect: errors and laws. Flexible laws need a clearly smaller error than others."""
+    """Refine the best law of each effect: errors and laws. Flexible ones are kept only with a clearly smaller error."""
     best: dict[str, tuple[float, CommandLaw]] = {}
     for law, error in zip(laws, inverse.sum_errors_per_law(laws, motion_laws), strict=True):
         if law.effect not in best or error < best[law.effect][0]:
@@ -250,7 +250,7 @@ def _refine_best_per_effect(
 def _refine_values(
     inverse: InverseBalance, motion_laws: tuple[int, ...], start: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
-    """Search a law's values along coordinates until one of `MOST_PASSES` passes lowers its error by less than 0.1 %."""
+    """Search a law's values along coordinates, in `MOST_PASSES` passes or until one gains at most 0.1 %."""
     error, law = start
     for _ in range(MOST_PASSES):
         neighbours = [(inverse.sum_errors(neighbour, motion_laws), neighbour) for neighbour in vary_parameters(law)]

@@ -1,8 +1,6 @@
 """Force balance of each axis of the recordings: the regression M a + B v + K x + laws = command.
 
-Each axis is first fitted in the band that noise allows (`band.py`). If no law is named there, the regression is
-repeated in the narrower band in which the device moves, and then with the samples in motion only. Laws outside the
-catalogue are compared with the result at the end. Called by `diagnose` and `first_model.fit_without_model`.
+Begin at `find_balances`, which is called by `diagnose` and `first_model.fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,11 +25,11 @@ from equalizer.signals.recording import Recording
 def find_balances(
     recordings: Sequence[Recording], excluded: frozenset[str], time_left: TimeBudget, map_: Mapper = map
 ) -> tuple[Balance, ...]:
-    """Find the force balance of each command; empty where no motion was measured, or too little of it. recordings: at
-    least one, with the same channels. excluded: names of effects that are left out, of the catalogue or of `FREE_LAWS`.
-    Where all axes can be tested and no law is named in the band that noise allows, the narrower band in which the
-    device moves is tried, because power of the command above that band hides laws; then the samples in motion alone.
-    Laws outside the catalogue are compared with the result."""
+    """Find the force balance of each command; empty where no motion was measured, or too little of it for a fit.
+    recordings: at least one, with the same channels. excluded: names of effects that are left out, of the catalogue or
+    of `FREE_LAWS`. Where all axes can be tested and no law is named in the band that noise allows (`band.py`), the
+    narrower band in which the device moves is tried, because power of the command above that band hides laws; then the
+    samples in motion alone. Laws outside the catalogue are compared with the result."""
     try:
         records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = compute_motions(records)
@@ -109,11 +107,11 @@ def _fit_balances(
     time_left: TimeBudget,
     map_: Mapper,
 ) -> tuple[Balance, ...]:
-    """Fit the balance of each command. Raises numpy.linalg.LinAlgError where the motion does not determine it."""
-    # With an imposed motion, the force is the response of the device, so that no actuator needs to be tested.
+    """Fit the balance of each command. Raises NoMotionError without samples to fit, LinAlgError for a singular fit."""
     rotational = any(unit.startswith("rad") for unit in recordings[0].response.units)
     rotational |= any(unit.startswith("N m") for unit in recordings[0].command.units)
     axes = range(len(recordings[0].command.channels))
+    # With an imposed motion, the force is the response of the device, so that no actuator needs to be tested.
     if any(recording.meta.get("imposed") for recording in recordings):
         return tuple(
             judge_laws(search_with_linear_part(motions, axis, rotational, excluded, time_left)) for axis in axes

@@ -3,9 +3,8 @@
 X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force (in
 `inverse_balance`, the predicted motion, whose columns include the command). A block keeps the Gram matrix X'X, the
 cross products X'y and y'y in place of its samples. Sums of these over blocks give the fit to any subset of blocks and
-columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
-y'y - 2 w'X'y + w'X'X w. Used by `regression`, `inverse_balance`, `linear_part`, `judged_law` and
-`first_model.joint_fit`.
+columns without the samples, which makes cross-validation fast. Weights w leave the residual sum of squares y'y - 2
+w'X'y + w'X'X w.
 """
 
 from collections.abc import Sequence
@@ -32,11 +31,11 @@ class Block:
     """Products of a block of consecutive samples: of its columns with each other and with the force."""
 
     gram: FloatArray
-    """(k, k): X'X of the columns X."""
+    """(k, k): X'X."""
     cross: FloatArray
-    """(k,): X'y, the cross products of the columns with the force y."""
+    """(k,): X'y."""
     power: float
-    """Sum of squares of the force y, y'y."""
+    """y'y."""
     centred_power: float
     """Sum of squares of the force about its mean over all fitted samples."""
     motion: int
@@ -106,7 +105,7 @@ def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[Float
 
 def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
     """Solve for weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge:
-    added to the diagonal, relative to its mean, and 1e-300 for a matrix of zeros. Raises LinAlgError where a system is
+    added to the diagonal, relative to its mean, with 1e-300 for a matrix of zeros. Raises LinAlgError where a system is
     singular nevertheless."""
     gram, cross = products
     column_count = gram.shape[-1]

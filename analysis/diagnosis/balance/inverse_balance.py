@@ -44,16 +44,14 @@ class CommandForce(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InverseBalance:
-    """Force balance of an axis, solved for the acceleration; for a servo, whose command is a reference position or
-    velocity, solved for that quantity."""
+    """Force balance of an axis, solved for `solved_column`."""
 
     search: StructureSearch
-    """The search for laws of the motion, whose regression and base are used here."""
+    """The search for laws of the motion, whose regression is used."""
     map_: Mapper
-    """Like `map`; may run in parallel. Maps laws to their errors or refined values."""
+    """Like `map`; may run in parallel."""
     has_friction: bool
-    """Whether friction is among the laws of the motion: samples at rest are then not used, because static friction
-    balances any force up to its level."""
+    """Whether samples at rest are left out, because static friction balances any force up to its level there."""
     commanded_order: int | None = None
     """Order of the position's time derivative that a servo's command is a reference for; None = the command is a
     force."""
@@ -72,8 +70,7 @@ class InverseBalance:
         return column if column < regression.matrix_column_count else driven_channel
 
     def sum_errors_per_law(self, laws: Sequence[CommandLaw], motion_laws: Sequence[int]) -> list[float]:
-        """Sum the cross-validated squared errors of each law. motion_laws: indices of laws of the motion fitted with
-        it."""
+        """Sum the cross-validated squared errors of each law (`sum_errors`)."""
         return cast(list[float], list(self.map_(partial(self.sum_errors, motion_laws=motion_laws), laws)))
 
     def sum_errors(self, law: CommandLaw, motion_laws: Sequence[int]) -> float:
@@ -82,7 +79,7 @@ class InverseBalance:
         return float(self.evaluate_law(law, motion_laws, False).sum())
 
     def fit_lower_bound(self, law: CommandForce, motion_laws: Sequence[int]) -> float:
-        """Compute the sum of squared errors on the fitted samples: a lower bound for each law that it approximates."""
+        """Compute the sum of squared errors on the fitted samples: about a lower bound for the laws it approximates."""
         fit_blocks, _ = self._build_blocks(self._build_regressors(law, motion_laws), False)
         products = [select_products(block, range(len(fit_blocks[0].cross))) for block in fit_blocks]
         weights = solve_normal_equations(sum_products(fit_blocks, range(len(fit_blocks[0].cross))), RIDGE)

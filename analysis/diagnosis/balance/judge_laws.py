@@ -1,10 +1,9 @@
-"""Test the laws of a force balance on held-out data. Called by `balances`, `actuator`, `compare_free_laws` and
-`confirm.balance_with_model`.
+"""Test the laws of a force balance on held-out data, or else by cross-validation. Begin at `judge_laws`.
 
-No model of a real device reaches the sensor noise, so that a test against the noise rejects all. A law is named by the
-relative decrease of the held-out squared error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat.
-17:1217, 1989), by its share of the decrease by all laws together, which leave the error `ceiling`, and unless other
-effects fit equally well (its class).
+Models of real devices rarely reach the sensor noise: a test against it would reject them. A law is named by the
+relative decrease of the squared error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat. 17:1217,
+1989), by its share of the decrease by all laws together, which leave the error `ceiling`, and unless effects of another
+family, or too many, fit about as well (`_find_objection`).
 """
 
 from collections.abc import Sequence
@@ -63,9 +62,9 @@ class Balance:
     """Result of the force balance of one axis: the chosen structure, with a test of each of its laws.
 
     laws: any of the command, then those of the structure by falling gain. further_laws: others that lower its error.
-    linear, error, ceiling: rms error on the test blocks, relative to the force's rms, of mass, damping and stiffness
-    alone, of the chosen structure, and of all laws together; without a test, all three are the cross-validated linear
-    error. complete: whether the structure search was completed. tested: whether the blocks allow a test."""
+    linear, error, ceiling: rms error on the test blocks, over the rms of the force about its mean, of mass, damping and
+    stiffness alone, of the chosen structure, of all laws together; all three the cross-validated linear error without a
+    test. complete: of the search. tested: whether the blocks allow a test."""
 
     search: StructureSearch
     chosen: Structure
@@ -88,11 +87,11 @@ class Balance:
         return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.is_linear))
 
     def withdraw_names(self, reason: str) -> "Balance":
-        """Copy the balance with no law named. reason: objection, as a clause, to each law that has none yet."""
+        """Copy the balance with no law named. reason: objection to each law that has none yet."""
         return replace(self, laws=tuple(replace(law, objection=law.objection or reason) for law in self.laws))
 
     def compute_error(self, law_indices: Sequence[int]) -> float:
-        """Compute the error on the test blocks with laws (indices in the regression), relative to the force's rms."""
+        """Compute the error on the test blocks with laws (indices in the regression), relative as `error`."""
         regression = self.search.regression
         return float(np.sqrt(_compute_errors(regression, law_indices).sum() / _sum_power(regression)))
 
@@ -115,7 +114,7 @@ def judge_laws(search: StructureSearch) -> Balance:
 
 
 def _find_shared_channels(regression: Regression, law_indices: Sequence[int]) -> set[int]:
-    """Find the channels for which laws (indices in the regression) contain two laws of the family of friction."""
+    """Find the channels for which laws (indices in the regression) contain two effects of the family of friction."""
     law_keys = [regression.laws[law_index].key for law_index in law_indices]
     channels = [channel for effect, channel in set(law_keys) if effect in find_family("coulomb_friction")]
     return {channel for channel in channels if channels.count(channel) > 1}
@@ -136,8 +135,8 @@ def judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
-    """Object to each further named law of a family whose gain is below `SECOND_OF_FAMILY_SHARE`: it may only correct
-    the shape of the first. laws: the largest gain first."""
+    """Object to further named laws of a family with a gain below `SECOND_OF_FAMILY_SHARE`. laws: the largest gain
+    first."""
     results: list[JudgedLaw] = []
     for law in laws:
         similar = [judged for judged in results if judged.named and find_family(judged.law.effect) & {law.law.effect}]
@@ -231,10 +230,10 @@ def _find_equivalents(
         increases = _compute_errors(regression, indices) - full_errors
         if tested_law.effect not in list_special_cases(effect):
             is_best &= increases[draws].sum(axis=1) >= 0
-        # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
+        # Of two equally good laws, the simpler: another family's with more parameters must not have a larger error.
         has_more_parameters = count_parameters(regression, indices[-1:]) > count_parameters(regression, [law_index])
         limit = 0.0 if has_more_parameters and effect not in find_family(tested_law.effect) else RIVAL_MARGIN * decrease
-        if tested_law.effect in FREE_LAWS:  # rivals of a strong law leave less than four times as much
+        if tested_law.effect in FREE_LAWS:  # rivals of a strong law leave at most four times as much
             limit = min(limit, FREE_LAW_GAIN / (1 - FREE_LAW_GAIN) * float(full_errors.sum()))
         if float(increases.sum()) <= limit:
             equivalents.append((float(increases.sum()), effect))
@@ -272,7 +271,7 @@ def _find_objection(
 def _judge_further_laws(
     regression: Regression, chosen: Structure, reference: tuple[FloatArray, float]
 ) -> tuple[JudgedLaw, ...]:
-    """Test the best law of each other effect, the best eight (chosen): those with a significant gain, largest first."""
+    """Test the best law of each other effect, eight at most: those with a significant gain, the largest first."""
     chosen_errors, decrease = reference
     chosen_effects = {regression.laws[index].effect for index in chosen.laws}
     best_by_effect: dict[str, tuple[float, int]] = {}

@@ -1,8 +1,8 @@
-"""A law of a force balance with the result of its test on held-out blocks of samples, and the choice of these blocks.
+"""A law of a force balance with the result of its test on blocks of samples, and the choice of these blocks.
 
 The test compares two sums of squared force errors E over these blocks: of the chosen laws, and of the same laws without
 this one. Its gain is 1 - E(with it) / E(without it); the lower bound of the gain is from a bootstrap over blocks
-(Kunsch, Ann. Stat. 17:1217, 1989). `judge_laws` and `actuator` run the test and decide which laws are named.
+(Kunsch, Ann. Stat. 17:1217, 1989). `judge_laws` and `actuator` run the test.
 """
 
 from collections.abc import Sequence
@@ -34,20 +34,19 @@ FAMILIES = (
     FREE_SPEED_LAWS,
     FREE_POSITION_LAWS,
 )  # fmt: skip
-"""Families of effects with similar forces. A law whose equally good rivals are all of its own family, and not too many
-or all dry friction, is named with the rivals as its class; a law with such a rival of another family is not named. An
-unlisted effect is a family of its own."""
+"""Families of effects with similar forces: a law may be named together with rivals of its family, which form its class
+(`judge_laws`). An unlisted effect is a family of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedLaw:
-    """A law with its parameters, its gain on held-out blocks, and the reason not to name it, if there is one."""
+    """A law with its parameters, its gain on the test blocks, and the reason not to name it, if there is one."""
 
     law_index: int
     """Index of the law in the regression; `NO_COLUMN` for a law of the command."""
     law: Law
     values: dict[str, float]
-    """Parameters of the effect by name; empty where the fitted weights have signs that the effect cannot have."""
+    """Parameters of the effect by name; empty where they are not physical, or the law has none."""
     gain: float
     """Share of the squared error that the law removes when it is added to the other laws; a law of the command may
     replace these."""
@@ -57,10 +56,10 @@ class JudgedLaw:
     """Decrease of the squared error by this law, over the decrease by all laws together; for a law of the command, over
     the error of the linear balance."""
     equivalents: tuple[str, ...]
-    """Rivals: effects that fit about as well in place of this law; not sought for a further law of a balance."""
+    """Rivals: effects that fit about as well in place of this law; not sought for a further law of the motion."""
     probability: float
     """Share of bootstrap draws in which no other effect in its place has a smaller error, apart from effects that
-    contain it as a special case; 0 for a further law."""
+    contain it as a special case; 0 for a further law of the motion."""
     objection: str
     """Reason not to name the law, as a clause; empty where it is named."""
     stands_for: str = ""
@@ -69,7 +68,7 @@ class JudgedLaw:
     formula: Formula | None = None
     """Formula for the simulation of a law that is no effect of the catalogue; else None."""
     is_physical: bool = True
-    """Whether its parameters have physically possible signs, and its force is not many times the recorded force."""
+    """Whether its parameters have physically possible signs, and its force is not far above the recorded one."""
     confirmed_by_folds: bool = False
     """Whether the law has a gain on the held-out blocks, and a significant gain on these and the cross-validation folds
     together."""
@@ -110,8 +109,7 @@ def compute_force_ratio(regression: Regression, laws: Sequence[int], law_index: 
 
 
 def list_special_cases(effect: str) -> tuple[str, ...]:
-    """List the effects that are special cases of a law, so that the law fits at least as well; empty for a law outside
-    the catalogue."""
+    """List the effects that are special cases of a law; empty for a law outside the catalogue."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
 
 

@@ -2,8 +2,7 @@
 
 A lag, a delay, a mode or a relaxation is not missing physics but part of a linear first model. If the balance lacks it,
 nonlinear laws are not found, or wrong ones are fitted in its place. Therefore the search for laws is repeated with the
-linear terms that it found as part of the base, up to `LINEAR_PART_ROUNDS` searches. Called by `balances`, `actuator`
-and `compare_free_laws`."""
+linear terms that it found as part of the base, up to `LINEAR_PART_ROUNDS` searches."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -47,8 +46,8 @@ def search_with_linear_part(
     time_left: TimeBudget,
 ) -> StructureSearch:
     """Search for laws with `search_structures`; then again with the delay and the linear laws that this search finds as
-    part of the base, until it finds no further ones. excluded_effects: names of effects that are not tried. time_left:
-    the search ends where it returns False."""
+    part of the base, until it finds no further ones. excluded_effects: names. time_left: the search ends where it
+    returns False."""
     base_terms = BaseTerms(find_driven_channels(motions)[axis])
     search = search_structures(motions, axis, rotational, excluded_effects, time_left, base_terms)
     for _ in range(LINEAR_PART_ROUNDS - 1):
@@ -73,7 +72,7 @@ def find_driven_channels(motions: Sequence[Motion]) -> tuple[int, ...]:
     if channel_count <= force_count:
         return tuple(min(axis, channel_count - 1) for axis in range(force_count))
     errors = [_compute_errors_without_channel(motions, axis, channel_count) for axis in range(force_count)]
-    # Imported here: the package takes longer to import than a diagnosis that does not need it.
+    # Imported here: most diagnoses do not need this slow import.
     from scipy.optimize import linear_sum_assignment
 
     return tuple(linear_sum_assignment(errors, maximize=True)[1].tolist())

@@ -1,11 +1,10 @@
 """Positions, velocities, accelerations and forces from recordings, for force balances.
 
-Derivatives are computed in the frequency domain: each spectral line is multiplied by (i omega)^order and low-pass
-filtered. The upper end of the band is the highest frequency up to which white noise makes at most a hundredth of the
-acceleration's mean square, because regression on a noisier acceleration would underestimate the mass by more (errors in
-variables; Soderstrom, Automatica 43:939, 2007). Measured accelerations are integrated above a lower end of the band
-only, below which noise would dominate the position (`band.py` computes both ends). `compute_motions` is called by
-`balances`, by `contrast`, `confirm` and `first_model`.
+With a time axis, derivatives are computed in the frequency domain: each spectral line is multiplied by (i omega)^order
+and low-pass filtered. The upper end of the band is the highest frequency up to which white noise makes at most a
+hundredth of the acceleration's mean square, because regression on a noisier acceleration would underestimate the mass
+by more (errors in variables; Soderstrom, Automatica 43:939, 2007). Measured accelerations are integrated above a lower
+end of the band only, below which noise would dominate the position (`band.py`). Begin at `compute_motions`.
 """
 
 from collections.abc import Callable, Iterable, Sequence

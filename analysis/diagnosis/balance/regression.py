@@ -3,10 +3,10 @@
 The products X'X and X'f of all columns are computed once per block of samples (`blocks.py`). From them any sum of laws
 is fitted and tested without another pass over the samples.
 
-The base is mass, damping and stiffness along every measured motion, linear dynamics of a higher order where there are
-any (`BaseTerms`), and a constant. Errors are sums of squares of the residual force within the band. In
-cross-validation, the error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111,
-1974). Used in `balance` and `first_model`, by `contrast.force_base` and `result.curves.state_maps`.
+The base is mass, damping and stiffness along every measured motion and linear dynamics of a higher order where there
+are any (`BaseTerms`), or given columns, and a constant. Errors are sums of squares of the residual force within the
+band. In cross-validation, the error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B
+36:111, 1974). Begin at `build_regression`.
 """
 
 from collections.abc import Sequence
@@ -137,8 +137,8 @@ def build_regression(
 ) -> Regression:
     """Build the regression of one axis's force on mass, damping, stiffness and laws. turns: whether the shaft turns
     freely (`Scales.turns`) and so has no stiffness. base_terms: further terms of the base; None = none, and the force
-    drives the motion channel of the same index, or the last. bases: columns (n, k) per motion that replace mass,
-    damping and stiffness. Laws whose columns vanish or are not finite are left out."""
+    drives the motion channel of the same index, or the last. bases: columns (n, k) per motion that replace all of the
+    base but the constant. Laws whose columns vanish or are not finite are left out."""
     channel_count = len(motions[0].channels)
     base_terms = base_terms or BaseTerms(min(axis, channel_count - 1))
     forces = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
@@ -202,7 +202,7 @@ def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:
     """Fit all these columns by ridge regression: the cross-validated sum of squares, and that of each test block
     (blocks,). The ridge parameter is the one of `RIDGE_PARAMETERS` with the least cross-validated error; it does not
-    act on the base. The result estimates the least error that a sum of a few laws can reach."""
+    act on the base."""
     is_base = np.array([k < regression.base_column_count for k in columns])
     products = stack_products(regression.fit, columns)
     total_products = products[0].sum(axis=0), products[1].sum(axis=0)

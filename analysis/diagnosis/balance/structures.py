@@ -3,7 +3,7 @@
 Each structure in the beam, first the base alone, is extended by each further law (weights by least squares); nonlinear
 parameters of the best are refined, and the best `STRUCTURES_BEAM` are kept, as long as each size improves
 significantly. The error of a structure is the sum over folds of the squared force error with weights fitted to the
-other folds. `choose_simplest_structure` selects the result. Called by `linear_part` and `confirm.balance_with_model`.
+other folds. `search_structures` runs the search, `choose_simplest_structure` selects the result.
 """
 
 from collections.abc import Iterator, Sequence
@@ -72,7 +72,7 @@ def search_structures(
     base: BaseTerms | GivenModelBase | None = None,
 ) -> StructureSearch:
     """Search for the sum of at most `MOST_SUMMED_LAWS` laws with the least cross-validated error. excluded: effects
-    left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
+    left out. base: None = mass, damping and stiffness alone. Raises NoMotionError without samples to fit."""
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [measure_scales(motions, c, rotational) for c in range(len(motions[0].channels))]

@@ -36,8 +36,7 @@ LEAST_SAMPLES_PER_PERIOD = 6.0
 """Least samples per period of the band's upper end that decimation before the laws keeps, so that harmonics of
 nonlinear laws are not aliased into the band. Chosen by hand."""
 DIFFERENCE_STEP = 0.1
-"""Step of the finite differences for the parameters of modes, in standard deviations of the calibration. Chosen by
-hand."""
+"""Step of the finite differences for parameters of modes, in standard deviations of the calibration; by hand."""
 
 
 def find_balances_with_model(
@@ -90,8 +89,8 @@ class _PreparedRecord:
 
 
 def _prepare_record(record: Observed, motion: Motion, model: MechanicalModel) -> _PreparedRecord:
-    """Compute motion, force and base columns of one record. Raises numpy.linalg.LinAlgError where the model's outputs
-    do not determine its motion."""
+    """Compute motion, force and base columns of one record. Raises LinAlgError where outputs do not determine the
+    motion."""
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known_effects = apply_conditions(place_recorded_effects(model, recording), recording)
     structure = _apply_structural_effects(add_payload(model, recording), known_effects)

@@ -58,10 +58,10 @@ _NamedLaws = list[tuple[int, JudgedLaw]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ConfirmationStart:
-    """Starting point of every fit of named laws."""
+    """Starting point of the fits of named laws."""
 
     search_context: SearchContext
-    """Shared state of the search, with samples to fit and to choose by."""
+    """Shared state of the search."""
     full_context: SearchContext
     """`search_context`, fitted to all samples but the held-out ones."""
     balances: tuple[Balance, ...]
@@ -209,9 +209,9 @@ def _fit_steps(
 def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constant_count: int) -> int | None:
     """Find the index of the first named law that may be absent; None if there is none. A law may be absent if the
     intervals of all parameters that can make it vanish contain the vanishing value, or those of all signed parameters
-    that a special case of it lacks. Where the law only refines another of its family, or is outside the catalogue, one
-    parameter is enough. errors: standard errors of the laws' parameters; constant_count: constant forces before the
-    laws."""
+    that a special case of it lacks. Where the law only refines an earlier one of its family, or is outside the
+    catalogue, one parameter is enough. errors: standard errors of the laws' parameters; constant_count: constant forces
+    before the laws."""
     first_parameter, hypothesis = 0, explanation.steps[-1].fitted.hypothesis
     law_families = [find_family(claim.effect.name) for claim in hypothesis.claims]
     for index, claim in enumerate(hypothesis.claims):
@@ -252,7 +252,7 @@ def _may_be_special_case(effect: Effect, zero_by_name: Mapping[str, bool]) -> bo
 
 
 def _has_only_true(flags: Sequence[bool]) -> bool:
-    """Whether all flags are true; False for no flags."""
+    """Whether there are flags and all are true."""
     return bool(flags) and all(flags)
 
 

@@ -2,11 +2,11 @@
 named.
 
 Called by `diagnose` after the search, where residuals exceed the noise. Where repeats show that the noise is about as
-large as the residual, the decision by likelihood (`verdict`) is kept. Otherwise the residual of a real device is far
-above its noise, even with the true law. An effect is then named if the model with it has a sufficiently smaller
-held-out error power than the model without it, and than the model with the best rival effect (95 % intervals by block
-bootstrap, `held_out_gain`). Where all effects together remove less than half of the power, the force balance must
-confirm them as well. `find_objection` tests these conditions.
+large as the residual, the decision by likelihood (`verdict`) is kept. Otherwise the residual may be far above the noise
+even with the true law. An effect is then named if the model with it has a sufficiently smaller held-out error power
+than the model without it, and than the model with the best rival effect (95 % intervals by block bootstrap,
+`held_out_gain`). Where all effects together remove less than half of the power, the force balance must confirm them as
+well (`find_objection`).
 """
 
 from collections.abc import Sequence

@@ -1,10 +1,9 @@
 """Choice of the error measure for a search by simulation, and the constants that it may add to the commands.
 
 A linear model that was fitted to deviations from the mean has no constants: neither the command at the operating point
-nor the zero of a sensor. Without them, its simulation has an offset far larger than the errors of its dynamics.
-Therefore a constant is added to the commands: for positions K x = B u at rest (`shift_to_operating_point`), for forces
-the mean error (`shift_to_mean_force`). Called by `diagnose` and `force_balance_measures`; `search_by_simulation` takes
-the `FittingMeasure`.
+nor the zero of a sensor. Without them, its simulation may have an offset far larger than the errors of its dynamics.
+Therefore a constant may be added to the commands: for positions K x = B u at rest (`shift_to_operating_point`), for
+forces the mean error (`shift_to_mean_force`). Called by `diagnose` and `force_balance_measures`.
 """
 
 from collections.abc import Sequence
@@ -42,7 +41,7 @@ class FittingMeasure:
     """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
     is_reduced: bool = False
     """Whether the force of further motions, modes and a delay was subtracted from the commands. Only set by
-    `choose_forces_of_balance`, for the search by simulation: always False from `list_fitting_measures`."""
+    `choose_forces_of_balance`."""
 
 
 def choose_fitting_measure(
@@ -97,7 +96,7 @@ def _compute_error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> 
 
 
 LEAST_STIFFNESS_RATIO = 1e-6
-"""Least ratio of the smallest to the largest singular value of the stiffness at which a position is held; chosen by
+"""Ratio of the smallest to the largest singular value of the stiffness above which it holds a position; chosen by
 hand."""
 
 

@@ -40,7 +40,7 @@ def list_fitting_measures(
     simulation in windows, where the fitted model allows it. Then the force predicted along the measured motion with the
     linear parameters of the balances: in the band where noise is small, if that contains at least
     `LAW_BAND_POWER_SHARE` of each law's power, and in the band of the balances. compared: "motion" or "force" restricts
-    the measures to that quantity."""
+    the latter measures to that quantity."""
     if not any(balance.named for balance in balances):
         return
     motion_choice = make_measure(recordings, model)
@@ -75,8 +75,7 @@ def choose_forces_of_balance(
     `fitting_measure` unchanged, also where these parameters make no model.
 
     It can replace `fitting_measure` only where forces are compared and no law is named. Better: a smaller error on the
-    samples to fit and to choose by (`_predicts_better`). A model fitted to spectra in closed loop may need modes that
-    are unnecessary where the motion of a second body is measured.
+    samples to fit and to choose by (`_predicts_better`).
     """
     fitted_measure = fitting_measure.chosen.measure
     has_named_law, first_recording = any(balance.named for balance in balances), recordings[0]
@@ -104,8 +103,8 @@ def choose_forces_of_balance(
 def _build_model_of_balances(
     recordings: Sequence[Recording], balances: Sequence[Balance], name: str
 ) -> tuple[Sequence[Recording], MechanicalModel | None]:
-    """Build the recordings with one body per command, and their linear model with the balances' parameters; None in
-    place of the model where these make none. name: of the model."""
+    """Reduce the recordings to one body per command where needed, and build their linear model with the balances'
+    parameters; None in place of the model where these make none. name: of the model."""
     reduced_recordings = reduce_recordings(recordings, balances) if is_reduction_needed(balances) else recordings
     return reduced_recordings, build_first_model(balances, reduced_recordings[0], name)
 

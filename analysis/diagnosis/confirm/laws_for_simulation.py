@@ -1,8 +1,7 @@
 """Convert laws named by a force balance to hypotheses for output-error fits, with starting parameters.
 
 A law of the catalogue becomes the effect of the same name with the fitted parameters; a law outside the catalogue
-becomes a formula in the language of `equalizer.laws`. Called by `confirm_laws`, which fits these hypotheses;
-`result.candidates` calls `write_law`.
+becomes a formula in the language of `equalizer.laws`. Called by `confirm_laws`.
 """
 
 import re
@@ -33,8 +32,7 @@ from equalizer.signals.signal import FloatArray
 _AXIS_SIGNALS = re.compile(r"\b[qvf]\b")
 """Symbols of a formula for position (q), velocity (v) and command (f) of the law's axis."""
 _SIGNAL_PREFIX = {"q": "", "v": "v", "f": "f"}
-"""Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance: on axis x, q becomes x,
-v becomes vx and f becomes fx."""
+"""Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance."""
 
 
 def write_law(formula: Formula, axis_letter: str) -> Law:

@@ -41,11 +41,11 @@ CommandChange = Callable[[FloatArray, float], FloatArray]
 """Maps one axis's command (n,), at a rate in Hz, to the force of the faulty actuator."""
 SIZE_RANGE = (0.75, 1.35)
 """Range of sizes within which a change that is nonlinear in its size is scaled, before it is linearised about another
-size. By hand."""
+size."""
 GRID_SIZE = 12
-"""Number of sizes on the logarithmic grid of a fault that is nonlinear in its size; for delays, the least number."""
+"""Number of sizes on a logarithmic grid; for delays, the least number."""
 EARLIER_DRIFT_SHARES = (0.0, 0.25, 0.5)
-"""Shares of a drift that are assumed to have occurred before the recording began. By hand."""
+"""Shares of a drift that are assumed to have occurred before the recording began."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from analysis.diagnosis.settings import (
 
 T_QUANTILE = float(stdtrit(FOLDS - 1, 0.975))
 """Half-width of a 95 % confidence interval in standard errors: quantile 0.975 of Student's t with FOLDS - 1 degrees of
-freedom. A fault is not named where the interval of its parameter includes the value without a fault."""
+freedom. A fault is not named where the interval of its first parameter includes 0, or 1 for a gain."""
 ALIASES = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
@@ -43,7 +43,7 @@ constant force in any recording."""
 
 NO_GAIN_REASON = "it contains the named fault as a special case, and its error is not significantly smaller"
 RIVAL_REASON = "another fault explains as much of the difference between these recordings, or more"
-"""Reasons, in messages, why a rival of the named fault is not named."""
+"""Reasons, in messages, why a rival of the best fault is not named."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +117,7 @@ def _find_inconclusive(
 
 
 def _subsumes(candidate: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `candidate` contains `best` as a special case at the same axis, so that it cannot fit worse."""
+    """Whether `candidate` contains `best` as a special case at the same axis."""
     return best.fault.effect in candidate.fault.simpler and best.fault.axis == candidate.fault.axis
 
 
@@ -155,7 +155,7 @@ def _find_objection(candidate: JudgedFault, sets_differ: bool) -> str:
 
 
 def _compute_distance_from_no_fault(candidate: JudgedFault, name: str) -> float:
-    """Compute the difference of a parameter from its value without a fault: 1 for a gain, else 0."""
+    """Compute the difference of a parameter from 1 for a gain, else from 0."""
     return candidate.values[name] - (1.0 if name == "gain" else 0.0)
 
 

@@ -22,7 +22,7 @@ ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))
 """Numbers of all blocks into which the samples are divided for cross-validation."""
 RELINEARISED_VARIANTS = 3
 """Of a fault that is valid at size 1 only: number of its variants, the best at size 1, that are linearised again
-besides the best at any size. Chosen by hand; each takes as long as a first fit."""
+besides the best at any size. Chosen by hand."""
 
 
 class FittedVariant(NamedTuple):
@@ -96,7 +96,7 @@ def _fit_variant(
 
 
 def _get_error(fitted_variant: FittedVariant) -> float:
-    """Get the sum of squared errors with the fault undone; a sort key."""
+    """Get the sum of squared errors with the fault undone."""
     return fitted_variant.fit.error
 
 

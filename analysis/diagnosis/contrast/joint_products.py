@@ -6,8 +6,7 @@ where the fault is linear, and to first order about size 1 elsewhere. The base i
 it is never extrapolated beyond the states of one set. Gram matrices P of the columns (z, d), summed over each block of
 rows, are sufficient statistics: with T = [I, s D], where D assigns the changes to their columns, T P T' is the Gram
 matrix of the rows with the fault undone. Sizes are found by variable projection (Golub and Pereyra, SIAM J. Numer.
-Anal. 10:413, 1973). Called by `fit_faults` and `rank_faults`; `compared_base` computes the Gram matrices. It,
-`likely_delays` and `study.evaluation.real.injected_halves` use `solve_residual_weights`.
+Anal. 10:413, 1973). Called by `fit_faults` and `rank_faults`.
 """
 
 from collections.abc import Sequence
@@ -24,8 +23,7 @@ ColumnIndices = npt.NDArray[np.intp]
 RIDGE = 1e-9
 """Ridge, relative to the mean diagonal element of the Gram matrix. By hand."""
 LARGEST_PRODUCT = 1e16
-"""Magnitude of an element of a Gram matrix, from which undoing a fault with bounded sizes counts as ill-conditioned. By
-hand."""
+"""Magnitude of an element of a Gram matrix from which undoing a fault counts as ill-conditioned. By hand."""
 MOST_NEWTON_STEPS = 3
 """Largest number of Gauss-Newton steps for the sizes. By hand."""
 
@@ -42,7 +40,7 @@ class GramBlocks:
     """Number of columns of the rows, without the changes."""
 
     def is_well_conditioned(self, variant: Variant) -> bool:
-        """Whether undoing the fault is well-conditioned: all elements are finite and, for bounded sizes, below
+        """Whether undoing the fault is well-conditioned: all elements are finite and, for sizes bounded above, below
         `LARGEST_PRODUCT`. Unbounded sizes are in SI units (such as 1 kg on a device of 1 mg), so that elements may have
         any magnitude."""
         limit = LARGEST_PRODUCT if np.isfinite(variant.upper_bound) else np.inf

@@ -2,10 +2,9 @@
 
 A base is a regression model that predicts a signal y from regressors x; a row is one sample (y, x) of it
 (`compared_base`). With the weights of a base fitted to the clean set, errors are e = r - c, with r from the responses
-and c from the commands.
-Where the delay spans many oscillations of the signal, the minimum of the error at the true delay is narrower than the
-spacing of a grid of delays. The cross-correlation of r and c has its peak there and suggests delays to try. Called by
-`rank_faults`.
+and c from the commands. Where the delay spans many oscillations of the signal, the minimum of the error at the true
+delay is narrower than the spacing of a grid of delays. The cross-correlation of r and c has its peak there and suggests
+delays to try. Called by `rank_faults`.
 """
 
 from collections.abc import Sequence

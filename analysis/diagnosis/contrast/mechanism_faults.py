@@ -34,8 +34,8 @@ WIDTH_FACTORS = (1.0, 3.0, 8.0, 20.0)
 PRESLIDING_SHARES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
 """Tried presliding distances, relative to the travel. Chosen by hand."""
 COGGING_PERIOD_COUNTS = tuple(np.arange(2.0, 40.0, 0.35).tolist())
-"""Tried numbers of periods of a cogging force within the travel, or within a turn of a shaft that turns farther, so
-close that neighbours cannot be distinguished. Chosen by hand."""
+"""Tried numbers of periods of a cogging force within the travel, or within a turn of a shaft that turns farther. Chosen
+by hand."""
 STOP_SHARES = tuple(np.arange(0.05, 0.5, 0.05).tolist())
 """Tried distances of an end stop from the middle of the travel, relative to the travel. Chosen by hand."""
 

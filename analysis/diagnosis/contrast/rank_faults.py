@@ -6,9 +6,9 @@ the sum of squared whitened errors of all bases, fitted to both sets jointly, wi
 
     gain(f) = E(none) / E(f) - 1.
 
-No real device repeats itself exactly, and a fault with free parameters gains a little on any data. As negative control,
-the same gain is computed between stretches of one set, where no fault can have appeared; E(f) is raised by the median
-of these gains. A confidence bound of the corrected gain comes from resampling blocks (bootstrap), standard errors of a
+Real devices hardly repeat themselves exactly, and free parameters gain a little on any data. As negative control, the
+same gain is computed between stretches of one set, where no fault can have appeared; E(f) is raised by the median of
+these gains. A confidence bound of the corrected gain comes from resampling blocks (bootstrap), standard errors of a
 fault's values from leaving out groups of blocks in turn (delete-a-group jackknife; Efron and Tibshirani, An
 Introduction to the Bootstrap, 1993, chapter 11). Called by `compare_with_reference`; `choose_fault` names a fault.
 """

@@ -100,7 +100,7 @@ def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 def _split_into_stretches(part: Part) -> list[slice]:
     """Split a part into about `NOISE_STRETCHES` stretches of at least 64 samples, so that an eighth of the spectrum has
-    four lines; stretches with missing samples are left out."""
+    at least four lines; stretches with missing samples are left out."""
     stretch_length = max(len(part.response) // NOISE_STRETCHES, 64)
     starts = range(0, len(part.response) - stretch_length + 1, stretch_length)
     return [

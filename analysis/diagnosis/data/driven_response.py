@@ -4,8 +4,8 @@ The coherence at the lines that the commands drive (Bendat and Piersol, Random D
 stretches (the segments of Welch's method) and averaged over the lines. For responses of pure noise and r independent
 commands, each line's value follows a beta distribution with the parameters r and K - r. In a short recording the
 stretches may be shorter than the device's impulse response, and a slow force that only follows the motion (dry
-friction, closed loop) may lie below the noise of the command. A response therefore also counts as driven where past
-commands predict it on held-out samples, or where it predicts its command. Called by `input_checks`.
+friction, closed loop) may lie below the noise of the command. A response therefore also counts as driven where past and
+present commands predict it in the second half, or where it predicts its command there. Called by `input_checks`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -60,7 +60,7 @@ def compute_response_significance(recordings: Sequence[Recording]) -> float | No
 
 
 def _is_predictable(recording: Recording) -> bool:
-    """Whether past commands predict a response, or responses before and after a sample predict its command."""
+    """Whether past and present commands predict a response, or responses around a sample predict its command."""
     command, response = recording.command.samples, recording.response.samples
     return _can_predict(response, command, uses_future=False) or _can_predict(command, response, uses_future=True)
 

@@ -1,10 +1,10 @@
-"""Find periodic segments in a recording that declares none: parts whose excitation repeats exactly.
+"""Find periodic segments in a recording that declares none: parts whose excitation repeats, up to rounding.
 
 The excitation is tested where it was recorded, else the command (`find_designed_command`); below, both are called
 command. A candidate period is the first high peak of its autocorrelation. It is accepted only where the command itself,
 sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat approximately,
 are not used. Without such a part, no segments are declared. Called by `prepare_recordings` and
-`study.importing.build_recording`; `analysis.look.repeats` uses the search for a period."""
+`study.importing.build_recording`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,7 +37,7 @@ hand."""
 MOST_SEARCHED_SAMPLES = 2**19
 """Largest number of samples in which a period is searched for; limits the computing time of the correlation."""
 LARGEST_SAMPLE = 1e100
-"""Largest sample whose squares can be summed without overflow; a damaged file may hold larger ones."""
+"""Magnitude of a sample above which samples are scaled, so that their squares do not overflow (a damaged file)."""
 
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:

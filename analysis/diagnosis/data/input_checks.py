@@ -1,6 +1,5 @@
 """Input checks of a diagnosis: recordings of one device, a model of that device, enough data. Recordings that fail are
-refused and get no verdict, not even `unexplained`. Called by `study.workflows.diagnosis` before `diagnose`, and by
-`diagnose`, `diagnose_values`, `prepare_recordings` and `study.evaluation.real`."""
+refused and get no verdict, not even `unexplained`. Called by `study.workflows.diagnosis` and `prepare_recordings`."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations

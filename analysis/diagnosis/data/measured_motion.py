@@ -1,8 +1,7 @@
 """Measured motion of the driven axes with its noise, and which signal drives a recording: force, motion or none.
 
 A recording may be driven by a force, by an imposed motion (the force is then the response; `convert_to_force_driven`
-exchanges the two), or not at all (free motion). Positions are used by the packages `forces` and `balance`;
-`is_free_motion`, `is_driven` and `is_quasi_static` also by `first_model`, `confirm` and `errors`.
+exchanges the two), or not at all (free motion).
 """
 
 from collections.abc import Sequence
@@ -68,7 +67,7 @@ def _has_position(recording: Recording, model: MechanicalModel) -> bool:
 
 
 def fill_gaps(samples: FloatArray) -> FloatArray:
-    """Interpolate samples (n, k) linearly across gaps; zero where a channel has no finite sample."""
+    """Interpolate samples (n, k) linearly across gaps, constant at the ends; zero without a finite sample."""
     filled_samples, indices = np.array(samples, dtype=np.float64), np.arange(len(samples))
     for column in filled_samples.T:
         is_finite = np.isfinite(column)
@@ -102,7 +101,7 @@ def select_time_unit(recording: Recording) -> str:
 
 
 def is_driven(recordings: Sequence[Recording]) -> bool:
-    """Whether any command changes, in a recording or between recordings; True where no command has a finite sample."""
+    """Whether any command changes, in or between recordings; True where no sample has all commands finite."""
     commands = np.vstack([recording.command.samples for recording in recordings])
     commands = commands[np.isfinite(commands).all(axis=1)]
     return len(commands) == 0 or bool(np.any(np.ptp(commands, axis=0) != 0))

@@ -31,13 +31,13 @@ from equalizer.signals.signal import FloatArray
 EXPECTED_CHANGE_SHARE = 0.1
 """Expected rms change of a missing force within `CHANGE_TIME_S`, relative to the rms of the command. Chosen by hand."""
 CHANGE_TIME_S = 0.005
-"""Time (s) in which a missing force is expected to change by `EXPECTED_CHANGE_SHARE`. Chosen by hand."""
+"""See `EXPECTED_CHANGE_SHARE`. Chosen by hand."""
 _LEAK_SHARE = 1e-5
-"""Decay of the state per sample, relative: without it, unobservable states have no steady-state filter. Chosen by
+"""Decay of the state per sample, relative: without it, unobservable states may have no steady-state filter. Chosen by
 hand."""
 _PROCESS_NOISE = 1e-12
-"""Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
-solution. Chosen by hand."""
+"""Process noise of all states per sample, relative to their size: without it the Riccati equation may have no
+stabilising solution. Chosen by hand."""
 _DOUBLINGS = 40
 """Largest number of doublings of the Riccati equation; 40 are equivalent to 2^40 samples of the filter."""
 _MATRIX = types.float64[:, ::1]

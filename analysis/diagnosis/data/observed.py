@@ -1,8 +1,8 @@
 """A recording ready for comparison with a model: its signals, and its samples split into three sets (`split_samples`).
 
 The sets are those of statistical learning: training (`fit`: parameters are fitted to it), validation (`choose`: among
-explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error). All errors and
-force balances of the diagnosis are computed from these records; `observed_parts` makes them.
+explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error).
+`observed_parts` makes these records.
 """
 
 from collections.abc import Sequence
@@ -83,8 +83,7 @@ class Observed:
         return mask & self.test
 
     def join_fit_and_choose(self) -> "Observed":
-        """Join fit and validation samples, and use them for both: for explanations that are chosen by other means than
-        validation."""
+        """Join fit and validation samples, and use them for both."""
         return replace(self, fit=self.fit | self.choose, choose=self.fit | self.choose)
 
     def shorten(self) -> "Observed":

@@ -1,8 +1,7 @@
 """Cut recordings into their parts (continuous stretches between gaps); each part is compared with the model by itself.
 
 The samples of each part are split into those to fit, to choose and to test by (`observed.split_samples`). Periods of a
-segment after the first `MOST_PERIODS` are used for the test only. Called by `choose_measure`, `balances`, the modules
-of `first_model` and others that compare recordings with a model.
+segment after the first `MOST_PERIODS` are used for the test only. Begin at `observe_parts`.
 """
 
 from collections.abc import Sequence

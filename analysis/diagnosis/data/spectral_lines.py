@@ -4,7 +4,6 @@ noise.
 A linear device responds on driven lines only. Where all driven lines are odd multiples of one line, odd distortion
 falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon, IEEE Control Systems 36 (2016), 38).
 The driven lines are found in the recorded excitation or command, so that any multisine with silent lines is suitable.
-Called by the modules of `analysis.diagnosis.localisation`.
 
 Lines are tested in octaves that begin at powers of 2 Hz, the same for all recordings, so that results of different
 recordings can be compared band by band. The ratio of the power on silent lines to that of the noise is F-distributed.
@@ -110,8 +109,7 @@ def select_lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
 
 def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
     """Find the names of the inputs that were driven in a segment: those with more than `_DRIVEN_SHARE` of the power of
-    the strongest; none without power. An input that is only moved by feedback has less, where the excitation was
-    recorded. power: (inputs,)."""
+    the strongest; none without power. power: (inputs,)."""
     if power.max(initial=0.0) == 0:
         return ()
     return tuple(

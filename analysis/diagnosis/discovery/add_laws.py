@@ -2,8 +2,7 @@
 
 Laws are searched where the catalogue leaves a mismatch, or where its named effects may only approximate a law. They
 replace the named effects if they pass the checks of `validation` on held-out data; otherwise they are reported as
-unconfirmed candidates, with the reasons. The search itself is `discover_laws`; its equations are in the package's
-docstring. Called by `search_by_simulation`.
+unconfirmed candidates, with the reasons. The search itself is `discover_laws`. Called by `search_by_simulation`.
 """
 
 import itertools

@@ -91,7 +91,7 @@ def sum_squared_coupling_deviations(tuning: Tuning, fitted: Fitted) -> float:
 def convert_to_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], pair: Sum) -> Fitted | None:
     """Rewrite the fit of a single force as a pair of half its factor with the same prediction: the model's coupled
     parameter takes the symmetric half. single: fit and sum of that force. None where force and pair depend on different
-    motions, or the parameter would leave its bounds."""
+    motions, or the parameter cannot take that half."""
     fitted, term_sum = single
     assert pair.partner is not None
     halves = {(half.axis, half.terms[0].shape): half for half in (replace(pair, partner=None), pair.partner)}
@@ -109,7 +109,7 @@ def convert_to_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted,
 
 def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> Fitted:
     """Make the factors of each pair of a fit antisymmetric: their mean is added to the model's coupled parameter, which
-    is the symmetric part. Unchanged where there is no pair, or the parameter would leave its bounds."""
+    is the symmetric part. Unchanged where there is no pair, or the parameter cannot take the mean."""
     couplings = _find_coupled_laws(fitted, measure.records[0].recording.command.channels)
     values, deviations = (
         [dict(placed_effect.values) for placed_effect in fitted.hypothesis.list_placed_effects()],
@@ -118,7 +118,7 @@ def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) ->
     for (prefix, axis, coupled_axis), (claim_index, factor) in couplings.items():
         partner_index, partner_factor = couplings.get((prefix, coupled_axis, axis), (claim_index, 0.0))
         parameter_index = _find_coupled_parameter(tuning, prefix, axis, coupled_axis)
-        # A parameter with tolerance 0 cannot take the mean.
+        # A parameter with tolerance 0 cannot take it.
         if axis < coupled_axis and factor * partner_factor < 0 < tuning.deviation[parameter_index]:
             mean_factor = (factor + partner_factor) / 2
             deviations[parameter_index] -= mean_factor / tuning.deviation[parameter_index]

@@ -32,8 +32,7 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 _MOST_SHUFFLES = 3
-"""Largest number of shuffles of the blocks in the negative control. Chosen by hand: each takes as long as a
-screening."""
+"""Largest number of shuffles of the blocks in the negative control. Chosen by hand."""
 _MOST_RIVALS = 2
 """Largest number of rivals, sums that lack a variable of the best sum. Chosen by hand."""
 

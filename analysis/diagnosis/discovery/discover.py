@@ -1,9 +1,8 @@
 """Forward selection of discovered laws, up to `LAW_MOST_ROUNDS`.
 
 In each round, sums of terms are screened on the axes and readings with the largest error above the noise, the best sums
-are fitted by output error, and the best fit is added. Finally exponents are rounded where that fits as well
-(`snap_exponents`). Steps and equations: see the theory of operation in the package's docstring
-(`analysis/diagnosis/discovery`). Called by `add_laws`."""
+are fitted by output error, and the preferred fit is added. Finally exponents are rounded where that fits as well
+(`snap_exponents`). The package's docstring has the equations. Called by `add_laws`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

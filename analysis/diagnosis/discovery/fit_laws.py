@@ -1,8 +1,7 @@
 """Fits sums of terms as laws by output error, and puts the simplest of those that fit about equally well first.
 
 Screening uses a linearised residual (`fit_sum`); here, each sum is simulated with the model, and all parameters are
-fitted together by Gauss-Newton steps (`errors.output_error`). Called by `discover`; `validation` uses
-`run_within_time`.
+fitted together by Gauss-Newton steps (`errors.output_error`). Called by `discover`.
 """
 
 from collections.abc import Callable, Sequence
@@ -151,7 +150,7 @@ def put_simplest_first(
 ) -> list[tuple[FittedCandidate, Sum]]:
     """Sort the candidates by rising error and move the preferred one to the front: among those inseparable from the
     best, the one with the fewest parameters; if it is a force linear in another axis's motion, among equally simple
-    ones that with the smallest change of the model's own coupled parameters. At least one."""
+    ones that with the smallest change of the model's own coupled parameters. fits_and_sums: at least one."""
     ranked_fits = sorted(fits_and_sums, key=lambda fit_and_sum: fit_and_sum[0].score.mean_log_error)
     inseparable_fits = [
         fit_and_sum for fit_and_sum in ranked_fits if are_inseparable(ranked_fits[0][0], fit_and_sum[0])

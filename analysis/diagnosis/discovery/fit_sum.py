@@ -3,8 +3,8 @@
 The residual is approximated by P d + sum of w_j phi_j(a_j): P the columns of the model's own parameters, w the factors
 and a the nonlinear parameters of the terms. At each step, d and w are solved for by least squares, so that only a is
 searched (variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10:413, 1973). Held-out errors are
-cross-validated over blocks. Called by `beam`, `antisymmetric_pairs` and `discover`, which screen sums; `fit_laws` then
-fits the best of them by output error. Sizes: s samples of the view's residual, t parameters of the model.
+cross-validated over blocks. Called by `beam`, `antisymmetric_pairs` and `discover`. Sizes: s samples of the view's
+residual, t parameters of the model.
 """
 
 from collections.abc import Sequence

@@ -4,8 +4,7 @@ A term is a shape times a factor; its free parameters (exponents, widths, time c
 spans the recording's travel, speed and duration. Forces linear in an axis's own motion are not terms: mass, damping and
 stiffness are parameters of the model. Nor is a constant force, which each regression contains (`screen_terms`).
 docs/diagnosis.md lists what the grammar contains and what it does not. Grids and bounds, most of them relative to the
-scales of the recording, are chosen by hand. `view_terms` calls `list_terms`; `Term` and the names of signals are used
-throughout the package.
+scales of the recording, are chosen by hand.
 """
 
 import re
@@ -64,9 +63,9 @@ def format_even_power(signal_name: str, parameter_index: int) -> str:
 
 
 POWER_BOUNDS = (0.15, 6.0)
-"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop. Chosen by hand."""
+"""Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop."""
 STATIC_EXCESS_BOUNDS = (0.02, 20.0)
-"""Bounds of the excess of static over sliding friction, relative to the latter. Chosen by hand."""
+"""Bounds of the excess of static over sliding friction, relative to the latter."""
 
 
 @dataclass(frozen=True, slots=True)

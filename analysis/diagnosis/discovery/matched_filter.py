@@ -34,7 +34,7 @@ from equalizer.signals.band_limited import compute_low_pass_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0  # chosen
-"""Length (s) of the zeros appended to a record, so that the response at its end does not wrap around to the start."""
+"""Length (s) of the zeros appended to a record, so that little of the response at its end wraps around to the start."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -264,8 +264,8 @@ def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
 
 
 def _list_blocks(record: Observed) -> list[tuple[int, int]]:
-    """List start and stop of the segments of which more than half is not held out; with fewer than `LAW_BLOCKS` of
-    them, of as many equal parts of the samples."""
+    """List start and stop of the segments of which more than half is in `fit` or `choose`; with fewer than `LAW_BLOCKS`
+    of them, of as many equal parts of the samples."""
     is_used = record.fit | record.choose
     blocks = [
         (segment.start, min(segment.stop, len(is_used)))

@@ -1,6 +1,5 @@
 """Round the exponents of a discovered law to whole or half numbers where their standard errors allow it, drop a lag
-that is shorter than a sample, and simplify the formula. Called by `discover` and `validation`; `fit_laws` uses
-`is_full_soft_limit`."""
+that is shorter than a sample, and simplify the formula. Called by `discover` and `validation`."""
 
 import re
 from dataclasses import replace

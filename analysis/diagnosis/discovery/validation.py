@@ -1,9 +1,9 @@
 """Checks that a discovered law must pass before it is named; each check that fails gives a reason, as a clause.
 
 Of the many formulas that the search tries, some fit any data. A law is named only where held-out stretches of another
-kind than the fitted ones confirm it (extrapolation), where its factor agrees between stretches (stability), where
-the same search in a time-shuffled force finds clearly less (negative control), where no law of other variables fits as
-well, no exponent is beyond the grammar's bounds, and the model's coupled parameters cannot imitate it. Called by
+kind than the fitted ones confirm it (extrapolation), where its factor agrees between stretches (stability), where the
+same search in a time-shuffled force finds clearly less (negative control), where no law of other variables fits as
+well, no exponent is above the grammar's bound, and the model's coupled parameters cannot imitate it. Called by
 `add_laws`."""
 
 from collections.abc import Iterator, Sequence

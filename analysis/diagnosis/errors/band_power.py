@@ -1,10 +1,9 @@
 """Error measure for impacts: differences of the power of each channel in each band and segment.
 
-Impacts make the motion chaotic: the waveforms of two simulations whose initial states differ by less than the
+Impacts can make the motion chaotic: the waveforms of two simulations whose initial states differ by less than the
 resolution of any sensor diverge, while their band amplitudes agree to a few per cent. Therefore ln a is compared, with
 a² the mean power density in a band of half an octave (Welch's method, windows of 1 s at most); the noise's power is
-added to a predicted a². Used by `band_power_fit` (fit of parameters), `search.band_power_comparison` (comparison of
-candidates) and `search.impacts`.
+added to a predicted a².
 """
 
 from collections.abc import Sequence

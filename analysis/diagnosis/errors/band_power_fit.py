@@ -7,8 +7,7 @@ With the differences e of ln a, measured less predicted (`band_power`), and devi
 
 with Huber's loss rho (Huber, Ann. Math. Stat. 35:73, 1964) over the N fitted bands. Simulations of impacts are chaotic:
 the spread of ln a between simulations whose parameters differ by rounding sets the weights, and derivatives are central
-differences over large steps. Called by `refine_band_power` and, for rattling play, by `search.impacts` and
-`search.second_effect_with_play`. All constants are chosen by hand.
+differences over large steps. All constants are chosen by hand.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +34,7 @@ LEAST_INFORMATION = 1e-6
 STEP_FACTORS = (1.0, 0.3, 0.1, 0.03)
 """Factors on a step that are tried in turn (line search)."""
 SPREAD_FLOOR = 0.04
-"""Least standard deviation of ln a: no simulation of impacts predicts it better."""
+"""Least standard deviation of ln a that is assumed, besides the spread."""
 HUBER_THRESHOLD = 2.0
 """Threshold k of Huber's loss, in standard deviations. The loss is robust, because effects other than the fitted one
 may be missing."""

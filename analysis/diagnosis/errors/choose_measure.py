@@ -2,8 +2,7 @@
 
 In this order, unless forces are requested: the samples of each recording are divided into those to fit, to choose and
 to test by; the noise of each channel is estimated; errors get their unit from the noise and the signal
-(`compute_error_units`); the rule selects free simulation, windows or forces. Called at the start of a diagnosis
-(`diagnose`), by `confirm` and `learn_model_error`, and where models are compared on recordings (`prediction_error`).
+(`compute_error_units`); the rule selects free simulation, windows or forces. Begin at `make_measure`.
 """
 
 from collections.abc import Sequence
@@ -187,7 +186,7 @@ def _subtract_rounding_noise(floor: NoiseFloor, record: Observed) -> FloatArray:
     """Compute (p,): rms noise of the response before a converter rounded it (rounding adds step² / 12), because
     quantisation is an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise
     that was not estimated from repeats is unchanged, because it cannot be separated from rounding; so is noise of which
-    no more than `LEAST_DITHER` would remain."""
+    no more than `LEAST_DITHER` steps would remain."""
     rms_noise = floor.response_rms
     if floor.method != "repeats":
         return rms_noise

@@ -12,10 +12,10 @@ control, whether the data show it or not, and is compared likewise;
 
 * a plant whose slowest motion decays with a time constant of a third of the longest recording or more, such as one
 without restoring force (integrator): small errors persist or grow. It is simulated in windows of 1 s or longer, each
-from a state estimated from the measured motion, or, where no state can be estimated, compared by forces;
+from an estimated state, or, where none can be estimated and motion was measured, compared by forces;
 
-* a recording that does not begin at rest: the initial motion decays, so its first seconds are left out; where that
-would be more than a quarter of the recording, windows are used;
+* a recording that does not begin at rest: the initial motion decays, so its beginning is left out; where that would be
+more than a quarter of the recording, windows are used;
 
 * a recording of an imposed motion with a measured force, or of positions without a time axis: forces are compared.
 """

@@ -4,8 +4,7 @@
 
 The residual holds the noise and the whole effect of the missing physics, because no measured sample corrects the
 simulation (only the realisation of a random effect is conditioned on the measurement). Joined parts of records begin in
-given states instead (`restarts`). Made by `choose_measure`; the other measures compare short windows (`windows`) or
-forces (`predicted_force`).
+given states instead (`restarts`). Made by `choose_measure`.
 """
 
 from collections.abc import Callable, Sequence
@@ -73,7 +72,7 @@ class FreeSimulation:
         return replace(self, records=records, restarts=tuple(compress(self.restarts, used)))
 
     def can_observe(self, effect: Effect) -> bool:
-        """True for every effect: each changes the simulated response or position."""
+        """True for every effect."""
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:

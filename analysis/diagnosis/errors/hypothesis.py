@@ -2,8 +2,7 @@
 
 A hypothesis is a list of claims (effect and sites) and a point: one coordinate per free parameter. A coordinate is the
 logarithm of a parameter on a log scale, else the parameter over its unit, so that a fit can step along it. Hypotheses
-are immutable: the functions below make new ones. `output_error` fits them; the search (`analysis/diagnosis/search`)
-proposes and compares them.
+are immutable: the functions below make new ones. `output_error` fits them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +24,6 @@ class Claim:
 
     effect: Effect
     spread: Spread
-    """How the sites share parameters: see `Spread`."""
     sites: tuple[int, ...]
     """Numbers of the axes or channels, from 0."""
 
@@ -174,7 +172,7 @@ def combine_hypotheses(leading: Hypothesis, added: Hypothesis) -> Hypothesis:
 
 
 NO_EFFECTS = Hypothesis((), (), np.zeros(0))
-"""The hypothesis without effects: the model alone."""
+"""The model alone."""
 
 
 def generate_near_equivalents(hypothesis: Hypothesis) -> Iterator[Hypothesis]:

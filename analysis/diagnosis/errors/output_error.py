@@ -12,8 +12,8 @@ the maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
     (S'S + diag(1, 0)) step = -(S'e + (d, 0))        parameters that would leave their range are fixed at its end
 
 with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd, one simulation per
-parameter of the model, is computed once, de/dp at each step, by finite differences. Called by `search`, `confirm`,
-`discovery` and others. Source: Ljung, System Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
+parameter of the model, is computed once, de/dp at each step, by finite differences. Sources: Ljung, System
+Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
 """
 
 from collections.abc import Sequence

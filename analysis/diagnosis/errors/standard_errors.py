@@ -7,16 +7,16 @@ central differences: parameters with the same effect on the prediction (an added
 proportional columns; the curvature error of one-sided differences would make them seem separable.
 
 Random errors (`compute_standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over
-stretches longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch
-of all periods of a segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where that gives the larger error.
-Systematic errors (`compute_segment_errors`): no law is exact, so that another level or axis would give other estimates;
-delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
+stretches, which are taken to be longer than the residuals' correlation time. Under periodic excitation model errors
+repeat: the same stretch of all periods of a segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where
+that gives the larger error. Systematic errors (`compute_segment_errors`): no law is exact, so that another level or
+axis would give other estimates; delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), each
+estimate by one Gauss-Newton step,
 
     theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g,
 
 with the sensitivities X_g (parameters, samples) and the residuals r_g of segment g. Residuals are in units of the
-noise. Throughout, t is the number of the model's free parameters (deviations); those of the hypothesis follow. Called
-by `search.identifiability` and `discovery.snap_exponents`.
+noise. Throughout, t is the number of the model's free parameters (deviations); those of the hypothesis follow.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,12 +40,11 @@ IndexArray = npt.NDArray[np.int64]
 """Array of indices."""
 
 STRETCH_S = 0.5
-"""Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time. Chosen by
-hand."""
+"""Length (s) of the stretches over which scores are summed. Chosen by hand."""
 BOUND_TOLERANCE = 1e-6
 """Distance of a coordinate from its bound at or below which it counts as at the bound. Chosen by hand."""
 CONVERGED_DECREASE = 0.01
-"""Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within about a tenth of a
+"""Fall of the sum of squares, in noise variances, below which a fit ends: the minimum is then within about a tenth of a
 standard error."""
 FINAL_DAMPINGS = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
 """Dampings of the final steps (pairs as in `output_error.Dampings`), the first smaller than in a search: in a direction
@@ -63,8 +62,8 @@ def compute_full_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
 ) -> Sensitivity:
     """Compute the sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters,
-    by central differences; one-sided at a bound and where the other side gives no valid model, zero where neither does.
-    map_: a possibly parallel `map` over the parameters."""
+    by central differences; one-sided at a bound and where the other side gives no valid model, zero where no difference
+    can be formed. map_: a possibly parallel `map`."""
     t, placed_effects = len(deviations), hypothesis.list_placed_effects()
     is_linear = all(isinstance(placed_effect.effect.action, Structure) for placed_effect in placed_effects)
     step_factor = STEP_FACTOR_LINEAR if is_linear else STEP_FACTOR
@@ -165,11 +164,12 @@ def _add_calibration_prior(gram: FloatArray, t: int) -> FloatArray:
 
 def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray:
     """Compute the standard errors (t + parameters,) of the model's deviations and the hypothesis's point; 0 for
-    parameters at a bound. jacobian: sensitivity to all parameters (`compute_full_sensitivity`).
+    parameters at a bound, or without effect on the prediction. jacobian: sensitivity to all parameters
+    (`compute_full_sensitivity`).
 
-    Scores sum to zero at the minimum, so that few clusters underestimate the variance. The larger of two estimates is
-    returned: with all periods of a segment in common clusters, and with separate ones. Directions with less than 1e-12
-    of the largest scaled information, undetermined up to rounding, are left out."""
+    Scores sum to zero at the minimum, so that few clusters underestimate the variance. For each parameter, the larger
+    of the two estimates, with and without common clusters, is returned. Directions with less than 1e-12 of the largest
+    scaled information, undetermined up to rounding, are left out."""
     t, is_free = len(fitted.deviations), _mask_free_parameters(fitted)
     residuals = stack_fit_residuals(measure, fitted.residuals)
     information = _add_calibration_prior(jacobian.gram * np.outer(is_free, is_free), t)
@@ -185,8 +185,8 @@ def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sen
 
 
 def compute_segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:
-    """Compute the jackknife standard errors over segments, (t + parameters,); None for fewer than two segments with
-    samples to fit. jacobian, limit 1e-12: as in `compute_standard_errors`."""
+    """Compute the jackknife standard errors over segments, (t + parameters,); None for fewer than two segments (or
+    recordings without segments) with samples to fit. jacobian, limit 1e-12: as in `compute_standard_errors`."""
     residuals, is_free = stack_fit_residuals(measure, fitted.residuals), _mask_free_parameters(fitted)
     products, scores = [], []
     for first, stop in _list_segment_ranges(measure):
@@ -224,7 +224,7 @@ def _list_segment_ranges(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
 
 
 def _mask_free_parameters(fitted: Fitted) -> Mask:
-    """Make the mask (t + parameters,) of the parameters that are not at a bound; always True for the model's."""
+    """Make the mask (t + parameters,) of the parameters that are not at a bound; True for the model's."""
     point, bounds = fitted.hypothesis.point, [parameter.bounds for parameter in fitted.hypothesis.parameters]
     is_interior = [
         not np.isclose(coordinate, limits, rtol=0.0, atol=BOUND_TOLERANCE).any()

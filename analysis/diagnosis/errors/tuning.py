@@ -1,17 +1,17 @@
-"""Re-tuning: the free parameters of a mechanical model within the tolerances of its calibration.
+"""Re-tuning: the free parameters of a mechanical model, which may move from their calibrated values.
 
-The parameters of the given model may move by a few standard deviations of their calibration; only a mismatch that
-remains then is attributed to missing physics. The model M q'' + B q' + K q = input is first written in the coordinates
-of Craig and Bampton (AIAA Journal 6 (1968), 1313): the m driven axes, and the modes with these axes held
-(fixed-interface modes), scaled to unit mass. Free are then
+The parameters may move by a limited number of standard deviations of their calibration; only a mismatch that remains
+then is attributed to missing physics. The model M q'' + B q' + K q = input is first written in the coordinates of Craig
+and Bampton (AIAA Journal 6 (1968), 1313): the m driven axes, and the modes with these axes held (fixed-interface
+modes), scaled to unit mass. Free are then
 
-* each entry of the m x m blocks of mass, damping and stiffness at the driven axes (an absolute change);
+* each entry on or above the diagonal of the m x m blocks of mass, damping and stiffness at the driven axes (an absolute
+  change);
 * of each mode k its frequency f, mass and damping ratio (relative changes df, dm, dz):  K_kk (1 + df)², B_kk (1 + df)
   (1 + dz), the coupling c to the masses of the axes times sqrt(1 + dm), and dm c c' added to these masses.
 
 `make_tuning` makes a `Tuning`, whose function `tune` maps deviations, in standard deviations, to a model. The
-deviations are fitted together with hypotheses by `output_error`. Called by `search_by_simulation`,
-`confirm.fitting_measures`, `confirm.balance_with_model` and `reference.learn_model_error`.
+deviations are fitted together with hypotheses by `output_error`.
 """
 
 from collections.abc import Callable
@@ -33,8 +33,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
 UNSTATED_TOLERANCE = Tolerance(modes=UNSTATED_MODES)
-"""Tolerance of a model that states none; for parameters of the axes it is `UNSTATED_SHARE` of the largest diagonal
-entry."""
+"""Tolerance of a model that states none; that of entries at the axes follows from `_choose_deviation`."""
 DAMPING_UNCERTAINTY_RATIO = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less
 accurately."""
@@ -75,8 +74,7 @@ class Tuning:
 
     def is_physical(self, deviations: FloatArray) -> bool:
         """Whether damping and stiffness stay physical with these deviations (parameters,): positive semidefinite, or no
-        more indefinite than in the given model. With the wider bound a parameter may vanish or change its sign. Raises
-        MechanicalModelError as `tune`."""
+        more indefinite than in the given model. Raises MechanicalModelError as `tune`."""
         tuned_model, given_model = self.tune(deviations), self.model
         return _is_as_definite(tuned_model.damping, given_model.damping) and _is_as_definite(
             tuned_model.stiffness, given_model.stiffness
@@ -88,9 +86,7 @@ class Tuning:
 
 
 def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
-    """Make the free parameters of a model. Where it states no tolerance of mass, damping or stiffness, `UNSTATED_SHARE`
-    of the largest at any axis is one standard deviation (`_choose_deviation`). input_channels: names of the driven
-    axes."""
+    """Make the free parameters of a model. input_channels: names of the driven axes."""
     modal_model = _transform_to_craig_bampton(model)
     m = model.inputs
     axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]
@@ -182,7 +178,7 @@ def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
     mass, damping, stiffness = (
         np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)
     )
-    # The remaining stiffness between driven axes and modes is rounding.
+    # For a symmetric stiffness, the remaining entries between driven axes and modes are rounding.
     stiffness[:m, m:] = stiffness[m:, :m] = 0.0
     return _CraigBamptonModel(mass, damping, stiffness, np.linalg.inv(basis), frequency_hz)
 

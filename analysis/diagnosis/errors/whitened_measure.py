@@ -1,4 +1,4 @@
-"""Error measure with prewhitened residuals, and its whitening filter. Called by `learn_model_error`.
+"""Error measure with prewhitened residuals, and its whitening filter.
 
 The whitened residual is the one-step prediction error of an AR(p) model of the residual r that a re-tuned model leaves
 on reference recordings,
@@ -6,8 +6,8 @@ on reference recordings,
     w(t) = r(t) + a1 r(t-1) + ... + ap r(t-p),        R a = -[R(1) ... R(p)]        (Yule-Walker)
 
 with a = (a1 ... ap), the autocovariance R(k) = E r(t) r(t-k) and its Toeplitz matrix R. The squared gain of the filter
-is proportional to the inverse of the residual's spectrum: frequencies at which the re-tuned model also errs on the
-reference recordings get little weight, those at which it is accurate get much.
+is about proportional to the inverse of the residual's spectrum: frequencies at which the re-tuned model also errs on
+the reference recordings get little weight, those at which it is accurate get much.
 
 References: Yule, Phil. Trans. R. Soc. A 226 (1927), 267; Walker, Proc. R. Soc. A 131 (1931), 518; Ljung, System
 Identification (1999), section 7.2 (prefiltering of prediction errors).
@@ -34,8 +34,8 @@ MOST_LAGS, SAMPLES_PER_LAG = 64, 50
 """Largest order p of the autoregression, and least samples per lag: with fewer, the coefficients are mostly noise. Both
 were set by hand."""
 WHITE_SHARE = 1e-4
-"""White noise added to the residual before the fit, as a share of its power: no frequency weighs more than 1 /
-WHITE_SHARE times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
+"""White noise added to the residual before the fit, as a share of its power: it limits the weight of frequencies
+without power, and keeps the Toeplitz matrix well conditioned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,8 +89,7 @@ def fit_whitening_filter(residuals: Sequence[FloatArray], white_noise_rms: Float
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhitenedMeasure:
-    """An error measure (`ErrorMeasure`) of whitened residuals. After `whiten_measure`, samples count only where all
-    samples that the filter uses are known."""
+    """An error measure (`ErrorMeasure`) of whitened residuals."""
 
     base_measure: ErrorMeasure
     whitening: WhiteningFilter
@@ -134,7 +133,7 @@ class WhitenedMeasure:
         """Compute, per record, (n, c): residuals of the base measure through the filter, in `unit`; NaN where
         missing."""
         base_residuals = self.base_measure.residuals(model, effects)
-        # The filter was fitted to residuals in the channels' units, those of the base measure are in units of noise.
+        # The filter was fitted to residuals in the channels' units, without the division by `unit`.
         return tuple(self.whitening.apply(residual * self.base_measure.unit) / self.unit for residual in base_residuals)
 
     def evidence(

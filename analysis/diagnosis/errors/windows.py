@@ -1,9 +1,9 @@
 """Error measure by windows (multiple shooting): short simulations, each from an initial state estimated by a smoother.
 
-For plants without a restoring force, whose free simulation would drift, and for recordings that do not begin at rest.
-The estimated state is not exact, so that the residuals of each window are projected on the complement of its free
-motions from other initial states (least squares): only the error that no initial state explains counts (Bock and Plitt,
-IFAC World Congress 1984: multiple shooting). `choose_measure` builds the measure where it is the suitable one.
+For plants whose free motion decays slowly or not at all, so that a free simulation would drift, and for recordings that
+do not begin at rest. The estimated state is not exact, so that the residuals of each window are projected on the
+complement of its free motions from other initial states (least squares): only the error that no initial state explains
+counts (Bock and Plitt, IFAC World Congress 1984: multiple shooting). Built by `choose_measure`.
 """
 
 from collections.abc import Sequence
@@ -38,8 +38,8 @@ random errors. Chosen."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """`ErrorMeasure` by windows, each simulated from a fitted initial state (multiple shooting): for plants without a
-    restoring force, and for recordings that do not begin at rest. Sizes: n samples or coordinates, c channels."""
+    """`ErrorMeasure` by windows, each simulated from a fitted initial state. Sizes: n samples or coordinates, c
+    channels."""
 
     records: tuple[Observed, ...]
     states: tuple[FloatArray, ...]
@@ -83,7 +83,7 @@ class Windows:
         )
 
     def can_observe(self, effect: Effect) -> bool:
-        """True for every effect: each changes the simulated response or position."""
+        """Whether the effect changes the compared signals: taken as true of every effect."""
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
@@ -99,7 +99,7 @@ class Windows:
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         """Gather, per record, the motion and missing force from which starting values are estimated. residuals: not
-        used; they are computed again with the simulation."""
+        used."""
         return tuple(
             self._gather_evidence(model, (*self.model_effects, *effects), record, states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -135,8 +135,8 @@ class Windows:
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, window_samples: int
     ) -> FloatArray:
         """Compute (n, c): residuals, NaN where missing, without their projection on the free motions from other initial
-        states, window by window; unchanged where a free motion diverges, and in a last window with fewer readings than
-        `READINGS_PER_STATE` per state."""
+        states, window by window; unchanged where a free motion diverges, and in windows with too few readings
+        (`_project_out`)."""
         n, c = residual.shape
         # A fit may try an unstable model, whose free motion overflows: its residuals are returned unchanged.
         with np.errstate(over="ignore", invalid="ignore"):

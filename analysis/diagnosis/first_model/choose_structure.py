@@ -2,8 +2,7 @@
 
 The structures are those of `model_structures`, fitted by force balance where a motion was measured along the commands;
 otherwise, and always with two modes, to spectra. A sentence states what the remaining error depends on
-(`describe_remaining_error`). Called where a user asks for a model alone (`study/workflows/diagnosis/fit_first_model`);
-a diagnosis uses `fit_without_model`.
+(`describe_remaining_error`). For a user who asks for a model alone; a diagnosis uses `fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +41,7 @@ the velocity is smoothed over 1 % of its standard deviation: chosen, narrow enou
 
 @dataclass(frozen=True, slots=True)
 class TriedStructure:
-    """A structure that was tried, with its held-out error, or the reason why it was refused."""
+    """A structure that was tried, with its error, and the reason where it was refused."""
 
     kind: Kind
     error: float | None
@@ -109,9 +108,8 @@ def choose_structure(
 
 
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
-    """Describe the model's error in a sentence and, where `fit` is by force balance (`balanced` is not None) on
-    recordings with a time axis, which regressor explains most of its power, or that none explains
-    `REPORTED_REMAINDER_SHARE` of it."""
+    """Describe the model's error in a sentence and, where `fit` is by force balance on recordings with a time axis,
+    which regressor explains most of its power, or that none explains `REPORTED_REMAINDER_SHARE` of it."""
     error_text = f"{100 * fit.error:.3g} % of the {fit.error_signal}"
     if balanced is None or fit.joint is None or balanced.untimed:
         return f"An error of {error_text} remains."
@@ -145,8 +143,8 @@ def _compute_explained_share(columns: Sequence[FloatArray], residual_forces: Seq
 def _fit_structures(
     balanced: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
-    """Fit every structure that the recordings allow, with force balances not yet two modes. balanced: for force
-    balances; None where only spectra can be fitted."""
+    """Fit every structure that the recordings allow, with force balances not yet two modes. balanced: None where only
+    spectra can be fitted."""
     structure_kinds: tuple[Kind, ...] = (
         ("mass-spring", "two-mode") if balanced is None else ("massless", "motor", "mass-spring")
     )

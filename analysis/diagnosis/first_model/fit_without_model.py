@@ -4,8 +4,8 @@ Methods, in the order in which they are tried: a spring per axis by force balanc
 time; the coefficients of the force balances, where these name laws along the motion of one body per command; damper and
 spring per unit mass by force balance, for a free motion; rigid bodies fitted to forces, for recordings in closed loop
 or of an imposed motion (`fit_rigid_model`); a mechanical model fitted to frequency responses (`mechanical_fit`), which
-takes longest, or rigid bodies where that fails. Tolerances are wide, because unmodelled physics biases the fitted
-parameters. Called by `diagnose_values` and `study.workflows.diagnosis.fit_without_model`.
+takes longest, or rigid bodies where that fails. Tolerances are wide, because unmodelled physics may bias the fitted
+parameters.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -93,7 +93,7 @@ def fit_first_model(
 
 
 def _fix_mass(model: MechanicalModel) -> MechanicalModel:
-    """Reduce the mass tolerance of a model to `FIXED_SHARE` of the largest mass, so that re-tuning does not change the
+    """Reduce the mass tolerance of a model to `FIXED_SHARE` of the largest mass, so that re-tuning hardly changes the
     mass. model: with a tolerance."""
     assert model.tolerance is not None
     return replace(model, tolerance=replace(model.tolerance, mass_kg=FIXED_SHARE * float(np.abs(model.mass).max())))

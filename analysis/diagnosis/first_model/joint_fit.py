@@ -6,7 +6,7 @@ For the forces f of d axes and the motion q along them,
 
 the sum over axes of |e_i|² / |f_i - mean f_i|² is minimised, so that every axis has the same weight. Standard errors
 are sandwich estimates (White, Econometrica 48:817, 1980), clustered by blocks of samples, because residuals within a
-block are correlated. Called by `model_structures`."""
+block are correlated."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -72,8 +72,8 @@ def fit_jointly(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joi
     """Fit the matrices jointly. parts: those to fit, without the stiffness where the shaft turns freely; a constant
     force per axis is always fitted, too. Held-out errors are those of cross-validation with fewer than
     `LEAST_TEST_BLOCKS` test blocks, or where they hold no motion on any axis (`has_held_out_motion`). A force without
-    power is given the power 1e-300, against division by zero. Raises numpy.linalg.LinAlgError where the motion does not
-    determine the parameters."""
+    power is given the power 1e-300, against division by zero. Raises numpy.linalg.LinAlgError where the motion, or that
+    without one of the blocks, does not determine the parameters."""
     parametrisation = _build_parametrisation(regressions[0], parts)
     powers = [max(compute_signal_power(regression.fit), 1e-300) for regression in regressions]
     block_equations = _build_block_equations([regression.fit for regression in regressions], parametrisation, powers)

@@ -2,9 +2,9 @@
 
 The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. The
 tolerance of a matrix is half the largest difference between its entries and those of the balances with the named laws
-(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry, at least 1e-12. A mass is at
-least `MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical model
-needs a mass. Called by `fit_without_model` and `force_balance_measures`."""
+(not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry, at least 1e-12. A diagonal mass
+is at least `MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical
+model needs a mass."""
 
 from collections.abc import Sequence
 
@@ -127,7 +127,7 @@ def _fit_matrix_rows(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit one row of the mass, damping and stiffness matrix each, (commands,), to one balance with these laws.
     law_indices: of the laws; driven_channels: channels of the driven motions. A stiffness row that the balance does not
-    contain is zero. A law of the command (negative index) adds no columns."""
+    contain is zero."""
     regression = balance.search.regression
     weights = regression.fit_weights(regression.select_columns(law_indices))[: regression.matrix_column_count]
     channel_count = len(regression.motions[0].channels)

@@ -2,7 +2,7 @@
 
 A diagnosis without a given model may start from one. Some structures omit matrices (`PARTS_OF`). They are fitted by the
 force balance where every command has a measured position or velocity (`fit_structure`), else, and always with modes, to
-spectra (`fit_modal_structure`). Called by `choose_structure` and `fit_without_model`.
+spectra (`fit_modal_structure`).
 """
 
 from collections.abc import Callable, Sequence
@@ -38,9 +38,9 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "mass-spring": PARTS,
     "gravity": PARTS,
 }
-"""Matrices that the force balance fits, by structure; "two-mode" is fitted to spectra only."""
+"""Matrices that the force balance fits, by structure; fewer without a time axis or for a free motion."""
 FIXED_SHARE = 1e-6
-"""Chosen so that re-tuning cannot change a mass: without a time axis, factor on the least mass, and standard deviation
+"""Chosen so that re-tuning hardly changes a mass: without a time axis, factor on the least mass, and standard deviation
 stated for mass and damping (in their units); for a free motion, that of the mass over the largest mass."""
 NAME_TEMPLATE = "first model, {}"
 """Name of the fitted model, to be filled in with its structure."""
@@ -76,7 +76,7 @@ class StructureFit:
     error_signal: str
     """Signal that the held-out errors refer to, in words."""
     joint: JointFit | None
-    """Result of the force balance; None for a fit to spectra (accelerations alone, or a structure with modes)."""
+    """Result of the force balance; None for a fit to spectra."""
     remarks: tuple[str, ...]
 
     @property
@@ -152,8 +152,8 @@ def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
 def fit_modal_structure(
     recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]
 ) -> StructureFit:
-    """Fit "mass-spring" or "two-mode" to spectra, for measured accelerations and for modes. Raises StructureFitError
-    for other structures, where the fit fails, and where a mode does not lower the held-out error."""
+    """Fit "mass-spring" or "two-mode" to spectra. Raises StructureFitError for other structures, where the fit fails,
+    and where a mode does not lower the held-out error."""
     if kind not in ("mass-spring", "two-mode"):
         raise StructureFitError("it needs a measured position or velocity along every command")
     axis_count = len(recordings[0].command.channels)
@@ -213,7 +213,8 @@ def _require_suitable(balanced: BalancedRecordings, kind: Kind) -> None:
 
 def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
     """Build the mechanical model of the fitted matrices, with a tolerance widened from their standard errors; damping
-    that would supply energy is reduced to its diagonal. Raises MechanicalModelError for a negative mass or damping."""
+    that would supply energy is reduced to its diagonal. Raises MechanicalModelError for an invalid model, such as one
+    with a negative mass or damping."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
     if kind == "massless" or balanced.free:
         mass = np.diag(_find_least_mass(balanced.regressions[0].motions)) * (FIXED_SHARE if balanced.untimed else 1.0)
@@ -224,7 +225,6 @@ def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> Mec
     )
     if problems:
         raise MechanicalModelError(problems)
-    # A damping matrix with a negative eigenvalue would supply energy: only its diagonal is kept.
     if np.linalg.eigvalsh(damping)[0] < 0:
         damping = np.diag(np.diagonal(damping))
     eye = np.eye(len(mass))

@@ -1,8 +1,8 @@
 """Convert recordings of any form to forces and the motions that they drive, with a sentence on each change.
 
-Used only without a given model, because a model defines its commands and responses itself. The steps are in the order
-of `convert_to_driven_motions`; each returns the recordings unchanged, with an empty sentence, where it does not apply.
-Called by `prepare_recordings` and `study.evaluation.real.diagnose_real`.
+Used only without a given model, because a model defines its commands and responses itself. Begin at
+`convert_to_driven_motions`; each of its steps returns the recordings unchanged, with an empty sentence, where it does
+not apply.
 """
 
 from collections.abc import Callable, Sequence
@@ -134,8 +134,8 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
 
 def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
     """Leave out commands that never change, because nothing about their axis can be identified, and with them the
-    motion of their axis, where there is one for each command. Unchanged where all commands are constant, or responses
-    are more numerous."""
+    motion of their axis, where there is one for each command. Unchanged where all commands are constant, responses are
+    more numerous, or no sample is complete."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([recording.command.samples for recording in recordings])
     samples = samples[np.isfinite(samples).all(axis=1)]

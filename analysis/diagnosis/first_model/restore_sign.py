@@ -1,9 +1,8 @@
 """Restore the sign of a speed or position whose sensor measures its magnitude only, from the command.
 
-Between two minima near zero the sign is constant. It is that of the speed which an FIR filter predicts from the
-command, and the filter is fitted to the signed speed in turn, until the signs no longer change or `MAX_FITS` is reached
-(alternating projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972). Called by
-`one_motion_per_force`.
+Between two minima near zero the sign is taken to be constant. It is that of the speed which an FIR filter predicts from
+the command, and the filter is fitted to the signed speed in turn, until the signs no longer change or `MAX_FITS` is
+reached (alternating projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972).
 """
 
 import itertools
@@ -55,9 +54,9 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
 
 
 def _is_unsigned_speed(recording: Recording) -> bool:
-    """Whether no position was recorded and the only response, a speed or position without NaN, is never below
-    -`UNSIGNED_NEGATIVE_SHARE` of its rms and is below `REVERSAL_SPEED_SHARE` of its rms in at least 5 % of the samples,
-    though each sign of the only command has more than `LEAST_SIGN_SHARE` of its power."""
+    """Whether no position was recorded and the only response, a speed or position without NaN, stays above
+    -`UNSIGNED_NEGATIVE_SHARE` of its rms and is below `REVERSAL_SPEED_SHARE` of its rms in about 5 % of the samples or
+    more, though each sign of the only command has more than `LEAST_SIGN_SHARE` of its power."""
     response, command = recording.response, recording.command
     if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
         return False

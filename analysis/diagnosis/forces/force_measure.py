@@ -1,11 +1,11 @@
 """Build the error measure on forces along the measured motion: choose its frequency band, compute the forces' noise.
 
 Theory of operation. With the motion q measured, the force that a model misses follows without simulation (inverse
-dynamics): the model's force M a + D v + K q + (effects along q) is compared with the actuator's force, both low-pass
-filtered up to `band_hz`. Differentiating q twice multiplies its noise by (2 pi f)² M, so the band is the widest in
-which that noise is at most `NOISE_SHARE` of the force, and ends where the force has no power. Noise densities of q are
-converted through the inverse response of the model; an actuator's own uncertainty is added in quadrature. Samples at
-the ends, where the filter has no full support, are not used. Called by `choose_measure` and `rigid_model`.
+dynamics): the force M a + D v + K q that the model needs is compared with that of the actuators and the effects along
+q, both low-pass filtered up to `band_hz`. Differentiating q twice multiplies its noise by (2 pi f)² M, so the band is,
+by default, the widest tried in which that noise is at most `NOISE_SHARE` of the force, and ends where the force has
+hardly any power. Noise densities of q are converted through the inverse response of the model; an actuator's own
+uncertainty is added in quadrature. Samples at the ends, where the filter has no full support, are not used.
 """
 
 from collections.abc import Sequence
@@ -71,8 +71,8 @@ def build_predicted_force_measure(
         force_records.append(force_record)
         force_floors.append(_compute_force_noise(model, motion, floor, band_hz))
     forces = np.vstack([force_record.measured for force_record in force_records])
-    # An unsuitable model overestimates the noise, so it is limited to the strongest force; that of an idle axis may be
-    # less than the noise.
+    # An unsuitable model overestimates the noise, so it is limited to the strongest force's standard deviation, because
+    # that of an idle axis may be below the noise.
     noise = np.minimum(np.fmin.reduce([floor.response_rms for floor in force_floors]), np.std(forces, axis=0).max())
     noise = np.asarray(np.hypot(noise, ACTUATOR_ERROR_SHARE * np.sqrt(np.mean(forces**2, axis=0))))
     rate_hz = records[0].recording.sample_rate_hz

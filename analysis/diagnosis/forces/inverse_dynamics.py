@@ -2,10 +2,9 @@
 
     M q'' + D q' + K q = B u,    y = C q        below the end of the band, by a zero-phase low pass
 
-Where every coordinate is measured, q follows from y and the derivatives suffice; else the frequency response from y to
-u is used (`compute_inverse_response`). The straight line between the first and the last sample, which a Fourier
-transform cannot represent, is treated by itself in steady state. Used by the error measure by forces (`force_measure`,
-`predicted_force`), `rigid_model`, `search.short_recordings` and `confirm.balance_with_model`.
+With as many coordinates as commands, q follows from y and the derivatives suffice; else the frequency response from y
+to u is used (`compute_inverse_response`). The straight line between the first and the last sample, which a Fourier
+transform cannot represent, is treated by itself in steady state.
 """
 
 from dataclasses import dataclass
@@ -110,8 +109,8 @@ def compute_required_force(model: MechanicalModel, motion: BandMotion) -> Requir
 
 
 def _compute_square_model_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
-    """Compute the required force of a model with as many coordinates as commands, all measured: the derivatives
-    suffice, without another Fourier transform. Raises numpy.linalg.LinAlgError as `compute_required_force`."""
+    """Compute the required force of a model with as many coordinates as commands, without another Fourier transform.
+    Raises numpy.linalg.LinAlgError as `compute_required_force`."""
     output_inverse = np.linalg.inv(model.output[: model.inputs])
     input_inverse = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass

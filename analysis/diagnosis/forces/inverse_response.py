@@ -8,8 +8,7 @@ one linear system,
 
 Solving it at each of many thousand lines is slow. The solution is a rational function of s whose poles are the model's
 transmission zeros, generalised eigenvalues of the matrix pencil (Emami-Naeini and Van Dooren 1982, Automatica 18:415).
-With the poles known, its partial fraction expansion is fitted to a few lines, and checked at others. Called by
-`force_measure` and `inverse_dynamics`; the transmission zeros alone by `search.short_recordings`.
+With the poles known, its partial fraction expansion is fitted to a few lines, and checked at others.
 
 Sizes: n coordinates q, m inputs u and as many outputs y, k transmission zeros with non-negative imaginary part.
 """
@@ -27,14 +26,14 @@ MAX_SOLVED_LINES = 2000
 """Number of spectral lines up to which the system is solved at each line. Chosen by hand."""
 RANGE_LINE_COUNT, POLE_LINE_OFFSETS = 60, np.array([-1.0, 0.0, 1.0])
 """Lines of the fit: number of logarithmically and of evenly spaced lines over the range, and distances of further lines
-from each pole in units of its half-width. Chosen by hand; `FIT_TOLERANCE` is tested for every model."""
+from each pole in units of its half-width. Chosen by hand."""
 HIGHEST_POWER = 4
 """Highest power of s in the expansion: that of an inertia behind a massless coupling."""
 POLE_LIMIT = 1e3
 """Ratio of a pole to the highest line above which a power of s represents it instead. Chosen by hand."""
 FIT_TOLERANCE = 1e-8
-"""Largest error at lines that were not fitted, relative to the line's largest entry; above it the system is solved at
-each line. Chosen: far below the noise of any recording."""
+"""Largest error at lines that were not fitted, relative to the line's largest entry of forces or of positions; above it
+the system is solved at each line. Chosen, far below the noise of recordings."""
 
 
 def compute_inverse_response(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
@@ -127,8 +126,7 @@ def _choose_lines(poles: ComplexArray, highest_hz: float) -> FloatArray:
     the half-width of a nearly undamped pole is set to 1e-6 of its magnitude, so that lines do not coincide."""
     half_widths = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
     pole_lines_hz = (np.abs(poles.imag)[:, None] + half_widths[:, None] * POLE_LINE_OFFSETS).ravel() / (2 * np.pi)
-    # Every other line tests the fit: near a pole, a second line 1 % higher. The lowest line is at 1e-6 of the range,
-    # the lowest logarithmically spaced one at 1e-4. Chosen by hand.
+    # Every other line tests the fit: near a pole, a second line 1 % higher. Distances are chosen by hand.
     log_spaced_hz = np.geomspace(1e-4 * highest_hz, highest_hz, RANGE_LINE_COUNT)
     evenly_spaced_hz = np.linspace(0.0, highest_hz, RANGE_LINE_COUNT)
     return np.unique(

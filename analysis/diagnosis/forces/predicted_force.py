@@ -4,8 +4,7 @@
 
 with the forces h of the effects along q (inverse dynamics). The residual is e rescaled to an actuator gain of 1
 (`_balance_forces`). Because no simulation is needed, this error measure suits plants in closed loop and plants that
-drift. The forces in e are means over one sample period around each sample. Created by `force_measure`; used like the
-other error measures of the search (`ErrorMeasure`).
+drift. The forces in e are means over one sample period around each sample. `force_measure` builds the measure.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,8 +39,7 @@ division by zero. Chosen."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedForce:
-    """Error of the force that the model requires for the measured motion; implements `ErrorMeasure`. For a plant in
-    closed loop, whose command depends on the response, and for a plant that drifts without a restoring force."""
+    """Error of the force that the model requires for the measured motion; implements `ErrorMeasure`."""
 
     records: tuple[Observed, ...]
     """Records whose `measured` is the applied force within the band."""

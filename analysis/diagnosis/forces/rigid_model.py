@@ -5,9 +5,9 @@ dynamics).
 
 The fitted matrices are made symmetric. K is kept only where it reduces the misfit by `SPRING_SHARE`. D and K that are
 not positive semidefinite are replaced, so that the model is passive, and the masses have a lower bound. Rigid robots
-are identified by the same regression: Gautier, Vandanjon and Pressé, Proc. IEEE Conf. Decision and Control 1994. Called
-by `fit_without_model`, where no model was given, for recordings in closed loop, where a controller would bias frequency
-responses from commands to motions, or of an imposed motion, and where a fit to frequency responses fails."""
+are identified by the same regression: Gautier, Vandanjon and Pressé, Proc. IEEE Conf. Decision and Control 1994. For
+recordings without a given model: in closed loop, where a controller would bias frequency responses from commands to
+motions, of an imposed motion, or where a fit to frequency responses fails."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -114,7 +114,7 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
     mass = mass + np.diag(np.maximum(_compute_least_mass(regressors[:, :m], target) - np.diagonal(mass), 0.0))
     stiffness = (full_fit[2 * m : 3 * m] + full_fit[2 * m : 3 * m].T) / 2 if has_springs else np.zeros((m, m))
     # A linear model must be passive: of damping that is not positive semidefinite only positive diagonal entries are
-    # kept, and such stiffness is dropped. The diagnosis looks for the cause.
+    # kept, and such stiffness is dropped.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
     stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
     largest_entries = [float(np.abs(np.diagonal(matrix)).max()) for matrix in (mass, damping, stiffness)]

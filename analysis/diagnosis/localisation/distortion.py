@@ -1,6 +1,5 @@
 """Nonlinear distortion by kind (odd, even, varying), from the repeated periods and the silent lines of a periodic
-excitation: one value per channel, input, level and band. `Distortions.remarks` names the kinds that the recording
-cannot show. Called by `examine_fits`.
+excitation: one value per channel, input, level and band. `Distortions.remarks` says what the recording cannot show.
 
 Theory. A linear, time-invariant device responds to a multisine on its driven lines only. Where all driven lines are odd
 multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and differences of an
@@ -74,13 +73,13 @@ class Distortion:
     band_hz: Band
     """Lower and upper end, Hz."""
     whole_band: bool
-    """True: the whole driven band; False: one octave of it."""
+    """True: all octaves of the driven band; False: one of them."""
     kind: Kind
     rms: float
     """Rms distortion in the output's unit, over all lines of the band that this kind reaches; 0 where not above the
     noise."""
     limit_rms: float
-    """Detection limit, rms in the output's unit: two standard errors of the noise."""
+    """Detection limit, rms in the output's unit: of a power of two standard errors of the noise's."""
     signal_rms: float
     """Rms response on the driven lines of the band, in the output's unit."""
     p_value: float

@@ -4,7 +4,7 @@ A force at an axis, of any cause, moves all channels in the proportions of the m
 one sensor appears in its channel alone. At each line, the residual in units of the noise is projected onto the subspace
 of an entry. The score is the mean over lines of the logarithm of 1 plus the power outside that subspace: a sum of power
 over lines would be dominated by lines at which the device moves as a rigid body, where the responses to different
-entries are nearly parallel. Called by `localisation`.
+entries are nearly parallel.
 """
 
 from collections.abc import Sequence

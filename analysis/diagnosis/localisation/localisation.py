@@ -1,8 +1,8 @@
 """Localise a mismatch: find the component through which it enters the model, and the states that it depends on.
 
 `find_entry_point` compares the residual's spectra with the model's responses to a force at each axis and to an error of
-each sensor (`entry_point`); `find_state_dependences` then tests the residual of that component against position,
-velocity, command and time (`state_dependence`). Both are called by `result.examine_fits`.
+each sensor (`entry_point`); `find_state_dependences` then tests the missing force against position, velocity, command
+and time, or a sensor's error against reading and time (`state_dependence`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,8 +41,7 @@ class Localisation:
     states: Mapping[str, tuple[StateMismatch, ...]] = field(default_factory=dict)
     """Significant state dependences by model: "before" (as given), "retuned", "after" (with the effects)."""
     entry: EntryPoint | None = None
-    """Entry point of the re-tuned model's residual; None where the residual is noise, where the noise is not known, or
-    where no free simulation was compared."""
+    """Entry point of the re-tuned model's residual; None as `find_entry_point`."""
     distortions: Distortions = field(default_factory=lambda: Distortions((), ()))
     """Distortion of the first recording (`find_distortions`)."""
 
@@ -52,7 +51,7 @@ def find_entry_point(
 ) -> EntryPoint | None:
     """Find the entry point of the residual of the first recording, which represents the device. fitted: the re-tuned
     model; floor: noise of that recording; cells: mismatch map of the re-tuned model. None where no cell exceeds the
-    noise, no free simulation was compared, or the spectra cannot be computed."""
+    noise, no free simulation was compared, or the spectra cannot be computed (`compute_residual_spectra`)."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]

@@ -2,8 +2,7 @@
 
 The power of the residual is compared with that of the noise plus an equivalence margin (noncentral F test), which
 includes the mismatch of clean recordings, if there are any. p-values are adjusted hierarchically (Benjamini and
-Bogomolov, J. R. Stat. Soc. B 76:297, 2014). Called by `mismatch_maps`; `reference.learn_model_error` uses
-`learn_floor`.
+Bogomolov, J. R. Stat. Soc. B 76:297, 2014).
 """
 
 from collections.abc import Hashable, Sequence

@@ -1,11 +1,11 @@
 """Mismatch maps of the given, the re-tuned and the completed model, by channel, frequency band and excitation level.
 
-A mismatch is significant only beyond the model's typical error on held-out data. No model is exact, and its error does
-not follow from the noise. The residual in a cell is therefore modelled as noise plus model error, both random, with the
-error's power a share of the signal's that varies slowly with frequency. The share is estimated on the held-out cells of
-the most complete model, of the same channel, in the same and the neighbouring octaves: other levels, other axes, other
-recordings. Its robust estimate is the median, so that a mismatch at one level or in one octave does not raise its own
-reference. Called by `assemble_findings`, and by `learn_model_error` for the cells of clean recordings.
+A mismatch is significant only beyond the model's typical error on held-out data, where that is known. No model is
+exact, and its error does not follow from the noise. The residual in a cell is therefore modelled as noise plus model
+error, both random, with the error's power a share of the signal's that varies slowly with frequency. The share is
+estimated on the other held-out cells of the most complete model, of the same channel, in the same and the neighbouring
+octaves. Its robust estimate is the median, so that a mismatch at one level or in one octave hardly raises its own
+reference.
 """
 
 from collections.abc import Mapping, Sequence
@@ -147,8 +147,8 @@ def compute_cells(
     learned: ModelErrorFloor | None = None,
     held_out: bool = False,
 ) -> Cells:
-    """Compute the cells of all records for one fit. held_out: only from the samples to choose by and to test, to which
-    no parameter was fitted. learned: mismatch of clean recordings."""
+    """Compute the cells of all records for one fit. held_out: only from the samples to choose by and to test. learned:
+    mismatch of clean recordings."""
     margin = Margin(learned=learned or ModelErrorFloor())
     cells: list[MismatchCell] = []
     for record_index, (record, residuals, floor) in enumerate(

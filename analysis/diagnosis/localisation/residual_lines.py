@@ -1,9 +1,9 @@
-"""Compute the power of the residual, the noise and the signal by segment and octave. Called by `mismatch_cells`.
+"""Compute the power of the residual, the noise and the signal by segment and octave.
 
-In periodic segments, the spectrum is that of the mean period, whose lines are independent. In all others, it is the
-mean over Hann windows that overlap by half (Welch, IEEE Trans. Audio Electroacoust. 15:70, 1967), whose correlation
-reduces the degrees of freedom. Powers are mean squares in the signal's unit squared, one-sided: twice the squared
-magnitudes of the lines of positive frequency.
+In segments with a usable period, the spectrum is that of the mean period, whose lines are independent. In all others,
+it is the mean over Hann windows that overlap by half (Welch, IEEE Trans. Audio Electroacoust. 15:70, 1967), whose
+correlation reduces the degrees of freedom. Powers are mean squares in the signal's unit squared, one-sided: twice the
+squared magnitudes of the lines of positive frequency.
 """
 
 from collections.abc import Sequence
@@ -87,8 +87,8 @@ class Observation:
 
 def compute_residual_lines(recording: Recording, observation: Observation, used: Mask) -> list[ResidualLines]:
     """Compute the residual power by segment and octave. used: (n,), mask of the samples to use. Segments of rest, and
-    those without a complete period or window of used, finite samples, are left out; a recording without segments counts
-    as one segment."""
+    those without a driven line or a complete period or window of used, finite samples, are left out; a recording
+    without segments counts as one segment."""
     is_usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
     settled_periods = {period.index: period for period in find_settled_periods(recording)}
     residual = observation.measured - observation.predicted

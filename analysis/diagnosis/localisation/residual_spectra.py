@@ -2,7 +2,7 @@
 is found (`entry_point`).
 
 Channels are those of the response, then of the position. A spectrum is that of the mean period (rfft / n, see
-`compute_line_spectra`), on the lines from the first to the last that the excitation drives. Called by `localisation`.
+`compute_line_spectra`), on the lines from the first to the last that the excitation drives.
 """
 
 from collections.abc import Sequence
@@ -51,8 +51,8 @@ def compute_residual_spectra(
     """Compute the spectrum of each excerpt: the mean period of a segment, or a window of `_WINDOW_S` where nothing is
     periodic. None where neither can be cut from usable samples, the noise is not known, or no line is driven. used:
     (n,), usable samples; None = all. Segments whose period differs from that of the first are left out. model_error:
-    relative to the response (default chosen by hand); it counts as noise, because residuals of the re-tuned model on
-    other axes would else appear as a second force."""
+    relative to the response (default chosen by hand); it counts as noise, because residuals on other axes might else
+    appear as a second force."""
     residuals = [recording.response.samples - prediction.response]
     channel_noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:

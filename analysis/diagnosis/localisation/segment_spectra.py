@@ -1,9 +1,9 @@
 """Compute the mean spectrum of each periodic segment and its variance, corrected for the command on silent lines.
 
-Silent lines are those that the excitation does not drive; `distortion`, which calls this module, finds nonlinear
-distortion there. With feedback, distortion of the response also appears in the command: the linear response to the
-command's silent lines is estimated from the driven lines (H1 estimate) and subtracted, unless it is negligible or not
-determined. Spectra are those of `periods.compute_period_spectra` (DFT divided by the length of the period).
+Silent lines are those that the excitation does not drive, where nonlinear distortion appears (`distortion`). With
+feedback, distortion of the response also appears in the command: the linear response to the command's silent lines is
+estimated from the driven lines (H1 estimate) and subtracted, unless it is negligible or not determined. Spectra are
+those of `periods.compute_period_spectra` (DFT divided by the length of the period).
 """
 
 from collections.abc import Sequence

@@ -4,7 +4,7 @@ A state is a variable of the motion or of the signals: position, velocity, comma
 larger in a region of the state, or follow its sign (`state_regions`); the p-value of each test is multiplied by the
 number of all tests of forces, or of sensor errors (Bonferroni). A dependence is stated where the p-value is at most
 `FALSE_DISCOVERY_RATE` and, for a region, its share of the mismatch is clearly larger than that of the samples
-(`_is_informative`), for at most `MOST_NAMED_STATES` per axis or channel. Called by `localisation`.
+(`_is_informative`), for at most `MOST_NAMED_STATES` per axis or channel.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 _PERMUTATION_SEED = 20
-"""Seed of the permutations, fixed so that the same recording gives the same result. Any value serves."""
+"""Seed of the permutations, fixed so that the same recording gives the same result."""
 TESTS_PER_AXIS = 6
 """Tests along one axis: position and velocity by size and by sign, command and time by size."""
 TESTS_PER_CHANNEL = 2
@@ -134,7 +134,7 @@ def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group
 
 def _is_informative(region: StateRegion) -> bool:
     """Whether a region is of the kind "sign", or its share of the mismatch is more than `STATE_CONCENTRATION` times its
-    share of the samples. Never for a middle region: no mechanical effect is confined to the middle of a state's
+    share of the samples. Never for a middle region: a mechanical effect is hardly confined to the middle of a state's
     range."""
     if region.description.startswith(MIDDLE_REGION_PHRASE):
         return False
@@ -143,8 +143,8 @@ def _is_informative(region: StateRegion) -> bool:
 
 def _assign_strata(recording: Recording, used_samples: Mask, driving_signal: FloatArray) -> IntArray:
     """Assign to each sample (n,) the index of its segment, rests not counted; -1 where it is not used or belongs to no
-    segment, and in weakly driven segments (`_LEAST_DRIVEN_SHARE`). A recording without segments is one. The permutation
-    test permutes within segments. driving_signal: (n,), command or reading."""
+    segment, and in weakly driven segments (`_LEAST_DRIVEN_SHARE`). A recording without driven segments is one. The
+    permutation test permutes within segments. driving_signal: (n,), command or reading."""
     sample_count = len(driving_signal)
     strata = np.full(sample_count, -1, dtype=np.int64)
     segment_spans = [

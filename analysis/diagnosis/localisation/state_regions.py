@@ -2,7 +2,7 @@
 
 State variables are position, velocity, command, response and time. Samples are sorted into bins of the state; tested
 are the power per bin (size) and the mean per bin (sign) against permutations of blocks of samples within a segment
-(`block_permutation`), because neighbouring samples are correlated. Called by `state_dependence`.
+(`block_permutation`), because neighbouring samples are correlated.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BIN_COUNT = 12
 """Number of bins of a state, with equally many samples each as far as equal values allow. Chosen."""
 PERMUTATIONS = 60
-"""Number of permutations of blocks. Chosen: p-values below ten over it are those of a fitted tail."""
+"""Number of permutations of blocks. Chosen: p-values below about ten over it are those of a fitted tail."""
 _LEAST_CONCENTRATION = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region. Chosen."""
 _LEAST_SHARE = 0.05
@@ -44,7 +44,7 @@ class State:
 
     kind: StateKind
     symbol: str
-    """Symbol in the result: "v", "x", "fx", "ax", "t"."""
+    """Symbol in the result, such as "v" or "fx"."""
     unit: str
     values: FloatArray
     """(n,), in `unit`."""
@@ -78,7 +78,7 @@ class StateRegion:
     """Share of the samples in the region; 1 for sign."""
     p_value: float
     description: str
-    """Text for `Mismatch.state`: "near v = 0"."""
+    """Text for `Mismatch.state`, such as "near v = 0"."""
 
 
 def find_state_regions(

@@ -2,7 +2,7 @@
 
 Method of Hunter and Reiner (Technometrics 7:307, 1965): the experiment with the largest difference between the
 predictions of both models after the rival's parameters are re-tuned. The information of the existing recordings is the
-prior of these parameters. Called by `propose_experiment`.
+prior of these parameters.
 
 Several recordings: with differences r_i of the predictions for n recordings, sensitivities X_i and prior information K,
 
@@ -36,7 +36,7 @@ RETUNING_STEPS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bench:
-    """Simulated test bench: the re-tuned model, sampling and noise with which experiments are simulated."""
+    """Simulated test bench: model, sampling and noise with which experiments are simulated."""
 
     tuning: Tuning
     sample_rate_hz: float
@@ -51,7 +51,7 @@ class PredictedGain:
 
     experiment: Experiment
     gain: float
-    """Expected log-likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
+    """Expected log-likelihood ratio in favour of the named effect; 0 where a simulation diverged."""
     shared: float = 0.0
     """The gain with the prior information shared by `MOST_RECORDINGS` recordings, at most `gain`; such gains add up to
     a lower bound of the joint gain of several recordings (module docstring)."""
@@ -207,8 +207,8 @@ def _retune_rival(
     bench: Bench, rival: Fitted, information: FloatArray, prediction: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
     """Re-tune the rival by Gauss-Newton steps, and return the sum of the remaining squared differences and of the prior
-    penalty; that of the linearised model where the steps diverge. prediction: the experiment, the difference of the
-    predictions (n c,) in units of the noise, and the sensitivities (d, n c) to the rival's parameters."""
+    penalty; that of the linearised model where the steps do not reduce it. prediction: the experiment, the difference
+    of the predictions (n c,) in units of the noise, and the sensitivities (d, n c) to the rival's parameters."""
     experiment, difference, sensitivities = prediction
     parameter_change, deviation_count = np.zeros(len(information)), len(rival.deviations)
     target = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + difference
@@ -241,7 +241,6 @@ def _retune_rival(
         if not penalised_squares < smallest_squares:
             break
         smallest_squares = penalised_squares
-    # Where the steps diverge: the value of the linearised model, which tends to be too small (conservative).
     return smallest_squares if smallest_squares < initial_squares else max(linearised_squares, 0.0)
 
 

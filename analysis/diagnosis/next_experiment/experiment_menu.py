@@ -3,7 +3,6 @@
 Sweeps at several levels, a wide and a longer sweep, slow sinusoids, for a stiff axis a sweep about a constant force and
 releases, and in SI units a sweep with added mass: `propose_experiment` predicts by simulation how well each
 discriminates the rivals. Nothing exceeds the level already recorded. Commands are in the unit of the model's commands.
-Also called by `study.evaluation.bank.follow_up`.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,5 @@
 """Estimate the noise floor of a recording's response and position, by the first of three methods that the data allow:
-differences between repeated periods, samples at rest, spectral lines above the driven band. Called by `choose_measure`
-and `rigid_model`."""
+differences between repeated periods, samples at rest, spectral lines above the driven band."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ class NoiseFloor:
 
     @property
     def response_rms(self) -> FloatArray:
-        """Rms noise of the response (p,), in the channels' units; NaN where `method` is "unknown"."""
+        """Rms noise of the response (p,), in the channels' units; NaN where unknown."""
         return self.response.rms
 
     @property
@@ -45,7 +44,7 @@ class NoiseFloor:
 
     @property
     def is_known(self) -> bool:
-        """Whether the noise was estimated; otherwise every rms is NaN."""
+        """Whether the noise was estimated."""
         return self.method != "unknown"
 
 

@@ -2,7 +2,7 @@
 
 At rest, the noise is estimated from windowed spectra, or at high frequencies from third differences, which remove slow
 ringing after an excitation. Without rest, the median power of the lines above the driven band is taken, which single
-harmonics do not change, and the noise is assumed to be white. Called by `noise_floor` and `repeat_noise`.
+harmonics hardly change, and the noise is assumed to be white.
 """
 
 from dataclasses import dataclass
@@ -91,8 +91,7 @@ def estimate_quiet_band_noise(
 ) -> tuple[FloatArray, float] | None:
     """Estimate a white density (lines, channels) with the power of the median line above the driven band, and its
     degrees of freedom; None without such a band of at least `_LEAST_LINES` lines, with a constant excitation, or where
-    the longest stretch without gaps has fewer than 2 `_LEAST_LINES` samples. The median excludes the lines of
-    harmonics."""
+    the longest stretch without gaps has fewer than 2 `_LEAST_LINES` samples."""
     excitation = select_instrument_signal(recording)
     start, stop = _find_longest_run(np.hstack([samples, excitation]))
     samples, excitation_run = samples[start:stop], excitation[start:stop]

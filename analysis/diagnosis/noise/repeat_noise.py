@@ -1,6 +1,6 @@
-"""Estimate noise from the differences between repeated periods. Called by `noise_floor`.
+"""Estimate noise from the differences between repeated periods.
 
-Noise does not depend on the excitation, whereas variations of the device itself between periods grow with it. Therefore
+Noise is taken not to depend on the excitation, whereas variations of the device between periods grow with it. Therefore
 the segments with the smallest variance are averaged and, where others are larger and even these exceed the noise at
 rest, the noise at rest is used. Densities are as in `ChannelNoise`: mean over lines = variance, in the channel's unit
 squared.

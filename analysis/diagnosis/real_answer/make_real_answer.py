@@ -1,7 +1,4 @@
-"""Convert the findings on one real recording to the document `RealAnswer`.
-
-Called by `study.evaluation.real.diagnose_real`.
-"""
+"""Convert the findings on one real recording to the document `RealAnswer`, for the report on real recordings."""
 
 from collections.abc import Mapping, Sequence
 
@@ -99,8 +96,8 @@ def describe_model(findings: Findings) -> str:
 
 def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
     """List the held-out stretches by channel, with its times in s and three rms values: of the signal about its mean,
-    and of the errors of the re-tuned and the completed model. Channels without finite values in a stretch are left
-    out."""
+    and of the errors of the re-tuned and the completed model. Channels without readings in a stretch, or with
+    predictions that are not finite there, are left out."""
     stretches = []
     for series in time_series:
         for start, stop in series.tested:
@@ -127,8 +124,7 @@ def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutS
 
 
 EXCERPT_SAMPLES = 900
-"""Largest number of samples of an excerpt, around where re-tuned and final prediction differ most relative to the
-signal. Chosen by hand."""
+"""Largest number of samples of an excerpt. Chosen by hand."""
 
 
 def select_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:

@@ -1,7 +1,5 @@
 """Document of the diagnosis of one real recording, format `hapteq-real-answer`, version 1: the values of a row of the
-table of real recordings, and of its section in the report. Made by `make_real_answer` and
-`study.evaluation.real.diagnose_real`, stored by `real_answer_file`, read by `real_report`, `real_summary` and others.
-Field names are those of the file and therefore fixed."""
+table of real recordings, and of its section in the report. Field names are those of the file and therefore fixed."""
 
 import json
 from dataclasses import asdict

@@ -3,7 +3,7 @@
 First, faults that the recordings show directly are sought: sensor faults in the readings, hum in a spectrum, steps of a
 quantized command, additional sensor noise. If there are none, `contrast.rank_faults` tests every fault that is not
 excluded by the error that it removes from a base model that is fitted to both sets of recordings. Reference recordings
-are called clean. Called by `diagnose`.
+are called clean.
 """
 
 from collections.abc import Sequence
@@ -29,8 +29,7 @@ from equalizer.signals.recording import Recording
 SENSOR_NOISE, QUANTIZATION = "sensor_noise", "force_quantization"
 """Names of these two effects in the catalogue."""
 LARGEST_CLEAN_ERROR = 0.02
-"""Relative prediction error of a model on a clean recording up to which the search by this model counts, unless the
-comparison contradicts it. Chosen by hand."""
+"""Largest relative error with which a model counts as predicting a clean recording. Chosen by hand."""
 LARGEST_NOISE = 0.1
 """Variation between repeats, relative to the signal's standard deviation, above which it is more than sensor noise, as
 of a device with stick-slip. Chosen by hand."""

@@ -1,10 +1,9 @@
 """Model error learned from clean recordings: the residual of the re-tuned model, which then counts as noise.
 
-A linear model is never exact: its residual on recordings of the intact device is no evidence for a missing effect.
-Called by `search_by_simulation` and `diagnose` where clean recordings are given. The residual is learned in two forms:
-its share of the signal by channel, input and octave (the floor of the mismatch map), and its spectrum, as the filter
-that whitens it (an AR(p) model, `fit_whitening_filter`). In the diagnosed recordings residuals pass through this
-filter, and their noise level is the whitened residual's rms, scaled with the signal.
+A linear model is never exact: its residual on recordings of the intact device is no evidence for a missing effect. The
+residual is learned in two forms: its share of the signal by channel, input and octave (the floor of the mismatch map),
+and its spectrum, as the filter that whitens it (an AR(p) model, `fit_whitening_filter`). In the diagnosed recordings
+residuals pass through this filter, and their noise level is the whitened residual's rms, scaled with the signal.
 """
 
 from collections.abc import Sequence
@@ -90,8 +89,8 @@ def learn_model_error(
 ) -> LearnedError:
     """Learn the residual spectrum of the re-tuned model on clean recordings, as noise for the search. clean: of the
     same device, alike in channels and units; the model is re-tuned to each separately, because recordings of different
-    days differ. diagnosed: the recordings to diagnose, with the same measure. Raises IncomparableRecordingsError where
-    the measures differ, numpy.linalg.LinAlgError where a fit is singular."""
+    days may differ. diagnosed: the recordings to diagnose, with the same measure. Raises IncomparableRecordingsError
+    where the measures differ, numpy.linalg.LinAlgError where a fit is singular."""
     measure_name = make_measure(diagnosed, model, clean).measure.name
     fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):

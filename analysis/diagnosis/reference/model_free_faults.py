@@ -2,7 +2,7 @@
 
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
 therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`), and the usual
-quantization step. Called by `search_by_simulation` and `compare_with_reference`, where reference recordings are given.
+quantization step.
 
 Sizes: n samples, p response channels. The limits are chosen by hand, unless a reason is stated.
 """
@@ -23,10 +23,9 @@ STEP_TOLERANCE = 1e-3
 """Relative difference of the quantization steps of two channels up to which they count as equal."""
 LONGEST_MEAN_RUN = 2.0
 """Largest mean length in samples of runs of repeats that are taken for lost samples, as with half of all samples lost
-at random: longer runs are backlash, or a sensor at rest."""
+at random: longer runs count as backlash, or a sensor at rest."""
 FULL_STEP_SHARE = 0.75
-"""Least median step after a repeat, relative to the median of the other steps: after backlash it is half of that or
-less."""
+"""Limit of the median step after a repeat, relative to the median of the other steps (`_has_full_steps`)."""
 REFERENCE_STRETCH_COUNT = 3
 """Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
 READING_TOLERANCE = 1e-9
@@ -96,9 +95,9 @@ def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -
 
 
 def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
-    """Find clipping: significantly more readings at the largest magnitude than in the references, which exceed that
-    magnitude, and no more repeats below it than usual. All channels have the fault if none exceeds the largest limit,
-    else the one with the largest limit. readings: (n, p); references: (samples, p) each."""
+    """Find clipping: significantly more readings at the largest magnitude than in the references, one of which exceeds
+    that magnitude, and no more repeats below it than usual. All channels have the fault if none exceeds the largest
+    limit, else the one with the largest limit. readings: (n, p); references: (samples, p) each."""
     limit_by_channel = {}
     for channel in range(readings.shape[1]):
         limit, top_count = _count_top_readings(readings[:, channel])
@@ -145,8 +144,8 @@ def _count_top_readings(values: FloatArray) -> tuple[float, int]:
 
 def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find lost samples: significantly more runs of repeats than in the references, short and followed by a full step.
-    The parameter is the share of lost samples, less the usual share, and all channels have the fault. A sensor that
-    rests for a while has not lost samples. readings: (n, p); references: (samples, p) each."""
+    The parameter is the share of lost samples, less the usual share, and all channels have the fault. readings: (n, p);
+    references: (samples, p) each."""
     is_repeat = _mark_repeats(readings)
     usual_count = max(float(_mark_run_starts(_mark_repeats(reference)).mean()) for reference in references) * len(
         is_repeat

@@ -1,9 +1,9 @@
 """Search for effects whose contribution exceeds the model error on clean recordings of the same device.
 
 The residual of the re-tuned model on clean recordings (`learn_model_error`) counts as noise in two ways: as coloured
-noise, by a whitening filter; and, where the residual exceeds that noise by more than a factor, by its rms only.
-Effects that also improve the prediction of the clean recordings are not named: the model lacks them, but they are not
-the fault. Called by `search_by_simulation`.
+noise, by a whitening filter; and, where the residual exceeds that noise by more than a factor, by its rms only. Effects
+that also improve the prediction of the clean recordings are not named, unless they are certain: the model lacks them,
+but they are not the fault.
 """
 
 from collections.abc import Sequence
@@ -36,8 +36,8 @@ def search_with_reference(
     time_left: TimeBudget,
 ) -> SearchResult:
     """Search for effects with the model's error on clean recordings (learned_error) as noise. context: as for a search
-    without clean recordings, with the faults that are certain. Residuals of the result are those of its own measure,
-    with that model error as noise. progress, time_left: as for `search_effects`.
+    without clean recordings, with the faults that are certain. Residuals of the result are plain, not whitened.
+    progress, time_left: as for `search_effects`.
 
     Where the residual exceeds that noise by more than `ModelErrorFloor.margin_factor`, whitening helps little: effects
     are then also sought with the plain residual, and that result replaces the first where it names effects and has the
@@ -125,7 +125,7 @@ def _search_whitened_residual(
     """Search on the whitened residual; the result is refitted and judged on the plain one."""
     plain_measure = add_learned_noise(context.full_measure, learned_error.floor)
     whitened_measure = learned_error.make_noise_measure(plain_measure, context.tuning.model)
-    # Model error is not random noise: even the right law leaves more than its learned size.
+    # Model error is not random noise: even the right law may leave more than its learned size.
     least_error = EXPLAINED_ERROR * learned_error.references.gain_factor
     search_context = replace(
         context,
@@ -158,9 +158,9 @@ def _search_whitened_residual(
 def _judge_with_margin(
     measure: ErrorMeasure, explanation: Explanation, is_named: bool, margin_factor: float
 ) -> Judgement:
-    """Judge the result with the thresholds raised by `margin_factor`, because devices differ from day to day. measure:
-    that of the residuals in `explanation`; its scores may be those of a whitened measure, which does not show slow
-    changes."""
+    """Judge the result with the thresholds raised by `margin_factor`, because devices may differ from day to day.
+    measure: that of the residuals in `explanation`; its scores may be those of a whitened measure, which does not show
+    slow changes."""
     if is_named:
         return Judgement(
             "explained"
@@ -177,8 +177,8 @@ def _judge_with_margin(
 
 
 def _refit_on_plain_residual(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Refit the parameters of the effects on the plain residual: a fit to the whitened residual would bias the
-    parameters of a law that is not exact. Without effects, and with certain faults, only the residuals are replaced."""
+    """Refit the parameters of the effects on the plain residual: a fit to the whitened residual may bias the parameters
+    of a law that is not exact. Without effects, and with certain faults, only the residuals are replaced."""
     final_fit = explanation.after.fitted
     if final_fit.hypothesis.claims and not context.certain:
         start = evaluate_fit(context.measure, context.tuning, final_fit.deviations, final_fit.hypothesis)

@@ -1,7 +1,7 @@
 """Assemble the findings of a finished search: the document (`Diagnosis`), and the data of figures and sentences.
 
 In this order: labels and re-tuned models, standard errors, mismatch maps of the given, re-tuned and completed model,
-examination of the fits (`examine_fits`), choice of the next recording, document. Called by `diagnose`.
+examination of the fits (`examine_fits`), choice of the next recording, document.
 """
 
 from collections.abc import Sequence
@@ -196,8 +196,8 @@ def _list_effects_with_gains(result: SearchResult, errors: FloatArray, labels: L
 
 
 def _propose(context: SearchContext, explanation: Explanation, judgement: Judgement) -> "Proposal | None":
-    """Propose the next recordings; None where no effect is named, where recordings cannot be predicted by a free
-    simulation, band powers were compared, or there is nothing to propose."""
+    """Propose the next recordings; None where no effect is named, no free simulation or only band powers were compared,
+    or there is nothing to propose."""
     if not judgement.named or context.full_measure.name != "free simulation" or explanation.statistic is not None:
         return None
     # Imported here: only named effects have rivals that a further recording could separate.

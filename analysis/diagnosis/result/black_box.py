@@ -1,10 +1,9 @@
-"""A black-box correction as a reference for the named effects: where it predicts better, an effect is still missing.
+"""A black-box correction as a reference for the named effects: where it predicts better, an effect may be missing.
 
 The residual of the re-tuned model is fitted by a polynomial of the commands and of the model's prediction, channel by
 channel, with as many terms as the named effects have parameters, at least 1. Terms are selected by orthogonal matching
 pursuit: the term with the largest projection of the residual, then a least-squares fit of all selected terms (Pati,
-Rezaiifar and Krishnaprasad 1993; a variant of the orthogonal least squares of Chen, Billings and Luo 1989). Called by
-`examine_fits`.
+Rezaiifar and Krishnaprasad 1993; a variant of the orthogonal least squares of Chen, Billings and Luo 1989).
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """Write sentences on classes of laws that the data cannot distinguish, and on unconfirmed candidates.
 
 A class contains a named effect and the effects that explain the held-out data equally well; where all of them belong to
-a family of `_LAW_FAMILIES`, its name is stated, too. Called by `wording`, `candidates`, `diagnosis_tables`,
-`real_answer.make_real_answer` and `view_diagnosis`.
+a family of `_LAW_FAMILIES`, its name is stated, too.
 """
 
 from collections.abc import Sequence
@@ -62,7 +61,7 @@ REFINEMENT_REASON = (
 )
 """Reason, stored in `Rival.why_not`, for a law that contains the named law as a special case without a gain."""
 SENTENCE_COUNT = 3
-"""Largest number of candidates that are described in sentences; the document and the page's table list all."""
+"""Largest number of candidates that are described in sentences."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +156,8 @@ def format_candidate_parameters(candidate: Candidate, device: DeviceWording | No
 
 
 def describe_candidates(diagnosis: Diagnosis, device: DeviceWording | None = None) -> tuple[str, ...]:
-    """Describe each of the best `SENTENCE_COUNT` candidates in a sentence; the first is left out where
-    `describe_best_candidate` describes it."""
+    """Describe the best `SENTENCE_COUNT` candidates, a text each; the first is left out where `describe_best_candidate`
+    describes it."""
     reported_count = 1 if describe_best_candidate(diagnosis, device) else 0
     return tuple(
         f"Not confirmed: {_describe_gain(candidate, device)}"

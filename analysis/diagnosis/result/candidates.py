@@ -1,10 +1,7 @@
 """Add the candidates and the other results of force balances to a diagnosis: classes, shares, and balance errors.
 
 A class contains effects that the data cannot distinguish; a candidate is a law that was found but not confirmed. Gains
-are fractions of the squared force error on held-out data (`judged_law`). `diagnose` calls
-`add_balances_with_given_model` where the user gave a model, `add_balances_with_fitted_model` where the model was fitted
-to the same recordings, and in both cases `collect_balance_errors`; for a fitted model `describe_linear_terms`, too.
-channels: names of the commands, in the order of the balances.
+are fractions of the squared force error (`judged_law`). channels: names of the commands, in the order of the balances.
 """
 
 import re
@@ -95,10 +92,10 @@ def add_balances_with_fitted_model(
     channels: tuple[str, ...],
     unconfirmed: Sequence[Candidate] = (),
 ) -> Diagnosis:
-    """Add classes, shares and candidates to the diagnosis, for a model that was fitted to the same recordings.
-    unconfirmed: effects of actuator and sensor that a search found, listed after the laws of ranks 0 and 1
-    (`_rank_law`). A constant force or sensor offset that no balance names becomes a re-tuned parameter; where no effect
-    remains, the verdict "explained" becomes "parameters", and any other "unexplained"."""
+    """Add classes, shares and candidates to the diagnosis, for a model that was fitted to the same recordings;
+    unchanged without balances. unconfirmed: effects of actuator and sensor that a search found, listed after the laws
+    of ranks 0 and 1 (`_rank_law`). A constant force or sensor offset that no balance contains becomes a re-tuned
+    parameter; where no effect remains, the verdict "explained" becomes "parameters", and any other "unexplained"."""
     if not balances:
         return diagnosis
     judged_laws = [
@@ -163,7 +160,7 @@ def _list_covered_names(effect: NamedEffect) -> tuple[str, ...]:
 
 def _rank_law(judged_law: "JudgedLaw") -> int:
     """Rank a candidate, 0 first. 0: physically possible parameters and a significant gain; 1: other laws; 2: linear
-    dynamics of a higher order; 3: laws that explain almost nothing (`LAW_CEILING_SHARE`)."""
+    laws; 3: laws that explain almost nothing (`LAW_CEILING_SHARE`)."""
     if judged_law.law.is_linear:
         return 2
     if judged_law.share < LAW_CEILING_SHARE:

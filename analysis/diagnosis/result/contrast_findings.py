@@ -2,7 +2,7 @@
 
 The comparison (`diagnosis.contrast`) replaces verdict, effects and errors of the search by simulation. A fault that the
 recordings show without a model is named alone; where there is none and the sets could not be compared, the results of
-the search are kept. Called by `diagnose`.
+the search are kept.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,7 @@
 
 The ceiling is the fit of all laws together in a force balance: a sum of a few laws can hardly have a smaller error
 (`BalanceErrors.ceiling`). Errors are rms errors over the rms of the signal, in a force balance over the rms of the
-force. Called by `wording` and `diagnosis_report`.
+force.
 """
 
 from collections.abc import Sequence

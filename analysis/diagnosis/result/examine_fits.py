@@ -2,7 +2,7 @@
 
 First the entry point of the mismatch is located; then its dependence on the state, the effects' curves, the black box
 and the distortion are computed in parallel. A part that crashes is left out with a remark where the guard is enabled
-(`search.guard`). Called by `assemble_findings`.
+(`search.guard`).
 """
 
 from dataclasses import dataclass

@@ -56,7 +56,7 @@ class Signature:
     axis: str | None
     """Letter of the axis; name of the channel where the curve shows the error of a channel; None = all axes."""
     abscissa_label: str
-    """Label of the abscissa with unit: "velocity of x (m/s)"."""
+    """Label of the abscissa with unit, such as "velocity of x (m/s)"."""
     ordinate_label: str
     """Label of the ordinate with unit."""
     measured_abscissa: FloatArray
@@ -71,7 +71,7 @@ class Signature:
     law: FloatArray
     """(q,): value of the fitted law at these points."""
     visited_range: tuple[float, float] | None = None
-    """Range of the abscissa that the recordings visited; beyond it the law is extrapolated."""
+    """Range of the abscissa that was recorded, beyond which the law is extrapolated; None = no extrapolation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +91,7 @@ class BlackBox:
 
 @dataclass(frozen=True, slots=True)
 class BalanceErrors:
-    """Errors of one axis's force balance on held-out data: rms residual relative to the rms signal."""
+    """Errors of one axis's force balance on held-out data: rms residual relative to the force's rms."""
 
     axis: str
     """Letter of the axis."""
@@ -131,7 +131,7 @@ class Findings(SummaryDisplay):
     given: MechanicalModel
     """The initial model; see `fitted`."""
     improved: MechanicalModel
-    """The re-tuned model with the named effects among its `effects`; its inputs are the commands as recorded."""
+    """The re-tuned model (after `add_contrast` the given one) with the named effects among its `effects`."""
     named: tuple[PlacedEffect, ...]
     """The named effects with axes and fitted parameters."""
     evidence: tuple[Evidence, ...]
@@ -175,7 +175,7 @@ class Findings(SummaryDisplay):
     split_s: Mapping[str, float] = field(default_factory=dict)
     """Duration in s of the samples to fit, to choose by and to test; keys "fit", "choose", "test"."""
     retuned: MechanicalModel | None = None
-    """The re-tuned model without new physics; its inputs are those of `improved`."""
+    """The re-tuned model without new physics."""
     own_errors: FloatArray | None = None
     """(t,): standard errors of the model's own parameters, in `tuning.units`; NaN = not computed."""
 

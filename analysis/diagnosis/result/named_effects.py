@@ -1,8 +1,8 @@
 """Make the named effects of the document: parameters with intervals, rivals with reasons, probabilities.
 
 A reported parameter's 95 % interval is value ± hypot(1.96 s, `INTERVAL_SHARE` value), with the standard error s
-propagated from the fit's coordinates. Probabilities of the candidates of a round fall exponentially with their errors.
-Called by `assemble_findings`, `examine_fits` and `unconfirmed_candidates`.
+propagated from the fit's coordinates. Probabilities of the candidates of a round fall exponentially with their
+logarithmic errors.
 """
 
 from collections.abc import Sequence

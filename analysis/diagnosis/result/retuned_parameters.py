@@ -1,7 +1,4 @@
-"""Find the model parameters that re-tuning moved by a standard deviation or more, and describe doubtful ones.
-
-Called by `wording`, `diagnosis_tables` and `diagnosis_report`.
-"""
+"""Find the model parameters that re-tuning moved by a standard deviation or more, and describe doubtful ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +30,7 @@ class MovedParameter:
 
     @property
     def text(self) -> str:
-        """Name and change in words: "damping fx +0.35 N s/m (2.1 standard deviations)"."""
+        """Name and change in words, such as "damping fx +0.35 N s/m (2.1 standard deviations)"."""
         return f"{self.name} {self.change_text} ({abs(self.deviations):.2g} standard deviations)"
 
     @property
@@ -85,8 +82,8 @@ def describe_retuning(moved_parameters: Sequence[MovedParameter], fitted: bool =
 
 def describe_doubtful_parameters(moved_parameters: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
     """Describe parameters that moved by `RETUNING_DOUBTED` standard deviations or more, so that they may compensate for
-    physics that was not named: a sentence each up to `_MOST_LISTED`, else one with their number; a table lists all.
-    fitted: as in `describe_retuning`; then one sentence on those of them at their bound, if there are any."""
+    physics that was not named: a sentence each up to `_MOST_LISTED`, else one with their number. fitted: as in
+    `describe_retuning`; then one sentence on those of them at their bound, if there are any."""
     doubtful_parameters = [parameter for parameter in moved_parameters if abs(parameter.deviations) >= RETUNING_DOUBTED]
     at_bound = [parameter for parameter in doubtful_parameters if parameter.at_bound]
     if fitted:

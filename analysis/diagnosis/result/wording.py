@@ -1,8 +1,7 @@
 """Write the sentences of a diagnosis, the same in the report, in the terminal and on the screen.
 
 `write_summary_lines` returns those of the terminal in order, the verdict first. Errors are on held-out data, relative
-to the signal or, in a force balance, to the force. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis`
-and `make_real_answer`.
+to the signal or, in a force balance, to the force.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,9 +73,9 @@ def describe_effect(effect: NamedEffect, signature: str = "", device: DeviceWord
 def describe_verdict(
     diagnosis: Diagnosis, moved_parameters: Sequence[MovedParameter] = (), device: DeviceWording | None = None
 ) -> str:
-    """Describe the verdict, with which every output begins, with named effects and held-out errors; where it is
-    "unexplained", with the best candidate. moved_parameters: re-tuned by a standard deviation or more, for the verdict
-    "parameters". device: None = several axes and no statement on the noise."""
+    """Describe the verdict, with named effects and held-out errors; where it is "unexplained", with the best candidate.
+    moved_parameters: re-tuned by a standard deviation or more, for the verdict "parameters". device: None = several
+    axes and no statement on the noise."""
     is_single_axis = device is not None and device.is_single_axis
     errors = diagnosis.fit.test
     effect_titles = conjoin([format_effect_title(effect, is_single_axis) for effect in diagnosis.effects])

@@ -5,9 +5,8 @@ is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end wh
 sensitivity (Jacobian) to the model's own parameters takes one simulation for each of them. It is therefore kept from
 fit to fit, and recomputed once after the first fit, then only where a parameter has moved far; only fits near the best
 are refined. With forces that depend on the motion, a sensitivity that was computed without these forces, or on one
-period, leads to a point short of the minimum: refined fits are then continued with the sensitivity of all parameters on
-all samples (`_polish`). Called by `search` and its steps (`next_effect`, `explain`, `revise_selection`,
-`identifiability`), by `confirm_laws`, `discovery` and `reference.search_with_reference`.
+period, may lead to a point short of the minimum: refined fits are then continued with the sensitivity of all parameters
+on all samples (`_polish`).
 """
 
 from collections.abc import Sequence
@@ -40,7 +39,7 @@ from analysis.diagnosis.settings import (
 )
 
 REFINING_STEPS, FULL_FIT_STEPS = 4, 2
-"""Gauss-Newton steps of a refining fit, and of a fit to all periods. Chosen."""
+"""Gauss-Newton steps of a refining fit, and of one that continues it on all samples. Chosen."""
 POLISHING_ROUNDS, POLISHING_GAIN = 3, 0.002
 """Largest number of rounds of `_polish`, and share of the cost that a round must remove for another to follow. A round
 takes a simulation for every parameter of the model. Chosen."""
@@ -97,9 +96,8 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
 
 def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     """Continue the fits (the best first; may be empty) with the sensitivity of all parameters under the forces of the
-    best; unchanged without forces that depend on the motion. Rounds follow while they lower the cost, even at the noise
-    level, where parameters may still be off by two standard deviations. Where the best reaches the noise, fits far
-    above it are not continued."""
+    best; unchanged without forces that depend on the motion. Rounds follow while they lower the cost enough
+    (`POLISHING_GAIN`). Where the best reaches the noise, fits far above it are not continued."""
     measure, tuning = context.measure, context.tuning
     if not any(has_motion_forces(fitted.hypothesis) for fitted in fits):
         return fits

@@ -18,8 +18,8 @@ Fits are compared by the log error power, a log-likelihood in which each channel
    fall by half. Then the next effect is looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where
    the best one lowers L by less, it is added with a second one if both lower L by more than twice `ADDED_SHARE`.
 
-Samples to fit, to choose by and to test are disjoint. In these steps the test samples only decide whether a first
-effect is looked for although no other sample requires it (`is_worth_searching`); `verdict` judges the result by them.
+In these steps the test samples only decide whether a first effect is looked for although no other sample requires it
+(`is_worth_searching`); `verdict` judges the result by them.
 
 References: Miller, Subset Selection in Regression (2002), chapter 3; Ljung, System Identification (1999), chapter 16.
 """
@@ -89,7 +89,7 @@ class Explanation:
     ended_early: bool = False
     """Whether the time limit was reached before the search was done."""
     excluded_name: str = ""
-    """Name of an excluded effect (`SearchContext.excluded`), where only its refinements explain as much; else empty."""
+    """Name of an excluded effect that explains best, where another is worth adding; else empty."""
     undetermined: tuple[str, ...] = ()
     """Effects that were found and removed, because the recordings do not determine their parameters."""
     errors: tuple[Fitted, FloatArray] | None = None
@@ -118,9 +118,9 @@ def explain(
     previous_steps: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
     """Re-tune the model and add effects one by one. progress: called with a text and the completed fraction. time_left:
-    called before each round and each simulation; when it returns False, the search ends with the effects added so far.
-    previous_steps: those of a search on fewer samples, each with its rivals; one effect is added to these, up to
-    `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before these are fitted again."""
+    time limit, at which the search ends with the effects added so far. previous_steps: those of a search on fewer
+    samples, each with its rivals; one effect is added to these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the
+    time ends before these are fitted again."""
     explanation = start_explanation(
         replace(context, map_=limit_map(context.map_, time_left)) if previous_steps else context,
         progress,
@@ -196,7 +196,7 @@ def _reevaluate(context: SearchContext, candidate: FittedCandidate) -> Fitted:
 
 def is_worth_searching(context: SearchContext, explanation: Explanation, base: FittedCandidate) -> bool:
     """Whether `base`, the last step of `explanation`, leaves enough error to search for one more effect. No third
-    effect is sought where two fit as well as right laws fit a real device, because it would only absorb their small
+    effect is sought where two fit as well as right laws fit a real device, because it might only absorb their small
     errors; except with clean recordings, and with opened held-out samples, which are few and may show an effect that
     the others do not."""
     if base.fitted.hypothesis.claims:
@@ -217,7 +217,7 @@ def _find_effect_pair(
 ) -> tuple[tuple[FittedCandidate, ...], ...]:
     """Find two effects of which none alone is worth adding, but which together remove more than twice `ADDED_SHARE` of
     the excess error. Returns their two rounds; empty where the best of `candidates` is worth adding, the error is near
-    the noise (`NEAR_NOISE_ERROR`), an effect is excluded, or no such pair is found."""
+    the noise (`NEAR_NOISE_ERROR`), or no such pair, without excluded rivals of its second, is found."""
     if not candidates or is_worthwhile(base, candidates[0]) or base.score.worst_channel <= NEAR_NOISE_ERROR:
         return ()
     best_by_name = {candidate.newest: candidate for candidate in reversed(candidates)}

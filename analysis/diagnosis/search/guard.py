@@ -1,7 +1,7 @@
 """Isolate crashes of the diagnosis: an effect or a task that raises an exception is left out, and the report says so.
 
-Used by the search over effects, the analyses after it, and the figures. A guard is disabled by default, and exceptions
-then propagate: tests, benchmarks and banks of simulated devices must see every crash.
+A guard is disabled by default, and exceptions then propagate: tests, benchmarks and banks of simulated devices must see
+every crash.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -1,11 +1,10 @@
-"""Remove effects that the data do not identify: one stays only if a parameter's interval excludes its null value.
+"""Remove effects that the data do not identify: the intervals of their parameters include the null value (no effect).
 
-Linearised intervals are computed first. Where an effect has one such parameter, and its interval contains zero by a
-small margin, the likelihood profile decides: with correlated parameters or a nonlinear law the linearised interval is
+Linearised intervals are computed first. Where an effect has one such parameter, and its interval contains that value by
+a small margin, the likelihood profile decides: with correlated parameters or a nonlinear law the linearised interval is
 too wide. The deviance between the fits without and with an effect needs no derivative. Summed over stretches longer
 than the errors' correlation time, its mean over its standard deviation is half of the parameter over its standard
-error, for any variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance). Called
-by `search`, `impacts`, `discovery.add_laws`, `confirm.confirm_laws`, `result.assemble_findings` and `diagnose`.
+error, for any variance and colour of the residuals (Vuong, Econometrica 57:307, 1989; for a quadratic deviance).
 """
 
 from collections.abc import Iterator

@@ -4,7 +4,7 @@ Two simulations of a drive with play diverge within a few impacts, however small
 Dynamical Systems, chapter 4). Waveforms can therefore not be compared. Band powers are compared instead (`band_power`),
 and the difference between two simulations of one hypothesis, its chance variation, takes the place of the noise.
 
-Steps of `explain_impacts`, which `search_by_simulation` calls:
+Steps of `explain_impacts`:
 
 1. nothing is fitted unless the response is irregular (`is_irregular`);
 2. play is fitted on each driven axis, and the best of these fits refined together with the model's parameters;
@@ -74,8 +74,7 @@ def explain_impacts(
     not explain it, where the model without play differs by chance alone, where the time ends before that is known,
     where play is not in the catalogue, or where the error measure is no free simulation.
 
-    explanation: result of the search by waveforms. floors: noise of each record. time_left: called before each
-    refinement, and between its linearisations.
+    explanation: result of the search by waveforms. floors: noise of each record.
     """
     effects_by_name = {effect.name: effect for effect in catalogue}
     if PLAY not in effects_by_name or not isinstance(context.full_measure, FreeSimulation):

@@ -1,7 +1,7 @@
 """Find the effect of the catalogue that lowers the error most when added to the selected ones (forward selection).
 
 Candidates are screened by linearisation, fitted by output error and compared: steps 2 to 5 of the theory of operation
-in `explain`. Called by `explain` and `revise_selection`.
+in `explain`.
 """
 
 from collections.abc import Sequence

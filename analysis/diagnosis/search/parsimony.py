@@ -4,7 +4,6 @@ Candidates are compared by the mean log error power over channels (`FitScore.mea
 excess above the accuracy of the noise estimate, `NOISE_ACCURACY`, is the part that remains unexplained. Where the
 errors of two candidates do not differ by more than chance, the one with the lower information criterion is preferred,
 and a special case before the more general law, unless the latter's error is smaller by a margin (`REFINED_SHARE`).
-Called by modules of `search`, `discovery`, `confirm`, `result` and `next_experiment`.
 """
 
 from collections.abc import Sequence
@@ -51,8 +50,8 @@ FAMILIES: tuple[frozenset[str], ...] = (
     frozenset({"added_mass", "hand_impedance", "body_on_actuator"}),
     frozenset({"backlash", "loose_joint"}),
 )
-"""Names of effects with similar forces or errors. At one place at most one of a family is named; a search exchanges
-them for one another."""
+"""Names of effects with similar forces or errors. A search adds at most one of a family at a place, and exchanges them
+for one another."""
 
 
 def are_exclusive(existing: Claim, added: Claim) -> bool:

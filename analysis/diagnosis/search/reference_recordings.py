@@ -3,7 +3,6 @@ others.
 
 A hypothesis may reduce the error on a clean recording by absorbing model errors. Only a larger reduction on the
 recordings under test is evidence for its effect. Gains are reductions of the logarithm of the rms error, per channel.
-Built by `reference.learn_model_error`, used by `search_context` and `reference.search_with_reference`.
 """
 
 from dataclasses import dataclass, field, replace

@@ -3,8 +3,7 @@
 Forward selection chooses the first effect while that effect alone must explain the whole error, so that the choice may
 be a compromise. The first effect is therefore searched for again with the later effects kept; where another effect fits
 better, it replaces the first and becomes the last in the order. This is repeated until no replacement fits better, or
-every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3). Called by `search`;
-`remove_effect` also by `identifiability`, `confirm.require_gain` and `reference.search_with_reference`.
+every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3).
 """
 
 from collections.abc import Callable, Sequence

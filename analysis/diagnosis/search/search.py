@@ -1,14 +1,12 @@
 """Search for missing effects with a given model: forward selection, backward elimination, verdict.
 
-Called by `search_by_simulation`; with reference recordings of the intact device by `reference.search_with_reference`.
-
 1. Forward selection (`add_effects`) uses the samples to fit and to choose by. After a second effect, the first may be
    exchanged for another of its family; after the last, for any effect that fits better (`revise_selection`).
 2. Backward elimination (`prune`) removes effects without which the others, refitted, fit as well; those that remove
    too little of the mismatch, or none of the held-out error where it was small; and those that the data do not
    determine (`identifiability`: no interval, or profile likelihood of an only amplitude, excludes the null value).
-3. `verdict.judge` compares the errors, in units of the noise, with limits. The errors on held-out samples, which
-   neither fitted nor chose anything, can only withdraw names or the verdict "explained".
+3. `verdict.judge` compares the errors, in units of the noise, with limits. The errors on held-out samples, to which
+   nothing was fitted, can there only withdraw names or the verdict "explained".
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), a part
    of them is opened, that is, used to fit and to choose by, and the search repeated: all but the loudest segments; else
    the first half of each stretch, or every other of more parts. The part still held out must confirm what this finds.
@@ -16,8 +14,8 @@ Called by `search_by_simulation`; with reference recordings of the intact device
    catalogue (`discovery`), because one law that explains everything is a shorter description than two; before a third,
    which takes longer, for rattling play (`impacts`), then laws; and at the end for laws (`_choose_early_or_full`).
 6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
-   repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device has absorbed missing
-   physics as a bias. The new result is used if it explains what the first does not, or with fewer effects.
+   repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device may have absorbed
+   missing physics. The new result is used if it explains what the first does not, or with fewer effects.
 
 Reference: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning (2009), 7.2, 3.3 (stepwise selection).
 """

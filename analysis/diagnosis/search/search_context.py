@@ -1,10 +1,8 @@
 """Shared state of all fits of a search for missing effects, and the first fits of the screened hypotheses.
 
 Samples have three roles: to fit parameters, to choose between hypotheses, and held out to test. A `SearchContext`
-contains the error measure on the first two and on all samples; some of its methods return copies in which a part of
-the held-out samples is opened (used to fit and to choose by), where these alone show a mismatch. Created by
-`search_by_simulation` and `learn_model_error`, passed to this package and to the modules that test and report its
-result.
+contains the error measure on the first two and on all samples; some of its methods return copies in which a part of the
+held-out samples is opened (used to fit and to choose by), where these alone show a mismatch.
 """
 
 from collections.abc import Sequence

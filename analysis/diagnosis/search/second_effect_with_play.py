@@ -4,7 +4,7 @@ Starting values come from the residual waveform, which impacts make chaotic: the
 order of magnitude, by about the same factor at every axis. Each effect of the catalogue is therefore evaluated at
 several strengths (a line search in the logarithm of its main parameter, where it can be scaled), without a fit; those
 with the least cost are fitted, and the best of these refined with the model's parameters. All costs are those of
-`band_power_fit`, about 1 for chance variation alone. Called by `impacts`.
+`band_power_fit`, about 1 for chance variation alone.
 """
 
 from collections.abc import Sequence

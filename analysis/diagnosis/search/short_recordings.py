@@ -1,8 +1,8 @@
 """Shorten recordings with periodic excitation to one settled period per segment, on which hypotheses are fitted first.
 
-All settled periods of a segment are equal except for noise. The kept samples are joined and simulated as one recording
-(compared forces: each stretch is one); a run-in before each stretch lets transients decay (Pintelon and Schoukens,
-System Identification, 2012, ch. 2). Called by `next_effect`, `compare_candidates`, `identifiability`, `fit_laws`.
+The settled periods of a segment are taken to be equal except for noise. The kept samples are joined and simulated as
+one recording (compared forces: each stretch is one); a run-in before each stretch lets transients decay (Pintelon and
+Schoukens, System Identification, 2012, ch. 2).
 """
 
 from collections.abc import Sequence

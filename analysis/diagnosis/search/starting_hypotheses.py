@@ -1,8 +1,8 @@
-"""List candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from data.
+"""List candidate hypotheses: effects of the catalogue at axes or channels, with starting values from data.
 
 Each effect's estimator (`Effect.starts`) computes its starting values from the missing force, the motion and the
 residuals of the base fit (`Evidence`); clock drift is also found by grid search. Hypotheses beyond the recorded range
-are left out. Called by `next_effect`, `second_effect_with_play`, `reference_recordings` and `discovery.add_laws`.
+are left out.
 """
 
 from collections.abc import Sequence
@@ -31,8 +31,8 @@ RANGE_LIMITS: dict[str, dict[str, Literal["travel", "command"]]] = {
 
 
 def list_candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = map) -> tuple[Hypothesis, ...]:
-    """List hypotheses of single effects, in the catalogue's order, at most `STARTS_PER_CLAIM` per effect and site; an
-    effect whose estimator finds no starting value is left out."""
+    """List hypotheses of single effects, in the catalogue's order, at most `STARTS_PER_CLAIM` per claim; an effect
+    whose estimator finds no starting value is left out."""
 
     def list_effect_hypotheses(effect: Effect) -> list[Hypothesis]:
         is_sensor_effect = find_place(effect) == "sensor"

@@ -1,8 +1,7 @@
 """The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it.
 
-Errors are rms errors over rms noise (`FitScore`). The limits are in `settings`, section "The verdict". Called by
-`search`, `revise_selection`, `search_by_simulation` and `named_effects`, and by `confirm` and `discovery` for the laws
-that they add.
+Errors are rms errors over rms noise (`FitScore`), or over chance variation where band powers are compared. The limits
+are in `settings`.
 """
 
 from collections.abc import Sequence
@@ -77,9 +76,8 @@ class UnconfirmedEffect:
     """Share of the held-out error power that the effect removes, alone or with others of the hypothesis; 0 where it is
     not known or not positive."""
     why_not: str
-    """Reason why it is not named, in words."""
     claim: int = -1
-    """Index of the effect among the hypothesis's claims."""
+    """Index of the effect among the hypothesis's claims; -1 = the last."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,12 +93,11 @@ class SearchResult:
     errors: FloatArray | None = None
     """Standard errors of the final fit (`compute_final_errors`), where the search needed them."""
     unconfirmed: tuple[UnconfirmedEffect, ...] = ()
-    """Effects that were found and are not named."""
 
 
 def judge(explanation: Explanation) -> Judgement:
     """Determine the verdict by the errors on the samples to fit and to choose by. Held-out samples can only withdraw
-    names (`_is_confirmed`), or turn "explained" into "partly_explained" or "unexplained"."""
+    names (`_is_confirmed`), or turn "explained" into "partly_explained"."""
     if not explanation.after.fitted.hypothesis.claims or not _is_confirmed(explanation):
         if explanation.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)

@@ -1,8 +1,4 @@
-"""Score the diagnosis on faults that were injected into real recordings: class of each answer, shares of each class.
-
-`study.evaluation.real.inject_real` injects the faults and reads the outcomes; `injected_section` shows the shares in
-the report, `real_summary` in the terminal.
-"""
+"""Score the diagnosis on faults that were injected into real recordings: class of each answer, shares of each class."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +12,7 @@ detectable. Chosen by hand."""
 AnswerClass = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
 """Class of the answer to a case, see `InjectedOutcome.answer_class`."""
 ANSWER_CLASSES: tuple[AnswerClass, ...] = get_args(AnswerClass)
-"""All classes; the last is the correct answer to a case without a fault."""
+"""The last is the correct answer to a case without a fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +21,6 @@ class InjectedOutcome:
     diagnosis."""
 
     recording: str
-    """Name of the recording."""
     effects: tuple[str, ...]
     """Names of the injected faults; none, or two where two were injected at once."""
     places: tuple[str, ...]
@@ -40,9 +35,7 @@ class InjectedOutcome:
     verdict: str
     """Verdict of the diagnosis; "failed" without a diagnosis."""
     named: tuple[str, ...]
-    """Names of the effects that the diagnosis names."""
     named_places: tuple[str, ...]
-    """Place of each named effect."""
     returned: tuple[str, ...]
     """The named effects and the rivals that the recording does not distinguish from these."""
     seconds: float
@@ -144,7 +137,6 @@ class Tally:
     """Counts and shares of a group of cases, such as those of one kind of fault or of one recording."""
 
     name: str
-    """Name of the group."""
     fault_count: int
     """Number of cases with a fault, detectable or not."""
     counts: tuple[int, ...]

@@ -2,10 +2,7 @@
 
 A change is right where the diagnosis returns one of the effects that it may show as: a loosened cable is backlash or a
 loose joint, depending on its slack. The control, a change that changes nothing, counts against a diagnosis that names
-anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter; a
-value of a change without a unit, or with another unit than the parameter's, is kept in the table and compared with
-nothing. Called by `study.evaluation.kit.lab_kit`, which draws and reads the labels, and
-`study.evaluation.kit.score_kit`; `study.cli.kit` lists the changes.
+anything. A value that was weighed or measured beforehand is compared with the interval of a parameter.
 """
 
 from collections.abc import Sequence
@@ -24,7 +21,6 @@ class Change:
 
     name: str
     instruction: str
-    """Instruction to the lab."""
     effects: tuple[str, ...]
     """Effects of which any is a right answer; empty for the control. The value is a parameter of the first of them."""
     unit: str
@@ -74,7 +70,6 @@ class Label:
     """One row of the sealed table: the change that was made before a recording."""
 
     recording: str
-    """Name of the recording."""
     change: str
     """`Change.name`."""
     value: float | None
@@ -99,7 +94,6 @@ class ScoredLabel:
     returned: str
     """Effects of its returned set (the named ones and their inseparable rivals), separated by spaces."""
     right: bool
-    """Whether the diagnosis is right (`score_label`)."""
     inside: bool | None
     """Whether the written value lies in the 95 % interval (ends included) of the first parameter of the change's first
     effect. None where no value was written, the change has no unit, or that effect was not named or has no interval in

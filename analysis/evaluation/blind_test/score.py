@@ -3,7 +3,7 @@
 Detection and naming of single effects and of pairs, false alarms on devices without a missing effect, behaviour where
 the true effect is outside the catalogue (open set), and error and interval coverage of the parameters. Cases count only
 where the mismatch is detectable (`outcome.DETECTABLE_ERROR`), except in false alarms and run times, and where a figure
-states otherwise. Intervals: `confidence_intervals`. Called by `study.evaluation.bank.prove` and `write_proof`.
+states otherwise. Intervals: `confidence_intervals`.
 """
 
 import math
@@ -88,7 +88,7 @@ class Score:
     figures: tuple[IntervalEstimate, ...]
     calibration: Calibration
     misses: tuple[Outcome, ...]
-    """Outcomes with a wrong answer (`is_wrong_answer`); a missing name for an undetectable effect is not wrong."""
+    """Outcomes with a wrong answer (`is_wrong_answer`)."""
 
 
 def compute_score(outcomes: Sequence[Outcome], follow_ups: Sequence[FollowUp] = ()) -> Score:
@@ -115,7 +115,7 @@ def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
 
 def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Compute rates on cases with a single concealed effect: its name, place and axis, and the returned set of
-    names; at last the rate of wrong names on undetectable cases of every kind."""
+    names; at last the rate of wrong names on undetectable cases of every kind but "nothing"."""
     bank_suffixes = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         detectable = _select_detectable(_select_kind(outcomes, "single", bank))

@@ -1,7 +1,7 @@
 """Outcome of a single case of a bank of laws: the concealed law, the diagnosis, and the error of the law it found.
 
 An answer is right if its structure (place, axis, variables, memory) is that of the concealed law and the relative error
-of its function is at most `MAX_LAW_ERROR`. Made by `study.evaluation.bank.laws.prove_laws`, scored by `law_score`.
+of its function is at most `MAX_LAW_ERROR`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,8 +13,8 @@ from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, parse_law
 
 MAX_LAW_ERROR = 0.05
-"""Relative error (`compute_law_error`) up to which a law counts as the concealed function. Chosen; the figures of
-`law_score` and their names state it as 5 %."""
+"""Relative error (`compute_law_error`) up to which a law counts as the concealed function. Chosen; names of figures in
+`law_score` state it as 5 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,7 @@ class TrueLaw:
     """The law that was concealed in a case: formula, axes, parameters, and all forms of it that count as right."""
 
     law: str
-    """Name of the law."""
     formula: str
-    """The law as a formula, for reports."""
     axes: tuple[str, ...]
     """Letters of the axes at which it acts."""
     acts_on: tuple[str, ...]

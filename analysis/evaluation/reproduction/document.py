@@ -1,9 +1,7 @@
 """Document of a reproduction: the content of `reproduction.json`, format `hapteq-reproduction`, version 1.
 
 Each published figure comes with its findings: what the paper reports, the reproduced value, and the rule by which it
-counts as reproduced. Units are part of the names or of the descriptions, which also appear in the JSON Schema, or are
-the field `unit`. Filled by the modules of this package, read and written by `study.store.formats.reproduction_file`,
-shown by `analysis.reports.reproduction_report`.
+counts as reproduced.
 """
 
 import json
@@ -147,4 +145,3 @@ def make_reproduction_schema() -> dict[str, Any]:
 
 
 _ADAPTER: TypeAdapter[Reproduction] = TypeAdapter(Reproduction)
-"""Converter between the document and plain values."""

@@ -3,7 +3,7 @@
 The paper reports that equalization removes the resonance near 11 Hz, reduces coupling peaks by up to a factor of ten,
 and keeps the response fairly flat near the edge of the workspace. Findings compare figures of our simulation with these
 statements; those on which the paper reports nothing compare nothing. `equalizer.tracking.feedforward.quality` defines
-flatness and coupling. Called by `write_reproduction`; `reproduce_equalized` measures the rows.
+flatness and coupling.
 """
 
 from dataclasses import dataclass

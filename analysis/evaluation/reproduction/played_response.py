@@ -1,10 +1,8 @@
 """Frequency response of a device from target to delivered acceleration, for the reproduction of the published figure 5.
 
 T(f) is the ratio of the spectra of one steady period, line by line; column i belongs to a target along axis i. T is the
-identity matrix for a perfect equalizer. Called by `study.evaluation.reproduction` (`reproduce_playback`,
-`reproduce_equalized`, `reproduce_baselines`), which measures T; `equalized_findings` compares it with the published
-one, and `played_responses` draws it.
-`equalizer.tracking.feedforward.quality` defines flatness, coupling and axis error.
+identity matrix for a perfect equalizer. `equalizer.tracking.feedforward.quality` defines flatness, coupling and axis
+error.
 """
 
 from collections.abc import Sequence
@@ -20,7 +18,6 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.quality import measure_quality
 
 SignalKind = Literal["sweep", "multisine"]
-"""Target signal: a logarithmic sweep or a multisine."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,11 +27,9 @@ class PlayedResponse:
     name: str
     """Name of the row in the document and figures."""
     device: str
-    """Name of the device model."""
     place_m: tuple[float, float, float]
     """Place of the handle in the workspace: x, y, z in m."""
     hand: bool
-    """Whether a simulated hand held the handle."""
     signal: SignalKind
     frequency_hz: FloatArray
     """(lines,): frequencies of the spectral lines."""

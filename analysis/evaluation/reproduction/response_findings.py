@@ -1,8 +1,7 @@
 """Findings on the published figures 4 and 1, from the simulated device's transfer functions; on 1 also from thresholds.
 
 Figure 4 shows the transfer functions from every force to every acceleration, figure 1 the frequency bands that follow
-from the onset of coupling and from the limit of direction perception. Frequencies are compared within `TOLERANCE`.
-Called by `study.evaluation.reproduction.write_reproduction`.
+from the onset of coupling and from the limit of direction perception.
 """
 
 from collections.abc import Sequence
@@ -38,7 +37,7 @@ def make_response_findings(
     response: FrequencyResponse, resonances: Sequence[Resonance], onset: CouplingOnset
 ) -> FigureFindings:
     """Make the findings on figure 4. response: transfer functions estimated from sweeps over the whole frequency range.
-    resonances, onset: found in these. Findings that no reliable line allows are left out."""
+    resonances, onset: found in these. Slope and lowest line are left out without enough reliable lines."""
     findings = (
         _find_low_resonance(resonances),
         _find_large_resonances(response, resonances),

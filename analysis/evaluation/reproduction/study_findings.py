@@ -1,8 +1,7 @@
 """Findings on the published figure 2: thresholds of direction discrimination by frequency, from simulated participants.
 
 Group means are compared pairwise with simultaneous p-values (Tukey-Kramer, `PairDifference`). Thresholds are force
-amplitudes in N, and those that the cap cut are censored. The limit of direction perception follows `LIMIT_RULE`. Called
-by `study.evaluation.reproduction.write_reproduction`; `response_findings` quotes `LIMIT_RULE`.
+amplitudes in N, and those that the cap cut are censored. The limit of direction perception follows `LIMIT_RULE`.
 """
 
 from dataclasses import dataclass
@@ -15,10 +14,8 @@ from analysis.psychophysics.threshold_table import format_frequency
 from analysis.wording import format_signed
 
 SIGNIFICANT_P = 0.05
-"""Level of significance of the published analysis."""
 MAX_MEAN_DIFFERENCE = 0.25
-"""Largest difference of two means, as a share of the larger mean, that counts as "fairly similar". Chosen by
-hand."""
+"""Difference of two means, as a share of the larger mean, below which they count as "fairly similar". Chosen."""
 
 LIMIT_RULE = (
     "the lowest tested frequency at which the group mean lies significantly above that of the lowest frequency and at "
@@ -35,7 +32,6 @@ _DIFFERENCES = (
     "As in the paper, thresholds that the cap cut off enter means as plain numbers, and means near the cap are too "
     "low.",
 )
-"""Differences from the publication, for the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +77,7 @@ def find_direction_limit(analysis: StudyAnalysis) -> float | None:
 
 
 def make_study_findings(analysis: StudyAnalysis) -> FigureFindings:
-    """Make the findings on the published figure 2: means, differences and censoring of the thresholds over
-    frequency."""
+    """Make the findings on means, differences and censoring of the thresholds over frequency."""
     summary = _ThresholdSummary(analysis)
     tested_hz = analysis.table.frequencies_hz
     findings = [

@@ -2,7 +2,7 @@
 
 Left: an excerpt of a channel, measured and predicted, with the residuals; it is the excerpt in which two predictions
 differ most, in units of the noise (`find_excerpt`). Right: rms error of each channel over all held-out samples, divided
-by the rms of its noise. Called by `diagnosis_pictures`.
+by the rms of its noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,6 @@ constants of this module."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
 """Bounds of the excerpt's length (s)."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
-"""Matplotlib marker, by stage."""
 _CANDIDATES_PER_STRETCH = 60
 """Number of candidate excerpts per held-out stretch, evenly spaced."""
 _OFFSET_WEIGHT = 0.01

@@ -1,7 +1,6 @@
 """Figure of the mismatch map: residual by channel and octave, per input and level, for each stage of the model.
 
-Stages are those of `stage_style`: given, re-tuned, and completed with the named effects. Called by
-`diagnosis_pictures`.
+Stages are those of `stage_style`: given, re-tuned, and completed with the named effects.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 _LEAST_COLOUR_LIMIT = 300.0
 """Smallest upper end of the colour scale, in units of the noise. Chosen by eye, as all sizes of this figure."""
 _WHITE_TEXT_FROM = 0.62
-"""Share of the logarithmic colour scale from which numbers are white."""
+"""Share of the logarithmic colour scale above which numbers are white."""
 _LETTER_WIDTH_IN = 0.075
 """Width reserved per letter of the labels beside the map, inches."""
 _ROW_HEIGHT_IN, _PANEL_GAP_IN = 0.25, 0.2
@@ -37,7 +36,6 @@ neighbours do not touch."""
 _UNIT_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 """Corners of a panel, relative to its size."""
 _WIDTH_IN = 8.8
-"""Width of the figure, inches."""
 _POINTS_PER_CELL, _GAP_CELLS = 4, 0.25
 """Points of the drawn table per cell, along each side; gap between panels in cells, a whole number of points."""
 _MOST_NUMBERED_COLUMNS = 10

@@ -1,7 +1,7 @@
 """Figures of the rival explanations in each round of the search, with the error that each of them leaves.
 
 Errors are geometric means, over the channels, of the rms error over the rms noise (1 = noise alone), on the samples
-that decided the choice and, where computed, on held-out samples. Called by `diagnosis_pictures`.
+that decided the choice and, where computed, on held-out samples.
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) ->
 
 
 def make_rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
-    """Make a picture per round in which several explanations were tried, for at most five rounds; folded where none of
+    """Make a picture per round in which several explanations were tried, of the first five rounds; folded where none of
     them was added."""
     retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
@@ -176,6 +176,6 @@ def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
 
 
 def _compute_geometric_mean(errors: FloatArray) -> float:
-    """Compute the geometric mean of errors (c,); errors below 1e-6 count as 1e-6, so that the logarithm of 0 is finite;
-    NaN gives NaN."""
+    """Compute the geometric mean; errors below 1e-6 count as 1e-6, so that the logarithm of 0 is finite; NaN gives
+    NaN."""
     return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-6)))))

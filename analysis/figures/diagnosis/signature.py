@@ -2,7 +2,7 @@
 
 A signature is the residual of the model without the effect (or the missing force) against the variable that the effect
 depends on, such as friction against velocity: means per bin (of some effects running rms or amplitude densities) with
-two standard errors. Called by `diagnosis_pictures`.
+two standard errors.
 """
 
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 _BANDWIDTH_NOTE = " Noise limits the bandwidth of the missing force, so corners look rounder than they are."
-"""Sentence of the caption where the ordinate is an estimated missing force, whose bandwidth the noise limits."""
+"""Sentence of the caption where the ordinate is an estimated missing force."""
 
 _EXTRAPOLATION_NOTE = " Shaded: outside the recorded range, where the formula is not tested."
-"""Sentence of the caption where the law is drawn beyond the recorded range, as an extrapolation."""
+"""Sentence of the caption where the recorded range is known."""
 
 
 def make_signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
@@ -51,7 +51,7 @@ def make_signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, .
 
 def draw_signature(signature: Signature) -> Figure:
     """Draw one signature: dots with bars of two standard errors, and the fitted law as a line. Spectra have logarithmic
-    axes; the range that was not recorded is shaded. Without a bin, the figure holds a note instead."""
+    axes; elsewhere the range that was not recorded is shaded. Without a bin, the figure holds a note instead."""
     figure = create_figure(8.8, 4.0)
     if not len(signature.measured_abscissa):
         return draw_no_data_note(figure, "Too few samples show this effect to draw it.")

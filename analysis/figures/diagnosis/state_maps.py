@@ -1,8 +1,7 @@
 """Figures of the missing force over the states of motion, and of its hysteresis loops.
 
 The missing force (`result.curves.state_maps`) does not depend on which effects are named. It is drawn as single samples
-and as means per bin over four state variables; the loops show the force over about one period of the motion. Called by
-`diagnosis_pictures`.
+and as means per bin over four state variables; the loops show the force over about one period of the motion.
 """
 
 from collections.abc import Sequence
@@ -25,8 +24,8 @@ _VISIBLE_SHARE = 0.998
 
 
 def make_state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
-    """Make two pictures of the first axis, of its states and its loops; empty without maps. The caption only states the
-    share of missing force of the other axes."""
+    """Make two pictures of the first axis, of its states and its loops; empty without maps. Of the other axes, only the
+    share of missing force is stated, in the caption."""
     if not maps:
         return ()
     first = maps[0]

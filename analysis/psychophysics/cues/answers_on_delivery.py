@@ -1,16 +1,16 @@
 """Logistic regression of the answers on the delivered stimulus within a direction: did answers depend on a cue?
 
 A residual is a trial's cue value minus the value fitted for that participant, direction and level, so the direction
-itself explains none of it. A participant who judges by intensity answers "first" more often at positive residuals,
-whichever direction was played. For a participant who judges by direction, more intensity makes both directions clearer,
-which is the separate term c.
+itself explains none of it. A participant who judges by intensity answers "first" more often (or less often) at positive
+residuals, whichever direction was played. For a participant who judges by direction, more intensity makes both
+directions clearer, which is the separate term c.
 
     logit P(answer first) = person + side (a + b level + c residual) + g residual
 
 side is +1 or -1 for the direction shown. For spectrum and coupling, the residual of the intensity is added with the
 same two terms, as both vary with a roved level. The level is in dB from the mean of the participant's levels; g is the
 effect of the cue, in logits per dB. The staircase makes levels depend on earlier answers, but not the residual of a
-trial. Called by `cue_findings`; `cue_section` prints `CUE_ONLY_SLOPE`.
+trial.
 
 Source: the regression of answers on trial-by-trial stimuli, A. J. Ahumada, J. Lovell, J. Acoust. Soc. Am. 49 (1971),
 1751-1756.
@@ -50,8 +50,8 @@ class AnswerRegression:
     residual_sd_db: float
     """Standard deviation of the residuals; 0 without trials."""
     slope: float | None
-    """g, in logits per dB: positive where more of the cue goes with answers of the first direction. None where the
-    delivery did not vary within a direction, or the answers do not determine it."""
+    """g, in logits per dB: positive where more of the cue goes with answers of the first direction. None without
+    trials, where the delivery did not vary within a direction, or where the answers do not determine it."""
     lower: float | None
     upper: float | None
     """Limits of the 95 % Wald interval of the slope, logits per dB."""

@@ -2,8 +2,7 @@
 
 Two kinds of evidence: the d' that the cue alone would give a participant with a stated internal noise
 (`cue_sensitivity`), and whether the answers depended on the cue among trials of the same direction
-(`answers_on_delivery`), with Holm's correction over all cues and frequencies. Called by
-`analysis.psychophysics.study_analysis`; `analysis.reports.cue_section` shows the findings.
+(`answers_on_delivery`), with Holm's correction over all cues and frequencies.
 """
 
 from collections.abc import Iterable, Sequence

@@ -9,8 +9,7 @@ At d' = 1 the difference is one just noticeable difference (JND) of that partici
 Phi(1/2) = 69 % of the answers right.
 
 With friction, the delivered stimulus depends on the level in a way that a participant can learn. Difference and spread
-are therefore those at the same level: a parabola of the level (dB) is fitted with them. Called by `cue_findings`;
-`answers_on_delivery` calls `fit_same_level_difference` for its residuals.
+are therefore those at the same level: a parabola of the level (dB) is fitted with them.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapter 1.
 """
@@ -50,7 +49,7 @@ class CueSensitivity:
     upper_db: float
     """95 % confidence interval of the difference, from the residuals of the trials."""
     spread_db: float
-    """Standard deviation over trials of one direction at the same level (root mean square residual of the fit)."""
+    """Standard deviation over trials of one direction at the same level (residual standard deviation of the fit)."""
 
     def compute_d_prime(self, noise_db: float) -> float:
         """Compute d' of a participant with this internal noise (dB, > 0) who uses this cue alone."""

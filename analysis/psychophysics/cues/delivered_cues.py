@@ -6,8 +6,7 @@ the level of the staircase L in N:
     intensity 20 log10(a / L)      spectrum 20 log10(1 + h / a)      coupling 20 log10(1 + c / a)
 
 Spectrum and coupling are the contributions of h and c to the amplitude if they were in phase with it, an upper bound.
-In dB all three can be compared with the same internal noise of a participant. Called by `cues.cue_findings`,
-`study_analysis` (gaps) and `power.felt_delivery`; the other modules of `cues` use the data classes.
+In dB all three can be compared with the same internal noise of a participant.
 """
 
 import math
@@ -62,7 +61,6 @@ class CueGap:
     frequency_hz: float
     cue: Cue
     missing: int
-    """Number of trials without a measurement of the cue."""
     trials: int
     """Number of trials with a measured acceleration."""
 

@@ -7,8 +7,7 @@ cluster-robust (sandwich) with the factor n / (n - 1), so that they stay valid w
 of curves does not fit.
 
 Source: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986), 13-22; G. Kauermann, R. J. Carroll, J. Am. Stat. Assoc. 96
-(2001), 1387-1396 (few clusters, t with n - 1 degrees of freedom). Called by `primary`; `power.power_curve` calls
-`compute_pseudo_thresholds`.
+(2001), 1387-1396 (few clusters, t with n - 1 degrees of freedom).
 """
 
 import math
@@ -40,7 +39,6 @@ class MedianThreshold:
 
     frequency_hz: float
     db: float
-    """Estimate."""
     lower_db: float | None
     """Lower bound; None: the answers do not contradict a median `LONGEST_SEARCH_DB` below the estimate, or too few
     people have enough answers (two or fewer for a median up to the cap, one or none for a median above it)."""
@@ -48,7 +46,6 @@ class MedianThreshold:
     """Upper bound; None where the median is above the cap: lower_db is then a one-sided bound, and the estimate itself
     is an extrapolation. Also None where two people or fewer have enough answers."""
     above_cap: bool
-    """Whether the estimate is above the cap."""
 
     @property
     def newton(self) -> float:

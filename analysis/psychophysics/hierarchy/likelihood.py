@@ -4,8 +4,7 @@ Per cell of answers at one level and direction:
     P(right) = lapse + (1 - 2 lapse) Phi(q(t) - side c),      t = t0 + exp(b) ln(10)/20 (level - theta).
 A person has the latent parameters z = (theta_1 ... theta_k, b, c): a threshold per frequency in dB, the logarithm of
 the slope, and the criterion in units of d'. side is +1 for direction 1 and -1 for direction 2; q and t0 are those of
-`curve`. Answers are binomial. Derivatives are exact, by the chain rule over t, b and c. Called by `marginal`; made by
-`objective`.
+`curve`. Answers are binomial. Derivatives are exact, by the chain rule over t, b and c.
 
 Names of derivatives: slope_per_db = -dt/dtheta = dt/dlevel, tau = t - t0 = dt/db, a = q(t) - side c (the evidence); q1,
 q2: dq/dt and its derivative; p1: dp/da. Of the log-likelihood l: u = dl/dp, u1 = du/dp, lt = dl/dt; ltt, ltb, ltc:
@@ -48,8 +47,7 @@ class Derivatives:
 
 
 class TrialLikelihood:
-    """Log-likelihood of a study's answers at given latent parameters. The indices of runs and persons are prepared
-    when it is made."""
+    """Log-likelihood of a study's answers at given latent parameters."""
 
     def __init__(self, answers: Answers, family: Family) -> None:
         self.answers, self.family = answers, family

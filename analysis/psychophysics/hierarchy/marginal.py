@@ -15,8 +15,7 @@ Adaptive levels need no correction: each level follows from the answers before i
 ignorable (D. B. Rubin, Biometrika 63 (1976), 581-592). Answers at the cap count as answers at that level, uncensored.
 
 Source: L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986), 82-86; the gradient by implicit differentiation of the
-mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709. Called by `objective`;
-`fit` and `quadrature_search` call `find_modes`.
+mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709.
 """
 
 import math
@@ -34,8 +33,8 @@ DECREMENT_TOLERANCE = 1e-11
 """Newton decrement (gradient times step) of the log posterior at which a mode is found; the gradient of the marginal
 likelihood then has some six correct digits."""
 LEAST_CURVATURE = 1e-5
-"""Least eigenvalue of the observed curvature (per dB²) that is used for a Newton step. A prior SD of 30 dB, with no
-answers, has a curvature of 1e-3, well above it."""
+"""Least eigenvalue of the observed curvature that is used for a Newton step. A prior SD of 30 dB, with no answers, has
+a curvature of 1e-3 per dB², well above it."""
 LONGEST_STEP_DB, LONGEST_STEP_SLOPE, LONGEST_STEP_CRITERION = 6.0, 0.7, 1.0
 """Largest Newton step in a threshold (dB), a log-slope and a criterion (units of d'): over larger steps the log
 posterior is not quadratic."""

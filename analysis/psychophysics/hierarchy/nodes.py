@@ -3,11 +3,11 @@
 Given the parameters that a person shares over all frequencies (deviation u, log-slope b, criterion c), the thresholds
 at single frequencies are independent. The quadrature is therefore nested: outer nodes over u, b and c, and at each of
 them inner nodes over the threshold at every frequency. Nodes are centred and scaled for each person by the posterior
-moments, first from Laplace's method, then from the last evaluation; inner nodes are centred by the regression of the
+moments, first from Laplace's method, then from an earlier evaluation; inner nodes are centred by the regression of the
 thresholds on u, b and c.
 
 Source: J. C. Naylor, A. F. M. Smith, J. R. Stat. Soc. C 31 (1982), 214-225; S. Rabe-Hesketh, A. Skrondal, A. Pickles,
-J. Econometrics 128 (2005), 301-323 (nested). Called by `quadrature` and `quadrature_search`.
+J. Econometrics 128 (2005), 301-323 (nested).
 """
 
 import math
@@ -139,7 +139,7 @@ def compute_laplace_moments(parameters: FloatArray, mode: FloatArray, informatio
 
 def place_nodes(moments: Moments, counts: NodeCounts) -> Nodes:
     """Place nodes with log weights for each person: outer nodes for u, b and c, inner nodes for each threshold, both
-    scaled by the moments. counts: number of nodes by latent parameter."""
+    scaled by the moments."""
     cholesky = np.linalg.cholesky(moments.covariance)
     outer_standard_positions, outer_log_weights = _make_product_rule(counts)
     deviations = np.einsum("nab,qb->nqa", cholesky, outer_standard_positions)

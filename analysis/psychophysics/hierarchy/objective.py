@@ -2,8 +2,7 @@
 
 Objective: sum of the persons' log marginal likelihoods (`marginal`) plus the log density of a weak prior (`Prior`),
 which keeps standard deviations, lapse rate and means finite where the answers do not determine them. The maximum is
-found by L-BFGS-B with the exact gradient of Laplace's approximation; `quadrature_search` starts from it. Called by
-`fit`.
+found by L-BFGS-B with the exact gradient of Laplace's approximation; `quadrature_search` starts from it.
 """
 
 from dataclasses import dataclass

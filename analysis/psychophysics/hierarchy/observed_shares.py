@@ -1,8 +1,7 @@
 """Observed shares of right answers by level, and fitted curves, for figures of psychometric functions.
 
 Levels are binned; each bin has the share of right answers with Wilson's 95 % interval. The curve of a person is the
-probability of a right answer of `curve.compute_proportion_correct`, averaged over both directions. Called by
-`analysis.figures.psychometric`.
+probability of a right answer of `curve.compute_proportion_correct`, averaged over both directions.
 """
 
 from dataclasses import dataclass
@@ -55,9 +54,7 @@ class ObservedShare:
     level_db: float
     """Mean over the trials of the bin, re 1 N or re each person's threshold."""
     trials: int
-    """Number of trials in the bin."""
     right: int
-    """Number of right answers."""
     lower: float
     """Lower end of Wilson's 95 % interval of the share."""
     upper: float

@@ -1,6 +1,5 @@
 """Primary analysis of a study by the hierarchical psychometric model: from all answers to median thresholds, contrasts
-between frequencies, standard deviations between persons, and the direction limit. Called by `study_analysis`;
-`single_persons` uses the estimates of persons.
+between frequencies, standard deviations between persons, and the direction limit.
 
 The cap is the largest force that the staircase may play. n: persons, k: frequencies.
 """
@@ -46,7 +45,6 @@ class PersonEstimate:
     thresholds_n: tuple[float, ...]
     """At each frequency; above the cap, only an extrapolation that the answers do not contradict."""
     above_cap: tuple[bool, ...]
-    """Whether the threshold at each frequency is above the cap."""
     slope: float
     """Slope of the psychometric function, in the units of `curve`."""
     criterion: float
@@ -58,7 +56,6 @@ class PrimaryAnalysis:
     """Estimates of the hierarchical psychometric model."""
 
     family: Family
-    """Family of the psychometric functions."""
     trials: int
     """Number of answers of all persons."""
     frequencies_hz: tuple[float, ...]
@@ -66,13 +63,11 @@ class PrimaryAnalysis:
     confidence: float
     """Confidence level of all intervals, 0 to 1."""
     medians: tuple[MedianThreshold, ...]
-    """Median threshold at each frequency."""
     overall: RepeatedMeasures
     """Analysis of variance over the pseudo-thresholds in dB."""
     contrasts: tuple[Contrast, ...]
     """Each frequency against the lowest, where that can be tested."""
     limit: DirectionLimit
-    """Frequency at which the median threshold reaches the cap."""
     persons: tuple[PersonEstimate, ...]
     """Estimates of each person, in the order of `Answers.subjects`."""
     runs: tuple[RunLikelihood, ...]
@@ -112,8 +107,7 @@ def compute_primary_analysis(
     declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
     """Fit the hierarchical model to all answers; None with fewer than two persons or two frequencies with answers.
-    cap_n: cap, N. confidence: of all intervals. declared_hz: two frequencies of the declared
-    contrast, first minus second, or empty."""
+    cap_n: cap, N. declared_hz: two frequencies of the declared contrast, first minus second, or empty."""
     if answers is None or answers.persons < 2:
         return None
     requested_hz, answers = answers.frequencies_hz, drop_unanswered_frequencies(answers)

@@ -2,7 +2,7 @@
 
 Laplace's method (`marginal`) puts medians some 0.13 dB too low (docs/statistics.md), because the likelihood of a
 threshold is skewed: its integral is not that of the normal density with the expected information. The nodes are those
-of `nodes`. Called by `quadrature_search`.
+of `nodes`.
 
 With L the log density of a person's answers and latent parameters z, and E over the posterior distribution of z:
     gradient = E[dL]  (Fisher's identity),      Hessian = E[d²L] + Cov[dL]  (Louis' identity),

@@ -1,9 +1,8 @@
 """Maximum of the penalized marginal likelihood by quadrature, from the maximum by Laplace's method.
 
 Newton's method with the Hessian of `quadrature`: first with coarse nodes, then with fine ones. Nodes are placed anew
-after each step by the posterior moments of the last evaluation; a search that does not converge is continued with nodes
-at fixed positions. The same search, with a parameter fixed, gives profile likelihoods for `inference`; `fit` calls it
-for the maximum."""
+after each step by the posterior moments of the last evaluation; a search with fine nodes that does not converge is
+continued with nodes at fixed positions. With a parameter fixed, coarse nodes give profile likelihoods."""
 
 from dataclasses import dataclass, replace
 
@@ -88,9 +87,8 @@ class QuadratureSearch:
         )
 
     def find_lowest_cost(self, parameters: FloatArray, fixed_index: int | None = None) -> float:
-        """Find the lowest cost near these parameters (size,) by coarse nodes, where that search does not converge again
-        from the maximum by Laplace's method. fixed_index: index of a parameter that keeps its value (profile
-        likelihood)."""
+        """Find the lowest cost near these parameters (size,) by coarse nodes; where that search does not converge,
+        again from the maximum by Laplace's method. fixed_index: index of a parameter that keeps its value."""
         minimum = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS, fixed_index)
         if not minimum.converged:
             laplace_parameters = maximise(self.objective, parameters, fixed_index).x
@@ -126,8 +124,8 @@ class QuadratureSearch:
                     break
                 step_fraction /= 4.0
             else:
-                # No step lowers the cost, because the nodes do not fit the posterior yet: place them anew, by the
-                # moments of the last evaluation, without a step.
+                # No step was accepted, because the nodes do not fit the posterior yet: place them anew, by the moments
+                # of the last accepted evaluation, without a step.
                 next_evaluation = self._evaluate(current.parameters, current.moments, counts)
             current = replace(next_evaluation, moments=current.moments) if counts is FIXED_COUNTS else next_evaluation
         return replace(current, converged=False)

@@ -2,8 +2,8 @@
 
 The answers of all runs of a participant at a frequency are pooled; most have one run there. Some 60 trials do not
 determine a slope. The likelihood of the threshold is therefore averaged over a distribution of slope, criterion and
-lapse rate (`Nuisance`), from the model of all answers or from usual values. The threshold has no prior: estimate and
-interval rest on these answers alone, without shrinkage. Called by `primary` and `single_persons`.
+lapse rate (`Nuisance`), from the model of all answers or from usual values. The threshold has no prior: it is not
+shrunk towards other thresholds.
 
 After right answers only, the likelihood rises towards low thresholds without a maximum: there is no estimate, only an
 upper bound. Where the estimate is above the cap there is only a lower bound. Each bound is that end of the two-sided
@@ -59,8 +59,8 @@ class Nuisance:
 
 @dataclass(frozen=True, slots=True)
 class RunLikelihood:
-    """Threshold of a participant at a frequency by the answers there alone, in dB re 1 N. The interval holds all
-    thresholds whose log-likelihood is within half the chi-squared quantile (1 degree of freedom) of the maximum."""
+    """Threshold of a participant at a frequency by the answers there, in dB re 1 N. The interval: from the lowest to
+    the highest threshold whose log-likelihood is within half the chi-squared quantile (1 df) of the maximum."""
 
     subject: str
     frequency_hz: float

@@ -1,7 +1,7 @@
 """Compare adaptive procedures (staircases, Psi) by the error of their threshold estimates, on simulated people.
 
 Each person takes one run under every rule, with the same random numbers (trial 7 has the same draw under every rule),
-so that differences between rules are paired. Called by `study.cli.power` (the command `hapteq power`).
+so that differences between rules are paired.
 
 Efficiency is measured by the sweat factor (M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787),
 variance of the estimate times number of trials. `RuleResult.error_per_trial_db` is its square root, with the mean
@@ -42,7 +42,6 @@ class RuleResult:
     """Error, bias and length of the runs of all simulated people under one rule."""
 
     rule: str
-    """Name of the rule."""
     runs: int
     """Number of runs that ended with a threshold. Errors are over these; NaN without such runs."""
     trials: float

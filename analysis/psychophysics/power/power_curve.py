@@ -4,8 +4,6 @@ Each simulated study is tested at one pair of frequencies at the 5 % level by th
 (t test over pseudo-thresholds), means of runs in dB (paired t test), and the published procedure (Tukey's test in
 newtons: |difference| > q sqrt(MS_within / n)). Power is the share of studies that find the difference; without a true
 difference this share is the type-1 error.
-Called by `study.workflows.planning.simulate_power`; `study.cli.power` and `analysis.figures.power_curves` use its
-results.
 """
 
 import math
@@ -34,7 +32,6 @@ class StudyVerdict:
     level."""
 
     people: int
-    """Number of participants."""
     trials: int
     """Number of trials of all people together."""
     primary_found: bool
@@ -69,11 +66,8 @@ class PowerPoint:
     analysis, means of runs, and the published procedure."""
 
     people: int
-    """Number of participants of each study."""
     studies: int
-    """Number of simulated studies."""
     trials_per_person: float
-    """Mean number of trials of a participant."""
     primary: Share
     means: Share
     published: Share

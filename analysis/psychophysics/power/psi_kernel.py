@@ -55,7 +55,6 @@ class PackedPsi(NamedTuple):
     negative_entropy: FloatArray
     """(1 + levels, cells): sum over a of s_ia log s_ia of the module's equation, nats."""
     trial_limit: int
-    """Largest number of trials of a run."""
     stop_sd_db: float
     """A run ends when the standard deviation of the threshold's posterior is at most this, dB."""
 

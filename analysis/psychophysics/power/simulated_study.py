@@ -2,8 +2,7 @@
 
 True thresholds are normal in dB: median of the frequency + deviation of the person + deviation of person x frequency,
 the model that `hierarchy.marginal` fits. Slopes are log-normal, criteria normal. The result has the form that the
-analyses take: counted answers, and the threshold of each run. Called by `power_curve`; `compare_rules`,
-`study.cli.power` and `study.workflows.planning.simulate_power` use `Crowd`.
+analyses take: counted answers, and the threshold of each run.
 """
 
 import math
@@ -82,12 +81,11 @@ class SimulatedStudy:
     """Answers, thresholds of runs, and true thresholds of a simulated study."""
 
     answers: Answers
-    """Counted answers of all runs."""
     threshold_n: FloatArray
     """(people, frequencies): arithmetic mean of the averaged reversal levels, N; NaN for a run without all reversals.
     For Psi: posterior mean, at most the cap."""
     threshold_db: FloatArray
-    """(people, frequencies): mean of the same levels in dB."""
+    """(people, frequencies): mean of the same levels in dB; for Psi, the same posterior mean."""
     cap_reversals: FloatArray
     """(people, frequencies): number of averaged reversals at the cap; for Psi, 1 where the threshold is cut by the cap,
     else 0."""
@@ -107,8 +105,8 @@ class _RunThresholds:
 
 
 def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> SimulatedStudy:
-    """Draw people from the crowd and simulate all their runs under this rule. The same seed gives the same study on any
-    machine and in any order of simulations."""
+    """Draw people from the crowd and simulate all their runs under this rule. The same seed gives the same study, in
+    any order of simulations."""
     rng, k = np.random.default_rng(seed), len(crowd.frequencies_hz)
     true_db, participants = _draw_people(crowd, people, rng)
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)

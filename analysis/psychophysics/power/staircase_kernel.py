@@ -2,8 +2,7 @@
 
 Order: `pack_rule` converts the rule to numbers, `simulate_staircase` plays trials; in each, `simulate_answer` draws an
 answer from the psychometric function. The rule is that of `protocols.procedure.staircase.step`; tests check that both
-give identical runs. Levels are in dB re 1 N. Called by `simulated_study`, parts also by `psi_kernel` and
-`compare_rules`.
+give identical runs. Levels are in dB re 1 N.
 """
 
 import math
@@ -30,11 +29,8 @@ class PackedRule(NamedTuple):
     """A `StaircaseRule` as numbers for compiled code; levels in dB re 1 N."""
 
     start_db: float
-    """Level of the first trial."""
     cap_db: float
-    """Largest level."""
     cap_n: float
-    """Largest level, N."""
     up_after_wrong: int
     """Number of successive wrong answers after which the level rises."""
     down_after_right: int
@@ -200,9 +196,7 @@ class SimulatedRun(NamedTuple):
     """Result of a simulated run."""
 
     trials: int
-    """Number of trials."""
     reversals: int
-    """Number of reversals."""
     mean_db: float = math.nan
     """Posterior mean of the threshold (dB re 1 N); NaN unless the Psi method chooses the levels."""
     above_cap: float = math.nan

@@ -2,8 +2,7 @@
 
 A port is a direction in the structure's coordinates along which a force acts and motion is output: each driven axis,
 and each joint that an effect adds. Sizes: n samples (n coordinates in `ports` and states), m commands, r ports, p
-responses. Called by `simulator`, `forces_along_motion`, `analysis.diagnosis`, and the effects that simulate an excerpt
-for their starting values.
+responses. Begin with `build_bodies` and `simulate_bodies`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -244,8 +243,7 @@ def _assemble_output_matrix(
 def pack_kernel_forces(bodies: Bodies, port_ids: tuple[int, ...]) -> Forces:
     """Pack the forces in the form of the compiled kernel: each distinct law once, and for every force the indices of
     its law and port and the ranges of its parameters and memory. port_ids: indices in `Bodies.ports`, among which the
-    kernel counts the ports. Raises ValueError for more than `MAX_LAWS` distinct
-    laws."""
+    kernel counts the ports. Raises ValueError for more than `MAX_LAWS` distinct laws."""
     laws: list[object] = []
     force_indices: list[tuple[int, ...]] = []
     parameter_count = memory_count = 0

@@ -2,9 +2,8 @@
 
 Two values are computed per integration step: the mean over the step, which determines the motion (masses integrate the
 force), and the value at the step's end, which an acceleration sampled there contains directly. First-order lag T and
-step h: F_end = d F_start + (1 - d) u, with d = exp(-h / T); mean = u + (F_start - u) (1 - d) T / h. Called by
-`simulator` and `forces_along_motion`; lag and delay also by the effects `amplifier_lag` and `transport_delay`. Sizes: n
-samples, m commands.
+step h: F_end = d F_start + (1 - d) u, with d = exp(-h / T); mean = u + (F_start - u) (1 - d) T / h. Sizes: n samples, m
+commands.
 """
 
 from collections.abc import Sequence

@@ -87,8 +87,7 @@ def compute_friction_force(
     forward_level: float, backward_level: float, start_z: float, memory: FloatArray, step_motion: FloatArray
 ) -> float:
     """Compute the mean friction force (N) over a step, with the level (N) `forward_level` where v > 0 and
-    `backward_level` where v < 0; called by the laws of Coulomb, Stribeck, asymmetric and position-dependent friction
-    and of the loose joint.
+    `backward_level` where v < 0.
 
     start_z: deflection over z_max at the start of the step; step_motion: see `instant`. Writes the deflection at the
     end, over z_max, to `memory[0]` and the force (N) at the end to `step_motion[F_END]`; where neither level is above
@@ -140,8 +139,8 @@ _READ_ONLY_VECTOR = types.Array(types.float64, 1, "A", readonly=True)
 @njit(types.float64[::1](_READ_ONLY_VECTOR, types.float64), cache=True)
 def compute_bristle_deflection(position: FloatArray, slip_deflection: float) -> FloatArray:
     """Compute the deflection (n,) of a bristle, relative to `slip_deflection`, at which it slips, by Dahl's equation
-    dz/dx = 1 - sgn(v) z along a position (n,) in the unit of `slip_deflection`, from 0 at the first sample. Called by
-    `presliding_hysteresis` and `analysis.diagnosis` for regressions on a measured position, not in a simulation."""
+    dz/dx = 1 - sgn(v) z along a position (n,) in the unit of `slip_deflection`, from 0 at the first sample. For
+    regressions on a measured position, not for a simulation."""
     deflection = np.zeros(position.shape[0])
     for k in range(1, position.shape[0]):
         travel = (position[k] - position[k - 1]) / slip_deflection

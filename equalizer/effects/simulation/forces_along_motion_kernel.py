@@ -84,11 +84,10 @@ def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays
     """Overwrite force (n, m) by the sum of the laws' forces over the step that begins at each sample.
 
     force, on entry: unbalanced force over each step (see `forces_along_motion.compute_effect_forces_along_motion`),
-    from which friction at rest follows, because it does not follow from the motion. motion: positions, velocities and
-    accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law reads them. per_newton: (3, m), position,
-    velocity and acceleration that 1 N over a step adds. places: (placed laws, 6), index of law and of axis, begin and
-    end (exclusive) in `parameters`, then in `memory`. step_s: step in s. The last row of force repeats the row before
-    it."""
+    from which friction at rest follows, because it does not follow from the motion. commands: (n, m), or (0, 0) where
+    no law reads them. per_newton: (3, m), position, velocity and acceleration that 1 N over a step adds. places:
+    (placed laws, 6), index of law and of axis, begin and end (exclusive) in `parameters`, then in `memory`. The last
+    row of force repeats the row before it."""
     position, velocity, acceleration = motion
     reads_all_axes = commands.shape[0] > 0
     step_motion = np.zeros(LENGTH + BLOCK_SIZE * force.shape[1] if reads_all_axes else LENGTH)

@@ -3,7 +3,7 @@
 The force F that is held over the step solves F = (1 - w) F_start + w F_end(F), because the motion at the step's end
 depends on F. The weight w is 1/2 (trapezoidal rule) for a force that hardly depends on the motion, and grows with the
 steepness of that dependence up to 1 (backward Euler), where the mean would oscillate (dry friction, stops): the motion
-can then stick. A law that reads an acceleration has w = 1. `discovered_law` binds laws to this kernel.
+can then stick. A law that reads an acceleration has w = 1.
 """
 
 from numba import njit

@@ -1,4 +1,4 @@
-"""Compiled time stepping of a linear structure under commands and motion-dependent forces; called by `stepping`.
+"""Compiled time stepping of a linear structure under commands and motion-dependent forces: `step_mechanism`.
 
 The linear part is exact (matrix exponential). A motion-dependent force is held over a step and solved for implicitly by
 its law, from the motion at the step's end; several forces by Gauss-Seidel sweeps. A law reads its parameters, memory
@@ -211,7 +211,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     forces: FloatArray, step_motion: FloatArray, start_memory: FloatArray,
 ) -> None:  # fmt: skip
     """Solve for several forces in turn (Gauss-Seidel), starting from linear extrapolation over the last two steps. A
-    force is solved again only if another has changed. Arguments: see `step_mechanism`."""
+    force is solved again if another changes by more than the tolerance. Arguments: see `step_mechanism`."""
     for i in range(memory.shape[0]):
         start_memory[i] = memory[i]
     for row in range(table.shape[0]):

@@ -1,9 +1,8 @@
-"""Simulates a mechanical model with its effects under commands: actuator, mechanism and hand, sensor, in this order.
+"""Simulation of a mechanical model with effects under commands: actuator, mechanism and hand, sensor, in this order.
 
 Main function: `simulate_mechanism`. Variants: `simulate_response` without the motion of the axes, faster;
 `simulate_windows` with restarts from given states, for multiple shooting; `simulate_states_before` for these states.
-Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants. Called by
-`analysis.diagnosis`: first model, output errors, evidence, signature curves, next experiment."""
+Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """A measured response on which random effects, such as lost samples, are conditioned."""
+    """A measured response on which effects such as lost samples are conditioned."""
 
     response: FloatArray
     """(n, p): as measured."""
@@ -64,8 +63,8 @@ def simulate_mechanism(
     measurement: Measurement | None = None,
 ) -> SimulationResult:
     """Simulate response and motion from rest. commands: (n, m), SI. Only `effects` are simulated, not `model.effects`,
-    which `equalizer.effects.placing` converts. measurement: random effects are conditioned on it; without one they are
-    drawn at random.
+    which `equalizer.effects.placing` converts. measurement: effects such as lost samples are conditioned on it; without
+    one they are drawn at random.
 
     Raises ValueError where an effect acts on an axis that is not there, for too many different force laws, and for a
     discovered law that does not fit the model or lacks conditions.
@@ -180,8 +179,7 @@ def _apply_sensor(
     measurement: Measurement | None,
 ) -> SimulationResult:
     """Apply the sensor: low pass of each channel, effects in the order of their stages, limits of the range. Positions
-    change only by effects with `on_position` (clock drift) or, under a measurement, `conditioned_position` (lost
-    samples)."""
+    change only by effects with `on_position` or, under a measurement of the position, `conditioned_position`."""
     response_effects = [
         (placed.effect.action, placed) for placed in effects if isinstance(placed.effect.action, OnResponse)
     ]

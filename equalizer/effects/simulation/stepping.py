@@ -4,14 +4,13 @@ Theory of operation. The structure M a + C v + K x = B u + F has the exact step 
 
     s(t + h) = A s(t) + B_u u + B_F F,    A = exp(h [[0, I], [-M^-1 K, -M^-1 C]])
 
-s = (x, v) is the state, u the command, F the forces at the ports, h the step. `modal_form` puts A into 2 x 2 blocks, so
-that a step costs O(n) instead of O(n²). Without motion-dependent forces a whole sample is one step. With them F depends
-on the state within the step: each force law is evaluated at the position, velocity and acceleration of its port,
-corrected for its own effect (`per_newton`), step by step in compiled code (`mechanism_kernel`). Many samples are
-stepped per call, because a call of compiled code costs as much as many steps.
+s = (x, v) is the state, u the command, F the forces at the ports, h the step. `modal_form` puts A into 2 x 2
+blocks where that is accurate; a step then costs O(n) instead of O(n²). Without motion-dependent forces a whole sample
+is one step. With them F depends on the state within the step: each force law is evaluated at the position, velocity and
+acceleration of its port, corrected for its own effect (`per_newton`), step by step in compiled code
+(`mechanism_kernel`), many samples per call.
 
-Sizes: n coordinates, m commands, s states in modal form, r ports with forces, L samples. Called by
-`simulation.bodies`.
+Sizes: n coordinates, m commands, s states in modal form, r ports with forces, L samples.
 
 Reference: Van Loan, IEEE Trans. Autom. Control 23:395 (1978) (integrals of the matrix exponential).
 """
@@ -67,7 +66,7 @@ class Stepping:
     samples_per_block: int
     """Samples stepped per call."""
     run: Callable[[FloatArray, int], None]
-    """Advances the state by one block; the first block starts from rest, each later one where the previous one ended.
+    """Advances the state by one block, from rest, where the previous block ended, or as `set_state` sets it.
     Arguments: rows of the block (at most samples_per_block * rows_per_sample, s + r or more), and the index of its
     first sample. On entry a row holds the contributions of its step; on return, the first row of each sample holds the
     state and the forces just before the sample."""

@@ -9,7 +9,7 @@ The missing force is what must be added at the driven axes so that the re-tuned 
 z) the mass follows by weighted least squares from the missing force F and the acceleration a, together with corrections
 of the model's own mass, damping and stiffness, since F = dM a + dB a / (2j pi f) + dK a / (2j pi f)² may be mere
 mistuning. Trials are ranked by the share of the missing force that they explain beyond those corrections. The estimates
-only start a fit of the whole model. Called by the effects `extra_mode` and `body_on_actuator`.
+only start a fit of the whole model.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import estimate_cross_density, estimate_spectral_density
 
 WINDOW_S = 2.0
-"""Window of the spectra (s): lines 0.5 Hz apart. Chosen."""
+"""Window of the spectra (s), at most the recording: lines 0.5 Hz apart. Chosen."""
 LEAST_POWER_SHARE = 1e-4
 """Least power of a line that is used, relative to the largest line. Chosen."""
 CHANCE_SHARE = 0.02
@@ -70,8 +70,8 @@ class MissingForceSpectra:
 
 def estimate_missing_force_spectra(evidence: Evidence, axis: int) -> MissingForceSpectra:
     """Estimate the Welch spectra of the acceleration of an axis and of the missing force at all axes, at the lines
-    below 0.45 (chosen) of the sample rate where the acceleration has more than `LEAST_POWER_SHARE` of its largest
-    power."""
+    between 0 and 0.45 (chosen) of the sample rate where the acceleration has more than `LEAST_POWER_SHARE` of its
+    largest power."""
     sample_rate_hz, is_used = evidence.sample_rate_hz, evidence.used[:, None]
     acceleration = np.gradient(evidence.axis_velocity, 1 / sample_rate_hz, axis=0) * is_used
     window_samples = min(int(WINDOW_S * sample_rate_hz), len(is_used))

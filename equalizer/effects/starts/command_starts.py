@@ -2,9 +2,7 @@
 
 An effect changes the command u to the force f(u, p). The parameter p is sought for which f(u, p) - u leaves the least
 of the missing force, in the sense of least squares; terms that a re-tuned linear model may have absorbed are projected
-out where the effect asks for it. Search: grid, then golden section on the logarithm of p. Called by the effects at the
-command: `amplifier_lag`, `transport_delay`, `force_deadband`, `force_saturation`, `force_nonlinearity`, `slew_limit`;
-`response_starts` uses `minimise_on_grid`.
+out where the effect asks for it. Search: grid, then golden section on the logarithm of p.
 """
 
 from collections.abc import Callable, Sequence

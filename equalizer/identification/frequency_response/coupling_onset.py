@@ -1,10 +1,9 @@
 """Coupling onset: the frequency from which driving one axis moves the others, by a stated rule, with its interval.
 
 Rule: the lowest frequency at which the worst coupling of the smoothed response, averaged over a twelfth of an octave,
-passes a quarter (-12 dB). A single line above it is noise; a resonance like the published one near 11 Hz, which couples
-over an eighth of an octave, must be found. The average is used rather than "stays above for n lines":
-noise interrupts a run of lines, which put the onset 0.1 to 0.3 Hz too high in trials. Called by
-`study.workflows.equalizer.report_identification` and by the reproduction of the paper.
+passes a quarter (-12 dB). A single line above it may be noise; a resonance like the published one near 11 Hz, which
+couples over an eighth of an octave, must be found. The average is used rather than "stays above for n lines": noise
+interrupts a run of lines, which put the onset 0.1 to 0.3 Hz too high in trials.
 """
 
 from dataclasses import dataclass
@@ -48,7 +47,7 @@ class OnsetRule:
 
 @dataclass(frozen=True, slots=True)
 class CouplingOnset:
-    """Coupling onset of a frequency response with its confidence interval; result of `find_coupling_onset`."""
+    """Coupling onset of a frequency response with its confidence interval."""
 
     frequency_hz: float | None
     """Onset; None: the averaged coupling does not exceed the threshold at any line above the noise."""
@@ -110,8 +109,8 @@ def find_coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = No
 def _mark_lines_above_noise(
     lines: FrequencyResponse, smoother: LocalPolynomial, smoothed_response: ComplexArray, rule: OnsetRule
 ) -> BoolArray:
-    """Mark the lines (lines,) at which the smoothed noise is below a quarter of the threshold; elsewhere noise alone
-    may pass it. Unknown noise counts as none."""
+    """Mark the lines (lines,) at which the smoothed noise, over the on-axis response, is below a quarter of the
+    threshold; elsewhere noise alone may pass it. Unknown noise counts as none."""
     noise_sd = np.sqrt(np.nan_to_num(smoother.propagate_variance(lines.noise_variance)))
     on_axis_gain = np.maximum(np.einsum("lii->li", np.abs(smoothed_response)), np.finfo(np.float64).tiny)
     is_above_noise: BoolArray = (np.linalg.norm(noise_sd, axis=1) / on_axis_gain).max(axis=1) < rule.threshold / 4

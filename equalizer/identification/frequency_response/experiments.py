@@ -1,9 +1,8 @@
 """Experiments in a recording: spectra of whole periods, or of windows where the excitation is not periodic.
 
-An experiment is an excitation that is repeated over one or more periods. Spectra are rfft / length without the lines at
-zero and at half the sample rate, so that white noise of variance s² has the expected power s² / length at each line;
-windows are scaled to a mean square of 1 for the same reason. Called by `transfer_estimate`, `noise_floor`,
-`shared_lines`, `identify_recordings`, the diagnosis and the comparison of devices (`analysis.device_change`).
+An experiment is an excitation that is repeated over one or more periods, or a window. Spectra are rfft / length without
+the lines at zero and at half the sample rate, so that white noise of variance s² has the expected power s² / length at
+each line; windows are scaled to a mean square of 1 for the same reason.
 """
 
 from collections.abc import Sequence
@@ -41,7 +40,7 @@ class Experiment:
 
     @property
     def periods(self) -> int:
-        """Number of periods, 1 for a single window; `effective_periods` is how many of them are independent."""
+        """Number of periods; 1 for a window."""
         return len(self.command)
 
     @property
@@ -71,8 +70,7 @@ class ExperimentSet:
 
 
 def select_instrument_signal(recording: Recording) -> FloatArray:
-    """Select the instrument (n, inputs) of the estimate, which is the excitation where it was recorded, else the
-    command."""
+    """Select the instrument (n, inputs) of the estimate: the excitation where it was recorded, else the command."""
     return (recording.command if recording.excitation is None else recording.excitation).samples
 
 

@@ -5,11 +5,10 @@ neighbouring lines by least squares, each weighted with 1 / its standard deviati
 response. As the fit is linear in the values, it is a weighted sum over the neighbours, with weights that depend on the
 lines and their noise only:  G_smooth(k) = sum over l of W(k, l) G(l).
 
-The bias stays below the noise while the neighbourhood is narrower than about the half width of a resonance.
+The bias stays small while the neighbourhood is narrower than about the half width of a resonance.
 
 The idea is that of the local polynomial method (Pintelon and Schoukens, System Identification, 2nd ed., 2012, chapter
-7), which fits input and output spectra with their transients; here the estimated response itself is fitted. Called by
-`identify_recordings` and `coupling_onset`.
+7), which fits input and output spectra with their transients; here the estimated response itself is fitted.
 """
 
 from dataclasses import dataclass, replace

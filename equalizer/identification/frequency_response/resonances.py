@@ -2,8 +2,7 @@
 
 Peaks are searched on averages over bins of equal width in octaves: of the largest singular value of the response matrix
 (gain), and of the Frobenius norm of its off-diagonal entries (coupling). A mode with one pole pair is then fitted to
-the lines around each peak (`single_mode`); its 95 % intervals are quantiles of refits with added noise. Called by the
-reports of identification and by the reproduction of the paper (`study.evaluation.reproduction`).
+the lines around each peak (`single_mode`); its 95 % intervals are quantiles of refits with added noise.
 """
 
 from dataclasses import dataclass, replace

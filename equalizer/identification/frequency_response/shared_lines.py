@@ -1,11 +1,10 @@
 """Instrumental-variable estimate of a frequency response at the spectral lines common to a set of experiments.
 
-Called by `transfer_estimate`, once for each set of experiments with equal lines. The result contains error variances.
-
 G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U (inputs, experiments) the total commands, Y
-(outputs, experiments) the responses, R (inputs, experiments) the excitations as instruments. Noise that a feedback adds
-to the command is uncorrelated with the instruments, so that it causes no bias. The noise variance follows from the
-residuals between periods, else between experiments, else from the scatter between lines (`noise_floor`).
+(outputs, experiments) the responses, R (inputs, experiments) the instruments, which are the excitations where these
+were recorded. Noise that a feedback adds to the command is uncorrelated with the excitations, so that it then causes no
+bias. The noise variance follows from the residuals between periods, else between experiments, else from the scatter
+between lines (`noise_floor`).
 """
 
 from collections.abc import Sequence
@@ -66,7 +65,7 @@ def solve_shared_lines(
 ) -> SharedLines:
     """Estimate the response at the given lines. experiments: all with exactly these lines. rest_density: (lines,
     outputs), by `estimate_rest_density`, a lower bound where the noise is estimated from the scatter of lines.
-    noise_lines: number of lines over which noise is averaged. Lines at which excitations or commands do not have full
+    noise_lines: number of lines over which noise is averaged. Lines at which instruments or commands do not have full
     rank are left out."""
     all_columns = _stack_columns(experiments)
     is_solvable = _has_full_rank(all_columns)
@@ -113,8 +112,7 @@ def _stack_columns(experiments: Sequence[Experiment]) -> _SpectraColumns:
 
 
 def _has_full_rank(columns: _SpectraColumns) -> BoolArray:
-    """Whether, at each line (lines,), the excitations R and the commands U both have full rank, which is the number of
-    inputs."""
+    """Whether, at each line (lines,), R and U both have full rank, which is the number of inputs."""
     input_count, experiment_count = columns.command.shape[1:]
     has_full_rank = np.full(len(columns.command), experiment_count >= input_count)
     if experiment_count >= input_count and len(has_full_rank):

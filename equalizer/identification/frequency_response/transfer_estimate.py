@@ -2,9 +2,8 @@
 
 An example is figure 4 of Wilson, Chan, Salisbury and Niemeyer, "Multi-DOF Equalization of Haptic Devices for Accurate
 Rendering at High Frequencies". Each line uses all experiments whose period contains it, weighted by their number of
-samples; experiments of different periods are combined at the lines that they share (`shared_lines`).
-`estimate_transfer` is the first step of the identification (`state_space.identify` fits a model to its result). Called
-by `identify_recordings`, `study.evaluation.reproduction.reproduce_paper` and `analysis.device_change`.
+samples; experiments of different periods are combined at the lines that they share (`shared_lines`). Begin with
+`estimate_transfer`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,7 +37,7 @@ class TransferEstimateError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class EstimateSettings:
-    """Settings of a transfer function estimate: rules for reliable lines, noise averaging, and window length."""
+    """Settings of a transfer function estimate."""
 
     rules: ReliabilityRules = field(default_factory=ReliabilityRules)
     noise_lines: int = 17
@@ -160,8 +159,8 @@ def _join_groups(
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
-    """Check the recordings: raises TransferEstimateError without any, and where sample rate, channels or units differ.
-    Rates are compared and stated with all digits, as `identify` compares them."""
+    """Check the recordings: raises TransferEstimateError without any, and where sample rate, channels or units
+    differ."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first_recording = recordings[0]

@@ -9,8 +9,7 @@ the data support. Steps of `fit_mechanical_model`:
    collocated with the commands, modes with free shapes at the sensors are tried (`modal_order`);
 4. the chosen structure is fitted to all lines, and simulated on the segments that were kept for the test.
 
-a, v and x are acceleration, velocity and position (n,) of the coordinates; command in N or N m. Called by
-`analysis.diagnosis.first_model`, `rigid_body` and `study.workflows.diagnosis.write_twin`; exported by `equalizer`.
+a, v and x are acceleration, velocity and position (n,) of the coordinates; command in N or N m.
 """
 
 from collections.abc import Callable, Sequence
@@ -57,7 +56,7 @@ collocated with the commands are considered. Chosen heuristically."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureChoice:
-    """The chosen structure, with sensors collocated with the commands or elsewhere; result of `choose_structure`."""
+    """The chosen structure, with sensors collocated with the commands or elsewhere."""
 
     best: RefinedFit[Structure] | RefinedFit[ModalStructure]
     candidates: tuple[OrderCandidate, ...]
@@ -135,9 +134,10 @@ def fit_mechanical_model(
 ) -> MechanicalFit:
     """Fit a model from the total command to the response.
 
-    Response i must be the motion at the point and in the direction of command i; further responses may be at any place.
-    on_progress: called with the share done, 0 to 1. name: of the model. Raises MechanicalFitError where the
-    recordings do not determine a model: unsuitable channels, too few driven lines, only noise, or an unstable fit.
+    Response i should be the motion at the point and in the direction of command i (else see
+    `MechanicalFitSettings.noncollocated_sensors`); further responses may be at any place. on_progress: called with the
+    share done, 0 to 1. Raises MechanicalFitError where the recordings do not determine a model: unsuitable channels,
+    too few driven lines, only noise, or an unstable fit. The exceptions of `refine_unknowns` escape too.
     """
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
@@ -206,7 +206,7 @@ def _fit_rigid_starts(
     settings: MechanicalFitSettings,
 ) -> list[RefinedFit[Structure]]:
     """Fit a rigid body at the driven axes up to the end of the first stage, once for each initial value: from growing
-    parts of that band, without and, with `settings.fit_delay`, with a delay."""
+    parts of that band that hold enough lines, without and, with `settings.fit_delay`, with a delay."""
     fits: list[RefinedFit[Structure]] = []
     stage_end_hz = compute_stage_ends(band_hz)[0]
     stage_groups = [

@@ -1,9 +1,8 @@
 """Spectra of commands and responses, segment by segment, with their noise: the data of a mechanical fit.
 
 A periodic segment gives the mean spectrum of its periods: noise, including noise that a feedback adds to the command,
-averages out, as with the excitation as an instrument. Any other segment gives the spectrum of its longest run without
-gaps; the transient from the states at its ends is fitted with the model. Spectra are rfft / length, in the signals'
-units. Called by `mechanical_fit`, `mechanical_misfit` and `analysis.diagnosis.first_model.choose_structure`.
+averages out. Any other segment gives the spectrum of its longest run without gaps; the transient from the states at its
+ends is fitted with the model. Spectra are rfft / length, in the signals' units.
 """
 
 from collections.abc import Iterator, Sequence
@@ -71,7 +70,8 @@ LEAST_EXCITED_AMPLITUDE = 1e-2
 MAX_TRANSIENT_LINES = 2000
 """Largest number of lines of a segment with a transient; of more, every second, third, ... line is used. Chosen."""
 _NOISE_SMOOTHING_LINES = 9
-"""Number of lines over which the noise power and, with a transient, the excitation power are averaged. Chosen."""
+"""Number of lines over which the noise power between periods and, with a transient, the excitation power are averaged.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

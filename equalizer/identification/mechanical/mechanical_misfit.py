@@ -2,8 +2,7 @@
 
 Residual of an output at a line:  r = w (Y - G U),  with  w = 1 / sqrt(noise variance + (floor |Y|)²),  so that E|r|² is
 about 1; for segments with a transient, less the best fit of the free response of the states at both ends. |Y|² is
-averaged over neighbouring lines. Called by `mechanical_fit`, `mechanical_refinement`, `physical_model` and the searches
-for modes.
+averaged over neighbouring lines.
 """
 
 from collections.abc import Callable, Sequence

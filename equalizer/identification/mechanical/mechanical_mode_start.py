@@ -3,7 +3,7 @@
 An oscillator with frequency w, damping ratio d and participation vector L adds, at the driven axes, the dynamic
 stiffness L L' s² (2 d w s + w²) / (s² + 2 d w s + w²). To first order the response changes in proportion to L L', so
 that for each w and d on the grid linear least squares gives the residual power that a further oscillator explains, with
-all present unknowns re-adjusted (their tangent space is projected out). Called by `mechanical_order`.
+all present unknowns re-adjusted (their tangent space is projected out).
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def estimate_mode_starts(
     groups: Sequence[LineGroup], current: RefinedFit[Structure], band_hz: tuple[float, float], max_starts: int = 2
 ) -> tuple[ModeStart, ...]:
     """Estimate starting values of a further oscillator, at the `max_starts` frequencies whose oscillators reduce the
-    residual most, best first; frequencies differ by more than 10 % (0.1 in the natural logarithm). band_hz: band of the
+    residual most, best first; frequencies differ by more than 0.1 in the natural logarithm. band_hz: band of the
     frequency responses; the grid extends beyond it by a factor of 1.5, because a mode outside also acts inside. Both
     factors are chosen."""
     thinned_groups = [_thin_group(group.exclude_held_out(), len(groups)) for group in groups]

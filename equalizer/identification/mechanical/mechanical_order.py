@@ -2,8 +2,7 @@
 
 Forward selection: from the driven axes alone, the first larger structure is adopted that lowers the squared error on
 held-out lines (every fourth line) enough, see `improves_enough`. Candidates are a further mode, sensors that measure
-the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are chosen. Called by
-`mechanical_fit`; `modal_order` uses `TARGET_REACHED`.
+the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are chosen.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +18,7 @@ from equalizer.identification.mechanical.mechanical_structure import Structure, 
 
 LEAST_GAIN = 0.08
 """Smallest relative fall of the cross-validated squared error for which a larger structure is adopted; it limits the
-order where no linear model fits the device. `modal_order.LEAST_GAIN` is the same for modes with free shapes."""
+order where no linear model fits the device."""
 GAIN_PER_UNKNOWN = 4.0
 """Smallest fall of the squared error per additional unknown, in units of the fall expected from noise alone."""
 TARGET_ERROR = 1.1
@@ -32,7 +31,7 @@ DELAY_RATIO = 4.0
 SIMPLER_RATIO = 1.02
 """Springs to the ground are omitted up to this ratio of the cross-validated squared errors without and with them."""
 JOINT_FREE_SHARE = 0.5
-"""Upper end of the band in which a model without the joint is fitted first, relative to that of the whole band."""
+"""Least upper end of the band in which a model without the joint is fitted first, relative to that of the band."""
 TARGET_REACHED = (
     "The residual on held-out lines is no larger than the noise, the variation between levels, and the share that no "
     "linear model is expected to explain."

@@ -11,9 +11,7 @@ matrices. With z = e^(s T), T the sample period, and E(t) the integral of e^(p t
 For the last two, a delay multiplies by e^(-s delay). `response[k]` is taken just before `command[k]` is written, as in
 `signals.recording`.
 
-Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6. Called by
-`mechanical_misfit`, `modal_search`, `mechanical_free_simulation`, `mechanical_refusals` and the computation of starting
-values.
+Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6.
 """
 
 from dataclasses import dataclass
@@ -87,7 +85,7 @@ def compute_free_response(
     """Compute the spectra (lines, p, states) of the free response to each state, per difference between the state's
     values at the segment's two ends. form: the model's, if known.
 
-    The spectrum of a segment is the response to its commands plus a real combination of these (transient, or leakage).
+    A segment's spectrum contains a real combination of these (transient, or leakage).
     """
     form = form or compute_pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)

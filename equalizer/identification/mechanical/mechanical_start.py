@@ -7,7 +7,7 @@ At each spectral line s = j w the command's force u and the motion x of the m dr
 which is linear in the entries of the symmetric matrices M (mass), D (damping) and K (stiffness). The sensor's low pass,
 the hold and the delay are removed from the measured motion first; of the trial delays, where the delay is to be
 estimated, that with the least residual is kept. The matrices are then made positive definite, as the nonlinear fit
-needs. Called by `mechanical_fit` and `mechanical_mode_start`.
+needs.
 """
 
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ def _build_regression(
     """Build regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
     imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed.
 
-    The error is taken as five times `floor` (chosen), plus noise: lines with little noise then do not dominate."""
+    The expected error includes five times `floor` (chosen): lines with little noise then do not dominate."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     # A held force shows in the acceleration one sample later, in velocity and position half a sample later.
     hold_delay = 1.0 if order == 2 else 0.5

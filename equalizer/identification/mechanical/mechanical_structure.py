@@ -3,8 +3,8 @@
 M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
 (root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses are a
 linear combination of the driven axes' motions (rows of `output`) and the oscillators' (sensor shapes). An elastic joint
-may connect the driven axes to the body that carries sensors and oscillators; see `insert_joint`. Called by
-`mechanical_fit` and its search for a structure. Bounds of the fit are chosen.
+may connect the driven axes to the body that carries sensors and oscillators; see `insert_joint`. Bounds of the fit are
+chosen.
 """
 
 from dataclasses import dataclass, field, replace

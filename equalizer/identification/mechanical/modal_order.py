@@ -1,8 +1,8 @@
 """Order selection of modes with free shapes, for sensors that are not collocated with the commands.
 
 Forward selection: a further mode is adopted while the squared error on held-out lines falls enough (`modal_search`
-finds it). Shapes (p, m) of full rank are then reduced to rank-one modes by singular value decomposition, and all
-unknowns are refined. Thresholds are chosen. Called by `mechanical_fit`.
+finds it). Shapes (p, m) are then split into rank-one modes by singular value decomposition, and all unknowns are
+refined. Thresholds are chosen.
 """
 
 from collections.abc import Callable, Sequence

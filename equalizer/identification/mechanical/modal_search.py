@@ -4,8 +4,7 @@
 
 in continuous time; responses are sampled exactly for the commands' hold. Frequencies w and damping ratios d (and a
 delay) are searched by bounded nonlinear least squares; the shapes, which enter linearly, follow by linear least squares
-at each step (Golub and Pereyra 1973; Jacobian after Kaufman 1975; references in `state_space.refinement`). Called by
-`modal_order`.
+at each step (Golub and Pereyra 1973; Jacobian after Kaufman 1975; references in `state_space.refinement`).
 """
 
 from collections.abc import Sequence
@@ -247,7 +246,7 @@ class ModalSearch:
 
     def _compute_mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
         """Compute the responses (lines, modes) of modes of unit mass by partial fractions, sampled exactly, with
-        actuator and sensor. A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
+        actuator and sensor. A damping ratio within 1e-6 of 1 becomes 1 + 1e-6, because the two poles must differ."""
         modes = len(unknowns) // 2
         natural_rad_s, ratio = np.exp(unknowns[:modes]), np.exp(unknowns[modes : 2 * modes])
         delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz

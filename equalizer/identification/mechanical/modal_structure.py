@@ -1,6 +1,5 @@
 """Modal parametrisation of a mechanical model: each mode has its own shape at the commands and at the sensors, for
-devices whose sensors are not collocated with the commands. Called by `modal_order`, which fits it, and
-`physical_model`, which converts the result."""
+devices whose sensors are not collocated with the commands."""
 
 from dataclasses import dataclass, replace
 

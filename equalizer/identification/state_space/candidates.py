@@ -1,11 +1,10 @@
 """Candidate state-space models: starting models, each refined to a local optimum, and the choice among them.
 
 The cost as a function of poles and output shapes has many local minima. Two subspace methods therefore give starting
-models without iteration, each for several horizons (`identify` calls them): frequency-domain identification on a warped
-frequency axis (`warped_subspace`), and canonical variate analysis of time records (`canonical_variate`). Each start is
-refined by maximum likelihood (`refinement`), first on lines averaged in bins, where the cost is smooth and cheap, then,
-in a narrow band, on all lines. Equations and references are in these modules. Called by `identify`, `relaxed_poles` and
-`order_report`.
+models without iteration, each for several horizons: frequency-domain identification on a warped frequency axis
+(`warped_subspace`), and canonical variate analysis of time records (`canonical_variate`). Each start is refined by
+maximum likelihood (`refinement`), first on lines averaged in bins, where the cost is smooth and cheap, then, in a
+narrow band, on all lines. Equations and references are in these modules.
 """
 
 from collections.abc import Sequence
@@ -76,8 +75,7 @@ class Candidate:
 
     @property
     def has_acceptable_gain(self) -> bool:
-        """Whether the largest gain at any frequency is at most `LARGEST_OUTSIDE_GAIN` times that on the fitted
-        lines."""
+        """Whether `outside_gain` is at most `LARGEST_OUTSIDE_GAIN`."""
         return self.outside_gain <= LARGEST_OUTSIDE_GAIN
 
 

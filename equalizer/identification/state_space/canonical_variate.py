@@ -5,7 +5,7 @@ The state is the part of the past (commands and responses) that best predicts th
 future commands is removed: canonical correlations between past and future. Each row of the data matrix [future
 commands, past, future responses] belongs to a sampling instant. Each record is reduced to the triangular factor of the
 QR decomposition of its data matrix, and the factors are stacked and reduced again: no row mixes samples of two records,
-and the cost is proportional to the number of records. Called by `candidates`.
+and the cost is proportional to the number of records.
 """
 
 from collections.abc import Sequence
@@ -19,8 +19,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_RATE_OVER_BAND = 3.5
-"""Records are decimated to at least this many samples per period of the band's upper end, and to hardly more. Chosen
-above the limit of 2 of the sampling theorem, which leaves room for the low-pass filter."""
+"""Least number of samples per period of the band's upper end in decimated records. Chosen above the limit of 2 of the
+sampling theorem, which leaves room for the low-pass filter."""
 LEAST_SAMPLES_PER_COLUMN = 4
 """Rows that a record must have, times the number of records, per column of the data matrix: more equations than
 unknowns. Chosen."""

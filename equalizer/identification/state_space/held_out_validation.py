@@ -2,7 +2,7 @@
 
 The model is simulated from rest some time before each segment (run-in), so that its state settles. The error is the rms
 of prediction - response in the model's band, relative to the rms of the response: over the last period of a periodic
-segment, else over the whole segment. Called by `identify_model` and `reproduce_paper`.
+segment, else over the whole segment.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ MIN_RUN_IN_TIME_CONSTANTS = 5.0
 
 @dataclass(frozen=True, slots=True)
 class HeldOutValidation:
-    """Error of a free simulation over the held-out test segments; result of `validate_on_test`."""
+    """Error of a free simulation over the held-out test segments."""
 
     error: float
     """Root mean square of prediction - response over that of the response, over all channels, within the model's

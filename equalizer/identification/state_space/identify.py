@@ -1,5 +1,4 @@
 """Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty.
-Called by `identify_recordings`.
 
 Theory of operation. The measured response G(f) of each line f has noise of known variance s(f)² per entry. The model
 
@@ -10,7 +9,7 @@ minimises the weighted squared residual sum of |G - G_M|² / s², the maximum-li
 1. Starts. Subspace identification in the frequency domain (`warped_subspace`) for several horizons, and canonical
    variate analysis of the time records (`canonical_variate`), because the cost has many local minima.
 2. Refinement. Each start is refined by Levenberg-Marquardt steps over poles and output shapes (`refinement`). All
-   poles stay inside a circle that stands for the longest decay the recordings can show: the model is always stable.
+   poles stay inside a circle that stands for the longest decay allowed: the model is always stable.
 3. Choice. Least cost among those without a large gain outside the band (`candidates`).
 4. Relaxation. Where the bound on the decay costs significantly, single poles may decay more slowly (`relaxed_poles`).
 5. Uncertainty. A parametric bootstrap refits draws of the noise (`bootstrap`); the misfit is what exceeds the noise.
@@ -61,7 +60,7 @@ written."""
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class IdentificationResult(SummaryDisplay):
-    """An identified model with its goodness of fit; result of `identify`."""
+    """An identified model with its goodness of fit."""
 
     model: IdentifiedModel
     cost: float
@@ -182,8 +181,8 @@ def _make_starts(
 def _refine_spare_starts(
     best_so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings
 ) -> list[Candidate]:
-    """Refine further starting models of a wide band, one per entry of `spare_horizons`, until the cost of one is at
-    most `UNEXPLAINED_COST`."""
+    """Refine further starting models of a wide band, one per entry of `spare_horizons`, until the best model's cost is
+    at most `UNEXPLAINED_COST`."""
     candidates: list[Candidate] = []
     for extra_rows in settings.spare_horizons if settings.wide else ():
         if choose_best([best_so_far, *candidates]).cost <= UNEXPLAINED_COST:

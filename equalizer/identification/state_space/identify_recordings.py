@@ -1,8 +1,7 @@
 """Identification of a state-space model from recordings: estimate of the frequency response, fit, and repetitions.
 
 The free decay of relaxed poles disturbs the estimate: it is subtracted from the recordings, and estimate and fit are
-repeated. Where the lines scatter more than their noise, the fit is repeated on local averages. Called as
-`equalizer.identify` and by `study.workflows.equalizer.identify_model`.
+repeated. Where the lines scatter more than their noise, the fit is repeated on local averages.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +37,7 @@ SMOOTHED_REMARK = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingsIdentification:
-    """Result of `identify_recordings`: frequency response of the recordings, and the state-space model fitted to it."""
+    """Frequency response of recordings, and the state-space model fitted to it."""
 
     estimate: FrequencyResponse
     """Frequency response of the recordings, free decays of relaxed poles subtracted."""

@@ -1,8 +1,7 @@
 """Likely causes of a model's misfit, as sentences; where the evidence is insufficient, the sentences state that.
 
 Evidence: the residual power over the noise power (`cost`), the residuals' correlation between neighbouring lines, poles
-at the decay bound, the error on a test, and the levels of fit and test. All thresholds are chosen. Called by
-`identify`, `identify_recordings` and `study.workflows.equalizer.identify_model`.
+at the decay bound, the error on a test, and the levels of fit and test. All thresholds are chosen.
 """
 
 from collections.abc import Sequence
@@ -16,8 +15,7 @@ from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Recording
 
 UNEXPLAINED_COST = 1.5
-"""Cost (residual power over noise power) above which residuals count as larger than the noise; `identify` and
-`identify_recordings` use it as well."""
+"""Cost (residual power over noise power) above which residuals count as larger than the noise."""
 SMOOTH_CORRELATION = 0.5
 """Correlation of the residuals of neighbouring lines from which they count as a linear response that the model
 lacks."""

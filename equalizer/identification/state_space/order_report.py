@@ -2,8 +2,7 @@
 
 Each order is fitted to every second line and tested on the others. The suggested order follows the one-standard-error
 rule (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984): the lowest order whose error on
-held-out lines exceeds the least one by no more than the standard error of that difference. Called by
-`study.workflows.equalizer.report_identification`.
+held-out lines exceeds the least one by no more than the standard error of that difference.
 """
 
 from collections.abc import Callable, Sequence
@@ -41,7 +40,7 @@ class OrderRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrderReport:
-    """Comparison of model orders; result of `compare_orders`."""
+    """Comparison of model orders."""
 
     singular_values: FloatArray
     """Singular values of the whitened data, largest first: about 1 where there is only noise."""
@@ -50,7 +49,7 @@ class OrderReport:
     rows: tuple[OrderRow, ...]
     """Orders tried, rising."""
     held_out_noise: float
-    """Noise of the lines, the lower limit of `held_out_error`."""
+    """Noise of the held-out lines, relative to the rms response: the expected `held_out_error` of a perfect model."""
     suggested_order: int
     """The lowest whose error on held-out lines is not worse than the best one's by more than its standard error."""
 

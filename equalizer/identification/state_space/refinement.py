@@ -10,8 +10,7 @@ alone; the Jacobian of the projected residual r is the partial derivative at fix
 orthogonal complement of their span (Kaufman 1975). A step solves (J'J + damping diag(J'J)) step = -J'r. The damping
 follows the ratio of the decrease of the cost to that which the linear model predicts (Nielsen 1999): a step that lowers
 the cost multiplies it by 1/3 (good prediction) to 2 (poor); rejected steps multiply it by 2, 4, 8, ... Poles that a
-step moves out of the allowed radius are moved back inside, so that the model is always stable. Called by `candidates`,
-`relaxed_poles` and `bootstrap`.
+step moves out of the allowed radius are moved back inside, so that the model is always stable.
 
 References: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973), 413; Kaufman, BIT 15 (1975), 49; Nielsen, Damping
 Parameter in Marquardt's Method, report IMM-REP-1999-05, Technical University of Denmark.

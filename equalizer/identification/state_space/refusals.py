@@ -2,7 +2,7 @@
 
 In order: estimates that disagree, a band beyond half the sample rate, inputs without excitation, outputs that are
 always zero, a band without lines or with a gap, too much noise, and fewer lines than the order needs. Thresholds are
-heuristic. Called by `identify` and `order_report`.
+heuristic.
 """
 
 from collections.abc import Sequence

@@ -3,7 +3,7 @@
 A pole at the bound of the decay is either superfluous, because the order is higher than needed, and then the bound does
 not raise the cost; or it represents a resonance with a longer decay. A likelihood-ratio test decides: twice the fall of
 the cost J (negative log-likelihood) when the bound is lifted, compared with the chi-squared distribution, with a
-Bonferroni correction for the number of lines at which noise could imitate a resonance. Called by `identify`.
+Bonferroni correction for the number of lines at which noise could imitate a resonance.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,8 +50,7 @@ class SlowPole:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelaxedFit:
-    """Candidate after the likelihood-ratio test of the decay bound; result of `relax_poles`, and made by `identify` for
-    the argument `initial`."""
+    """Candidate after the likelihood-ratio test of the decay bound."""
 
     candidate: Candidate
     """The candidate with its poles relaxed; else the given candidate."""
@@ -87,8 +86,8 @@ def relax_poles(
 
 
 def refine_and_tighten(candidate: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
-    """Refine a candidate from another estimate of the same device on these lines; of its relaxed poles, those that are
-    no longer needed return to the ordinary bound. Called by `identify` for the argument `initial`."""
+    """Refine a candidate from another estimate of the same device on these lines; relaxed poles
+    that do not need a longer decay there return to the ordinary bound."""
     refined = refine_candidate(candidate.name, candidate.fitted, lines, settings, candidate.radius)
     return _tighten_poles(refined, lines, settings, float(np.max(candidate.radius)))
 

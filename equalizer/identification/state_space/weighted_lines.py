@@ -1,8 +1,7 @@
 """Frequency lines that a model is fitted to: measured responses, weighted by the inverse of their standard errors.
 
 With circular complex Gaussian noise of variance E|error|² = 1 / weight², the weighted sum of squares is the negative
-log-likelihood, up to a constant. `weight_lines` prepares the data, called by `refusals` (for `identify`)
-and `misfit`; `candidates` reduces them by `group_lines` and `average_bins`.
+log-likelihood, up to a constant. `weight_lines` prepares the data; `group_lines` and `average_bins` reduce them.
 """
 
 from collections.abc import Sequence
@@ -41,8 +40,7 @@ class WeightedLines:
         return len(self.frequency_hz)
 
     def compute_cost(self, modelled: ComplexArray) -> float:
-        """Compute the weighted sum of squares of a model's responses (lines, outputs, inputs): the negative
-        log-likelihood up to a constant, for noise whose E|error|² is 1 / weight²."""
+        """Compute the weighted sum of squared errors of a model's responses (lines, outputs, inputs)."""
         return float((np.abs(self.weight * (modelled - self.response)) ** 2).sum())
 
     def compute_relative_error(self, modelled: ComplexArray) -> FloatArray:

@@ -5,8 +5,9 @@ An identified model is valid in a limited band only. Low band: inverse dynamics 
 direction of the smallest peak force (`high_band`). The forces are added. Without edges in the split, all is middle
 band. Called by `narrow_and_wide_models`.
 
-Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²). A
-virtual spring needs m = p, which is not checked: its force along the motion, (N, p), is subtracted from the commands.
+Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²). As
+many forces as accelerations are required, which is not checked: the force of the virtual spring, (N, p), is subtracted
+from the commands.
 """
 
 from dataclasses import dataclass, field, replace
@@ -44,8 +45,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracki
 
 MIN_PADDING_S = 0.3
 """Least duration (s) of the zeros added before and after the reference. The inverse is non-causal: a constant force
-causes no lasting acceleration, so that forces begin before and end after the reference acceleration. Chosen, as the
-default of `lqr.padding.Padding`."""
+causes no lasting acceleration, so that forces begin before and end after the reference acceleration. Chosen."""
 PADDING_DECAYS = 6.0
 """Duration of the padding, in time constants of the low band's return to rest. A shorter padding would cut off a force
 that has not decayed, which excites the device; after six, exp(-6) = 0.25 % remains. Chosen."""
@@ -147,7 +147,8 @@ class BandedEqualizer:
 
     def compute_forces(self, reference: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
         """Compute the forces of all three bands for a reference acceleration. reference: (n, p), m/s²; cap: None = no
-        limit. Raises ForceLimitError for forces above the cap, TrackingError if no forces under it are found."""
+        limit. Raises ForceLimitError for forces above the cap, TrackingError if no forces under it are found,
+        ValueError for an unsuitable reference."""
         bands = self.split.split(self._pad_reference(reference))
         low_forces, motion = self._compute_low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)
@@ -186,7 +187,7 @@ class BandedEqualizer:
         return int(np.ceil(max(MIN_PADDING_S, padding_decay_s) * self._rate_hz))
 
     def _pad_reference(self, reference: FloatArray) -> FloatArray:
-        """Pad reference (n, p) with zeros, to a length for which the FFT is fast; if causal, only at the end."""
+        """Pad reference (n, p) with zeros, so that an FFT of N rows is fast; if causal, only at the end."""
         rows_before = 0 if self.causal else self._padding_rows
         filter_rows = 2 * self.split.latency_samples
         rows_after = (
@@ -244,9 +245,8 @@ class BandedEqualizer:
         self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, middle_response: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Predict the acceleration (N, p), m/s², of each band: by the high band's frequency response if there is a high
-        band, because it is defined at all frequencies; else by each band's model. middle_response: that of the middle
-        model.
-        """
+        band, because it is defined at all frequencies; else by each band's model. middle_response: the middle
+        model's."""
         if self.high is not None:
             low_acceleration, middle_acceleration, high_acceleration = (
                 predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band

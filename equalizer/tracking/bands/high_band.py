@@ -1,11 +1,11 @@
 """The high band: acceleration matching with one degree of freedom, along the direction of the smallest peak force.
 
 Above the limit of direction perception a person perceives the strength of a vibration but hardly its direction. The
-reference acceleration is therefore reduced to a single signal of the same spectral energy and played along a single
-direction d of force. With g the norm of the device's response G d at a spectral line and w the force weight, the
-magnitude of the force is that of the reduced reference times g / (g² + w). The direction is free: of those tried, that
-of the smallest peak force is chosen. Called by `banded_equalizer` and `narrow_and_wide_models`. Sizes: N samples,
-m forces, p responses.
+reference acceleration is therefore reduced to a single signal of the same energy and played along a single direction d
+of force. With g the norm of the device's response G d at a spectral line and w the force weight, the magnitude of the
+force is that of the reduced reference times g / (g² + w). The direction is free: of those tried, that of the smallest
+peak force is chosen. Called by `banded_equalizer` and `narrow_and_wide_models`. Sizes: N samples, m forces, p
+responses.
 """
 
 from dataclasses import dataclass
@@ -192,10 +192,8 @@ def _compute_force_along(
 
 
 def compute_minimum_phase(gain: FloatArray) -> ComplexArray:
-    """Compute the minimum-phase response (lines,) of a gain (lines,), of a real FFT of even length, none negative.
-
-    By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing).
-    """
+    """Compute the minimum-phase response (lines,) of a gain (lines,), of a real FFT of even length, none negative, by
+    folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing)."""
     fft_length = 2 * (len(gain) - 1)
     # A zero, as at 0 Hz, has no logarithm: it is replaced by the rounding error of the largest gain.
     min_gain = max(np.finfo(float).eps * float(gain.max()), np.finfo(float).tiny)

@@ -3,7 +3,7 @@
 Low band, below the narrow model's band: a rigid model fitted to the narrow model's lowest lines. Middle: the narrow
 model. High, above it: the wide model's response along one direction. Forces are played from the first to the last row
 of the reference; those of the low and the high band before and after it (run-in and run-out) are cut off. The middle
-band is then solved again for the reference minus the narrow model's response to the cut forces. Called by
+band is then solved again for the reference minus the narrow model's response to what remains of them. Called by
 `equalize_trajectory` and `playback_models` of `study.workflows.equalizer`.
 """
 
@@ -197,8 +197,8 @@ def _predict_bands(
     reference: FloatArray,
     forces: FloatArray,
 ) -> BandPredictions:
-    """Predict the errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
-    one. reference: (n, axes), without frequencies above the wide band."""
+    """Predict the errors: the middle band's, of banded_forces, by the narrow model; the high band's, of the final
+    forces (n, inputs), by the wide one. reference: (n, axes), without frequencies above the wide band."""
     edges, rows, middle_band_hz = (
         equalizer.split.edges,
         banded_forces.find_reference_rows(len(reference)),

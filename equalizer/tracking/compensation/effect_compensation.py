@@ -1,11 +1,11 @@
 """Compensation of known nonlinear effects: their forces along the planned motion are added to the feedforward.
 
 A linear model that was identified on a device with friction contains a linear equivalent of that friction; adding the
-complete friction would count it twice, which is worse than no compensation. It is best to identify on recordings from
-which the effects were subtracted (`subtract_effects`). Where there is only a model, the equivalent for a sinusoid of
-the identification's amplitude (`compute_equivalent_impedance`, a describing function) is subtracted. This is an
-approximation: it does not describe an axis that stuck while another was swept. Called by `equalize_trajectory`;
-`subtract_effects` uses its functions for laws, axes and gains.
+complete friction would count it twice. It is best to identify on recordings from which the effects were subtracted
+(`subtract_effects`). Where there is only a model, the equivalent for a sinusoid of the identification's amplitude
+(`compute_equivalent_impedance`, a describing function) is subtracted. This is an approximation: it does not describe an
+axis that stuck while another was swept. Called by `equalize_trajectory`; `subtract_effects` uses its functions for
+laws, axes and gains.
 """
 
 from collections.abc import Iterator, Mapping
@@ -218,8 +218,8 @@ def _compensate_command_map(
     identified_with_n: float | None,
 ) -> None:
     """Change column `axis` of both arrays (N, m), N, in place, so that a command map (a discovered law) turns their sum
-    into the intended force: scale scaled_forces by the linear share of the map at the amplitude identified_with_n, and
-    add to compensating_forces the command minus the intended force."""
+    into the intended force: scale scaled_forces by the linear share of the map at the amplitude identified_with_n
+    (unless None), and add to compensating_forces the command minus the intended force."""
     if identified_with_n is not None:
         scaled_forces[:, axis] *= compute_linear_share(law, identified_with_n)
     intended_n = scaled_forces[:, axis] + compensating_forces[:, axis]

@@ -111,9 +111,8 @@ def compute_equivalent_impedance(
     law: ForceLaw, parameters: Mapping[str, float], frequency_hz: FloatArray, speed_mps: FloatArray, slip_share: float
 ) -> ComplexArray:
     """Compute the describing function (lines,), N s/m: complex ratio of force to velocity at the fundamental, for
-    velocity amplitudes `speed_mps` (lines,), m/s, above zero. From the second of two cycles, in which the presliding
-    deflection is periodic. slip_share: slip speed over velocity amplitude.
-    """
+    velocity amplitudes `speed_mps` (lines,), m/s, above zero. From the second of two cycles, because presliding begins
+    without deflection. slip_share: slip speed over velocity amplitude."""
     line_indices = np.unique(
         np.linspace(0, len(frequency_hz) - 1, min(MOST_EVALUATED_LINES, len(frequency_hz))).round().astype(int)
     )

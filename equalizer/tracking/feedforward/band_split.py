@@ -24,9 +24,9 @@ CAUSAL_ORDER = 3
 
 @dataclass(frozen=True, slots=True)
 class BandEdges:
-    """Crossover frequencies (Hz), at which adjacent bands have equal gain. None: that outer band does not exist, and
-    the middle band extends to 0 Hz or to half the sample rate. Raises ValueError for an edge that is not positive and
-    finite, and for a low edge that is not below the high edge."""
+    """Crossover frequencies (Hz), at which adjacent bands have about equal gain. None: that outer band does not exist,
+    and the middle band extends to 0 Hz or to half the sample rate. Raises ValueError for an edge that is not positive
+    and finite, and for a low edge that is not below the high edge."""
 
     low_hz: float | None = 4.0
     """Crossover between the low and the middle band. The default, 4 Hz, is 1 Hz below a model band that begins at 5 Hz,
@@ -136,7 +136,6 @@ class CausalSplit:
     With a first-order low-pass q, (q + (1 - q))^order = 1. Its binomial terms with the higher powers of 1 - q make the
     band above the crossover, the others the band below. Near a crossover the gain of a single band may exceed 1
     (`largest_gain`): the bands partly cancel there, but the errors with which each band is reproduced do not cancel.
-    With a model that is valid over a wide band, the whole signal should therefore be played through it without a split.
     Raises ValueError for an even or non-positive order, and for a sample rate of at most twice the highest edge.
     """
 
@@ -218,8 +217,7 @@ class CausalSplit:
 
     def design_one_pole(self, edge_hz: float) -> tuple[FloatArray, FloatArray]:
         """Design the first-order low-pass q = 1 / (1 + s / w) by the bilinear transform, with the frequency axis
-        corrected so that its corner is at edge_hz (Hz): numerator and denominator, (2,) each. Also called by
-        `study.workflows.equalizer.controller.c_source`, which writes the filters as C."""
+        corrected so that its corner is at edge_hz (Hz): numerator and denominator, (2,) each."""
         warped_corner = np.tan(np.pi * edge_hz / self.sample_rate_hz)
         return np.array([warped_corner, warped_corner]) / (1 + warped_corner), np.array(
             [1.0, (warped_corner - 1) / (1 + warped_corner)]

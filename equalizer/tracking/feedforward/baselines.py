@@ -3,8 +3,7 @@ forces.
 
 `study.evaluation.reproduction.reproduce_baselines` compares them with the identified model's inverse;
 `make_static_gain_inverse` is also used by `study.workflows.equalizer.play_contact`. Costs are multiply-adds per sample
-of an implementation that runs sample by sample at the sample rate of the response. A periodic command that is computed
-beforehand costs nothing while it is played.
+of an implementation that runs sample by sample at the sample rate of the response.
 """
 
 from dataclasses import dataclass

@@ -4,9 +4,8 @@ model.
 The reference is first limited to the model's band, because the model is not valid outside it; the result states the
 share outside. There is one row of forces per row of the reference, from rest. Forces above a cap are refused, or solved
 again under the cap with the loss stated (`lqr.constrained`). Called by `workspace.feedforward_at_place` (a single
-model) and `bands.narrow_and_wide_models` (the middle band of two models); exported as `equalizer.equalize`. The band
-and its edges are also used by `realtime.realtime_controller` and `study.workflows.equalizer`. Sizes: N rows (samples),
-m inputs, p outputs.
+model) and `bands.narrow_and_wide_models` (the middle band of two models); exported as `equalizer.equalize`. Sizes: N
+rows (samples), m inputs, p outputs.
 """
 
 from dataclasses import dataclass
@@ -97,8 +96,8 @@ def compute_feedforward_forces(
     Finite-horizon LQR tracking from rest, which equals least squares with the block-Toeplitz matrix of the impulse
     response and a weight on the forces. reference: (N, p), m/s²; settings: None = defaults. Raises ForceLimitError for
     forces above the cap (with `constrain` off), TrackingError where the reference has no content in the band or the cap
-    cannot be kept, or for an invalid weight, ValueError where sample rate, number of channels or unit are not the
-    model's.
+    cannot be kept, or for an invalid weight, ValueError for an invalid cap and where sample rate, number of channels or
+    unit are not the model's.
     """
     settings = settings or FeedforwardSettings()
     check_reference(model, reference)
@@ -135,8 +134,8 @@ def extract_band(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
 
 
 def compute_band_edges(model: IdentifiedModel) -> BandEdges:
-    """Compute the edges (Hz) of a model's band, each `BAND_MARGIN_HZ` further out; None for an edge within twice the
-    margin of zero or of half the sample rate."""
+    """Compute the edges (Hz) of a model's band, each `BAND_MARGIN_HZ` further out; None where the band ends within
+    twice the margin of zero or of half the sample rate."""
     low_hz, high_hz = model.band_hz
     nyquist_hz = model.sample_rate_hz / 2
     return BandEdges(

@@ -1,9 +1,8 @@
 """Trajectories of desired accelerations or commanded forces: parsing and formatting of their CSV tables.
 
 A table has a header, the time in its first column (s) and constant time steps. Its header determines its kind:
-accelerations of three axes, forces of three axes, or a transient along a single direction. Called by
-`study.store.formats.trajectory_file`, which reads and writes the files, by `study.workflows.equalizer`, which computes
-and plays the forces, and by `study.workflows.files`, which recognises and documents the tables.
+accelerations of three axes, forces of three axes, or a transient along a single direction.
+`study.store.formats.trajectory_file` reads and writes the files.
 """
 
 import csv
@@ -74,8 +73,8 @@ class Trajectory:
 
 
 def parse_trajectory(text: str) -> Trajectory:
-    """Parse a table of one of `TABLE_KINDS`. Raises TableError for text that is not CSV, an unknown header, fields that
-    are not finite numbers, fewer than two rows, and time steps that are not constant."""
+    """Parse a table of one of `TABLE_KINDS`. Raises TableError for text that is not CSV, an unknown header, rows
+    without a finite number in every column, fewer than two rows, and time steps that are not constant."""
     try:
         rows = list(csv.reader(io.StringIO(text.rstrip())))
     except csv.Error as error:

@@ -9,8 +9,7 @@ initial forces would get worse. A setback is a repeat that increased the error; 
 
 Corrections are faded to zero at both ends of the record. An inverse that cannot act before the first row would respond
 to an error there with an impulse; a handle held by static friction would not move, and the impulse would grow with
-every repeat. Called by `study.workflows.equalizer.repeat_playback`, which plays the forces between the steps;
-`find_largest_share` is also called by `effect_compensation` and `repeat_trajectory`.
+every repeat. Called by `study.workflows.equalizer.repeat_playback`, which plays the forces between the steps.
 """
 
 from collections.abc import Callable

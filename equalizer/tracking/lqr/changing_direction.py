@@ -59,14 +59,14 @@ class TurningResult:
 
 def make_rotatable_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
     """Make the transient of a trajectory (N, p), m/s², before rotation. gains: for N rows, with a free end or rest as
-    final state. Raises TrackingError for another shape."""
+    final state. Raises TrackingError for another shape and values that are not finite."""
     p = gains.problem.outputs
     return _make_transient(gains, make_axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def make_normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
     """Make the transient of a recording (N,), m/s², to be played along a normal (a unit vector per tick). Raises
-    TrackingError for another shape."""
+    TrackingError as `make_rotatable_transient`."""
     p = gains.problem.outputs
     return _make_transient(gains, make_axis_recordings(recording, p), (p,))
 
@@ -84,20 +84,15 @@ def restart(state: LiveState) -> LiveState:
 
 def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -> tuple[FloatArray, LiveState]:
     """Compute the force (m,), N, of this tick, and the next state. After the last row the force is zero. direction: (p,
-    p) or (p,).
-
-    Raises TrackingError for another shape of the direction.
-    """
+    p) or (p,). Raises TrackingError for another shape of the direction."""
     result = play(transient, np.asarray(direction, dtype=np.float64)[np.newaxis], state)
     return result.forces[0], result.state
 
 
 def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> TurningResult:
     """Compute T ticks in a compiled loop. directions: (T, p, p) or (T, p), one per tick; state: None = first row, at
-    rest. After the transient's last row the forces are zero.
-
-    Raises TrackingError for another shape of the directions.
-    """
+    rest. After the transient's last row the forces are zero. Raises TrackingError for another shape of the
+    directions."""
     problem, start_state = transient.problem, make_initial_state(transient) if state is None else state
     direction_rows = np.asarray(directions, dtype=np.float64)
     if direction_rows.shape[1:] != transient.direction_shape:

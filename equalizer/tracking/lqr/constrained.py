@@ -4,9 +4,9 @@
 
 with fixed further forces f. By the alternating direction method of multipliers, ADMM (Boyd et al., Distributed
 Optimization and Statistical Learning via the Alternating Direction Method of Multipliers, 2011). Two steps alternate:
-tracking with the gains of one Riccati recursion, and projection of the forces on the cap. The multipliers give a lower
-bound of the optimal cost (duality), so that the distance from the optimum is known. Called by
-`feedforward.solve_causally` and `bands.banded_equalizer`.
+tracking with stored gains, and projection of the forces on the cap. The multipliers give a lower bound of the optimal
+cost (duality), so that the distance from the optimum is known. Called by `feedforward.solve_causally` and
+`bands.banded_equalizer`.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class TrackingLoss:
     error_capped: float
     """Error of the returned forces."""
     error_clipped: float
-    """Error of the optimal forces after clipping to the cap, for comparison; clipped forces are never played."""
+    """Error of the optimal forces after clipping to the cap, for comparison."""
     cost_free: float
     """Value of the cost for the optimal forces without a cap."""
     cost_capped: float
@@ -110,11 +110,9 @@ def track_under_cap(
     settings: CapSettings | None = None,
 ) -> CappedForces:
     """Track reference (N, p), m/s², from rest. cap_n: largest norm of a row of all forces, N; already_planned: (N, m),
-    N, further forces, such as those of other bands, which count against the cap (None = none).
-
-    Raises TrackingError for other shapes and an invalid cap, where `already_planned` alone is above the cap, and where
-    the duality gap is not reached within the allowed rounds.
-    """
+    N, further forces, such as those of other bands, which count against the cap (None = none). Raises TrackingError for
+    other shapes, where `already_planned` alone is above the cap, and where the duality gap is not reached within the
+    allowed rounds; ValueError for an invalid cap."""
     r = require_trajectory(problem, reference)
     fixed_forces = (
         np.zeros((len(r), problem.inputs)) if already_planned is None else np.asarray(already_planned, dtype=np.float64)

@@ -14,13 +14,11 @@ P, H and K do not depend on the trajectory r (`riccati`): `compute_stored_gains`
 each trajectory, a backward pass gives v and g (`compute_costate_feedforward`), and a forward pass simulates the model
 and gives the forces (`track`). Both passes are linear in r, which `rotation` uses.
 
-No measured signal is fed back, but K_k x_k must not be omitted: it acts on the state of the simulated model, and
-without it the error is about as large as the trajectory.
+No measured signal is fed back: K_k x_k, a part of the force, acts on the state of the simulated model.
 
 References: Bryson and Ho, Applied Optimal Control (1975), chapter 5; Anderson and Moore, Optimal Control: Linear
 Quadratic Methods (1990), chapter 4. The tests compute the same forces by one dense least-squares problem
-(`tests/equalizer/tracking/lqr/dense_least_squares.py`). Called by the other modules of `lqr`, the equalizers in
-`feedforward` and `bands`, and `learning.model_inverse`.
+(`tests/equalizer/tracking/lqr/dense_least_squares.py`). Exported as `equalizer.stored_gains` and `equalizer.track`.
 """
 
 from dataclasses import dataclass
@@ -93,7 +91,7 @@ def compute_costate_feedforward(
     gains: StoredGains, reference: FloatArray, final_state: FloatArray | None = None
 ) -> FloatArray:
     """Compute g of u = g - K x, (N, m), N: the feedforward from the remaining trajectory. Linear in `reference` and
-    `final_state`. Raises TrackingError as `track`. Also called by `changing_direction`."""
+    `final_state`. Raises TrackingError as `track`."""
     problem = gains.problem
     r = require_trajectory(problem, reference)
     if len(r) != len(gains):

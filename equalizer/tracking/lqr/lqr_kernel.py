@@ -2,8 +2,8 @@
 
 `compute_feedforward`: backward pass, costate v and feedforward g. `simulate`: forward pass, model and forces.
 `simulate_tick`: one time step of the forward pass, for a direction that may change at each step; `simulate_ticks`: many
-steps. Called by `lqr`, `preview`, `constrained` and `changing_direction`. n: order, m: forces, p: outputs; in
-all passes z = [x, u] is the state with the forces, and s its product with a matrix.
+steps. Called by `lqr`, `preview`, `constrained` and `changing_direction`. n: order, m: forces, p: outputs; z = [x, u]:
+state and forces; s: result of a product with a matrix.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ _INPUT_VECTOR = types.Array(types.float64, 1, "C", readonly=True)
 _MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _STACK = types.Array(types.float64, 3, "C", readonly=True)
 _OUTPUT_MATRIX = types.float64[:, ::1]
-# _VECTOR and _OUTPUT_MATRIX are written; the others are read-only inputs. All are contiguous.
+# _VECTOR and _OUTPUT_MATRIX may be written; the others are read-only inputs. All are contiguous.
 
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath={"reassoc", "contract"})
@@ -97,12 +97,9 @@ def simulate(
 def simulate_tick(
     step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, k: int, work: FloatArray
 ) -> None:
-    """Simulate step k of a transient: u = sum over c of direction_c g_kc - K_k x_k, zero for k >= N.
-
-    K: (N, m, n); g: (N, m, c); direction: (c,); work: (2 n + m + p,), in this order: n numbers, the state, overwritten
-    by the next state; m, the force of this step; n, work space; p, the model's response at this step. step: as for
-    `simulate`.
-    """
+    """Simulate step k of a transient: u = sum over c of direction_c g_kc - K_k x_k, zero for k >= N. K: (N, m, n); g:
+    (N, m, c); direction: (c,); work: (2 n + m + p,), in this order: n numbers, the state, overwritten by the next
+    state; m, the force of this step; n, work space; p, the model's response at this step. step: as for `simulate`."""
     m, n = K.shape[1], K.shape[2]
     for i in range(m):
         force = 0.0

@@ -2,9 +2,8 @@
 
 The gains are those of the infinite horizon (`compute_stationary_gains`). Samples that are not known yet count as zero,
 the expected value of a zero-mean signal. A device without acceleration response to a constant force needs a long
-preview; a low-frequency weight (`TrackingWeights`) shortens it to about 0.2 s, at the cost of a larger loss at shorter
-previews and a small loss at full preview: `compute_preview_loss` computes both. Called by
-`realtime.realtime_controller`.
+preview; a low-frequency weight (`TrackingWeights`) shortens it, at the cost of tracking error: `compute_preview_loss`
+computes the loss. Called by `realtime.realtime_controller`.
 """
 
 from dataclasses import dataclass

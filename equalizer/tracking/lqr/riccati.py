@@ -65,11 +65,8 @@ class Gains:
 
 def compute_backward_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> Gains:
     """Compute the gains of `samples` steps by the square-root recursion. terminal_weight: P_N, (n, n), weight of x_N -
-    x_f; None = free final state.
-
-    Raises TrackingError where a force, or a combination of forces, has no effect on the cost, and for an invalid
-    terminal weight.
-    """
+    x_f; None = free final state. Raises TrackingError where a force, or a combination of forces, has no effect on the
+    cost, and for an invalid terminal weight."""
     n, m = problem.order, problem.inputs
     S = _factorize(require_terminal_weight(problem, terminal_weight))
     K, H_inverse = np.empty((samples, m, n)), np.empty((samples, m, m))

@@ -4,10 +4,9 @@
 
 A device without acceleration response to a constant force has zeros near z = 1: the forces of its model's exact inverse
 drift at low frequencies, below the identified band. The force weight R penalises forces at all frequencies, the
-low-frequency weight only there: it penalises w, a first-order low pass of each force,
-w_{k+1} = a w_k + (1 - a) u_k, as a further output with zero reference (frequency-dependent weights by augmenting the
-plant: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, chapter 9). Called by `lqr`, by the other
-modules of this package and by the equalizers, which make a problem and pass it to `lqr`.
+low-frequency weight only there: it penalises w, a first-order low pass of each force, w_{k+1} = a w_k + (1 - a) u_k, as
+a further output with zero reference (frequency-dependent weights by augmenting the plant: Anderson and Moore, Optimal
+Control: Linear Quadratic Methods, 1990, chapter 9). Begin at `make_tracking_problem`, whose result `lqr` solves.
 """
 
 from dataclasses import dataclass
@@ -131,10 +130,7 @@ class TrackingProblem:
 
 def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
     """Make the problem of a model and its weights, with the low-passed forces as further outputs if these have a
-    weight.
-
-    Raises TrackingError for an output weight that is not (p, p).
-    """
+    weight. Raises TrackingError for an output weight that is not (p, p)."""
     p, m = model.D.shape
     Q = np.eye(p) if weights.output_weight is None else weights.output_weight
     if Q.shape != (p, p):

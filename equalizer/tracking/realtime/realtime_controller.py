@@ -46,7 +46,7 @@ class RealtimeSettings:
     """Weight of |force|² against |acceleration error|² in the quadratic cost, (m/s² per N)². Default as in
     `FeedforwardSettings`; chosen."""
     preview_s: float = 0.2
-    """Preview (s): how far ahead of its playback a stream is known. Its delay is the preview, less one sample.
+    """Preview (s): how far ahead of its playback a stream is known. Its delay is one sample less, and at least 0.
     Default chosen."""
     cap_n: float = 3.0
     """Limit of the norm of the force vector, N. Default as in `FeedforwardSettings`; chosen."""
@@ -82,8 +82,8 @@ class RealtimeController:
         """Simulate the tracking of a stream from rest: the bands of the stream, and the forces for the middle band.
 
         reference: (N, p), m/s². Row k of the forces is played at the tick at which row k of `reference` arrives; it
-        tracks an earlier row, by the preview less one sample. The force limit `cap_n` is not applied. The final state
-        is that after the end of the delayed stream: by this delay later than the last row of the forces.
+        tracks row k - M + 1, with a preview of M rows. The force limit `cap_n` is not applied. The final state is that
+        after the end of the delayed stream: by this delay later than the last row of the forces.
         """
         bands = self.split.split(reference)
         delay_rows = len(self.tracker) - 1
@@ -99,11 +99,9 @@ def make_realtime_controller(
     model: IdentifiedModel, transient: FloatArray | None = None, settings: RealtimeSettings | None = None
 ) -> RealtimeController:
     """Make both controllers of a model. transient: accelerations (N, p), m/s², before rotation; None =
-    `make_default_transient`. Rows of zeros are appended to it, during which the device comes to rest.
-
-    Raises TrackingError for a model without states or without stationary gains, a weight that is negative or not
-    finite, and a transient that is not finite or has another number of columns than the model has outputs.
-    """
+    `make_default_transient`. Rows of zeros are appended to it, during which the device comes to rest. Raises
+    TrackingError for a model without states or without stationary gains, a weight that is negative or not finite, and a
+    transient that is not finite or has another number of columns than the model has outputs."""
     settings = settings or RealtimeSettings()
     if not model.order:
         raise TrackingError("the model has no states: its answer is a constant gain, which needs no controller")

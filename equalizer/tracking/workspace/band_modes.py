@@ -1,9 +1,9 @@
 """Resonances of an identified model within its band, without the spurious poles of its fit.
 
-A model of order 26 of a device with four resonances in the band has more than four pole pairs there: several pairs may
-describe a single resonance, or the noise of the measurement. The model's poles therefore only give start values: a pole
-pair with residues for each resonance, and a smooth remainder with free coefficients, are fitted together to the model's
-response. Called by `modal_interpolation`, which interpolates the resonances between places after `mode_matching`.
+A model may have more pole pairs in the band than the device has resonances there: several pairs may describe a single
+resonance, or the noise of the measurement. The model's poles therefore only give start values: a pole pair with
+residues for each resonance, and a smooth remainder with free coefficients, are fitted together to the model's response.
+Called by `modal_interpolation`, which interpolates the resonances between places after `mode_matching`.
 """
 
 from dataclasses import dataclass
@@ -126,8 +126,8 @@ def find_band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tup
 
 
 def _find_start_values(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
-    """Find natural frequency (Hz) and damping ratio of the model's poles in and near the band, (modes, 2), by rising
-    frequency. Neighbours whose distance is below the larger of their half bandwidths (damping ratio times natural
+    """Find natural frequency (Hz) and damping ratio of the model's weakly damped poles in and near the band, (modes,
+    2), by rising frequency. Neighbours whose distance is below the larger half bandwidth (damping ratio times natural
     frequency) are merged, weighted by their modal gain."""
     poles, mode_shapes = np.linalg.eig(model.A)
     modal_inputs = np.linalg.solve(mode_shapes, model.B.astype(complex))

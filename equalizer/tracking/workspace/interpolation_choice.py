@@ -33,7 +33,6 @@ class HeldOutPlace:
     """Reference response of the device at a place that is held out from the interpolation."""
 
     place_m: Place
-    """Position (m) of the place."""
     frequency_hz: FloatArray
     """(lines,), within the models' band."""
     response: ComplexArray
@@ -72,8 +71,8 @@ class InterpolationChoice:
     """Interpolation by the modes of all models; None where it is not used."""
 
     def find_models_at(self, place_m: Place) -> ModelsAtPlace:
-        """Find the models and weights for a place (m) by the chosen interpolation. A place outside the convex hull of
-        the models gets those of the nearest place inside, with a remark."""
+        """Find the models and weights for a place (m) by the chosen interpolation. Outside the convex hull of the
+        models they are those of the nearest place inside."""
         return self.modal.interpolate_at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 

@@ -32,8 +32,8 @@ LOWEST_POLE_RATIO, HIGHEST_POLE_RATIO = 0.3, 4.5
 Chosen by hand."""
 RANK_TOLERANCE = 0.1
 """Singular values below this share of the largest are not counted in the rank of a residue matrix. The interpolated
-residue is truncated to the largest rank of the models' residues, because a sum of matrices has a higher rank. Chosen by
-hand."""
+residue is truncated to the largest rank of the models' residues, because a sum of matrices may have a higher rank.
+Chosen by hand."""
 REMARK_THRESHOLD = 0.02
 """Error of the fit of the remainder, relative to the total response of the line, above which the user gets a remark.
 Chosen by hand."""

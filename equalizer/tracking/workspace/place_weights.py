@@ -3,8 +3,7 @@
 Two sets of weights are computed: barycentric coordinates on the Delaunay triangulation (piecewise linear, never
 negative), used by `blended_inverse` for forces and by `modal_interpolation` for smooth remainders, and cardinal
 functions of multiquadric radial basis functions (smooth), used by `modal_interpolation` for the parameters of
-resonances. A place outside the convex hull of the points is replaced by the nearest place inside. Also called by
-`interpolation_choice` and `study.workflows.equalizer.playback_models`, which check how far a place lies outside.
+resonances. A place outside the convex hull of the points is replaced by the nearest place inside.
 """
 
 from dataclasses import dataclass
@@ -18,9 +17,9 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.workspace.workspace_models import Place
 
 MIN_SPREAD_RATIO = 0.05
-"""Spread of the points in a principal direction, relative to the largest (ratio of singular values), below which that
-direction is ignored: otherwise the triangulation of hand-placed points, which lie on a line or surface only nearly,
-would have slivers that join distant points. Chosen."""
+"""Spread of the points in a principal direction, relative to the largest (ratio of singular values), up to which that
+direction is usually ignored: otherwise the triangulation of hand-placed points, which lie on a line or surface only
+nearly, would have slivers that join distant points. Chosen."""
 HULL_TOLERANCE_M = 1e-3
 """Distance to the points' convex hull, in m, up to which a place counts as inside. Chosen."""
 SUM_EQUATION_FACTOR = 1e6

@@ -13,8 +13,8 @@ from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.samples import PacketCounts, Samples
 
 BUFFER_S = 300.0
-"""Time (s) for which samples are kept after their arrival: enough for a long recording and for the two minutes before
-it to which the clock is fitted (`sensor.CLOCK_FIT_S`)."""
+"""Time (s) for which samples are kept after their arrival: enough for a recording of three minutes and the two minutes
+before it to which the clock is fitted (`sensor.CLOCK_FIT_S`)."""
 
 
 class RowBuffer:

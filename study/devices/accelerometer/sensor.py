@@ -29,7 +29,7 @@ and the drift of the bias since the calibration. Chosen: 1000 samples at 2 kHz."
 
 CLOCK_FIT_S = 120.0
 """Time (s) before a recording from which sample arrivals are included in the fit of the sensor's clock, besides those
-of the recording itself: long enough for 1 ppm, and short enough that the rate of a quartz that warms up is constant."""
+of the recording itself: long enough for 1 ppm, short enough for a nearly constant rate of a quartz that warms up."""
 
 LATENESS_S = 0.05
 """Wait (s) after the last tick for samples that are still on their way, in addition to half the length of the low-pass
@@ -89,8 +89,8 @@ class Accelerometer:
 
     def measure_rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
         """Measure the last `seconds`, during which the sensor was at rest. Returns facts; the standard deviation of
-        each axis (3,), m/s², NaN without samples; samples per second. The clock is fitted as for a tick at this moment.
-        Called by `sensor_findings`."""
+        each axis (3,), m/s², NaN without samples; samples per second. The clock is fitted as for a tick at this
+        moment."""
         now_s = time.monotonic()
         interval_samples = self._history.select_interval(now_s - seconds, now_s)
         noise_mps2 = (
@@ -137,7 +137,7 @@ class Accelerometer:
 
 def make_silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
     """Make the error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of received
-    bytes that belong to no packet. Also called by `six_positions`."""
+    bytes that belong to no packet."""
     return DeviceError(
         "The accelerometer is silent",
         f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that belong to none).",

@@ -22,8 +22,8 @@ NI_PREFIX, LABJACK_PREFIX = "ni:", "labjack:"
 """Prefixes of a port that names a data-acquisition device instead of a serial line."""
 
 SCAN_HZ = 4000.0
-"""Requested sample rate of each channel (Hz): about twice the least accepted rate (`sensor_findings.MIN_RATE_HZ`),
-within the range of both vendors' devices."""
+"""Requested sample rate of each channel (Hz): about twice the least accepted rate (`sensor_findings.MIN_RATE_HZ`).
+Chosen."""
 READ_INTERVAL_S = 0.01
 """Interval between two reads (s); the scans of an interval are read together. Chosen: short against the age at which a
 sample counts as missing (`newest_sample.MAX_AGE_S`)."""
@@ -140,7 +140,7 @@ class LabJackSource:
         return self._scans.convert_scans(np.array(volts, dtype=np.float64).reshape(-1, 3)), arrived_s
 
     def close(self) -> None:
-        """End the stream and close the device. Raises what labjack-ljm raises."""
+        """End the stream and close the device."""
         try:
             self._ljm.eStreamStop(self._handle)
         finally:

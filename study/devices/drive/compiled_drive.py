@@ -3,8 +3,8 @@
 The ticks do the same as those of `stepped_runner` and `realtime_drive` in Python, in the same order and to the last
 bit. `run_due` runs ticks one after another without waiting, for tests and for systems whose clock compiled code does
 not read; `attend` waits for each tick in real time, until the loop's thread is needed for other work. Both are called
-by `compiled_ticks`. The code allocates nothing and does not hold Python's global interpreter lock, so that no other
-Python thread can delay a tick.
+by `compiled_ticks`. The code allocates nothing and does not hold Python's global interpreter lock, so that no tick
+waits for another Python thread.
 """
 
 from pathlib import Path
@@ -86,11 +86,8 @@ def _run_tick(  # noqa: PLR0913 - compiled code takes function pointers one by o
     sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
     """Run a tick: sense, store the time of the reading, decide the force (`govern.tick`), write it, publish it to
-    telemetry.
-
-    Returns `RUNNING`, `FINISHED` where the force is off and stays off or the rig is gone, or the driver's error code.
-    From the cells DECIDING and WRITING, the thread that monitors the loop finds where a tick hangs.
-    """
+    telemetry. Returns `RUNNING`, `FINISHED` where the force is off and stays off or the rig is gone, or the driver's
+    error code. The cells DECIDING and WRITING show other threads whether a force is about to be written."""
     calls, cells, samples = rig
     # `_missed_reading`, the reading of a missed tick, is used in `_attend_tick` only.
     state, settings, loop, buffer, force, ring, _missed_reading = governor
@@ -195,10 +192,8 @@ def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     ) -> int:
         """Run ticks as they become due, until the force is permanently off, a tick fails or is too late, or the thread
         is needed for other work. Returns the return code of the last turn, `RUNNING` if there was none. To be called
-        only where the address at `study.devices.native.SLEEP` is not 0.
-
-        After an error code (above zero) the caller has to count the lateness of that tick.
-        """
+        only where the address at `study.devices.native.SLEEP` is not 0. After an error code (above zero) the caller has
+        to count the lateness of that tick."""
         _ = sources_fingerprint
         return_code = RUNNING
         while return_code == RUNNING and not _must_return(governor, loop_state):

@@ -40,8 +40,8 @@ RECORD_MISSED_POINTER = FunctionPointer(govern.record_missed_ticks, RECORD_MISSE
 
 class CompiledTicks:
     """Control ticks of a rig by the compiled loop, and its newest reading. loop_state: shape (LOOP_STATE_SIZE,), the
-    cells listed in `compiled_drive`, shared with the drive. The constructor compiles the loop. `error`: function that
-    makes the exception for a driver's error code, as in `CompiledIo`."""
+    cells listed in `compiled_drive`, shared with the drive. `error`: function that makes the exception for a driver's
+    error code, as in `CompiledIo`."""
 
     def __init__(self, compiled_io: CompiledIo, governor: Governor, loop_state: FloatArray) -> None:
         self._compiled_io = compiled_io
@@ -57,7 +57,7 @@ class CompiledTicks:
         self._loop_state = loop_state
         self._is_running = False
         self.error = compiled_io.error
-        self.run(0)  # compiles the loop now, not when a stimulus is due
+        self.run(0)  # the first call takes longer: now, not when a stimulus is due
 
     @property
     def can_attend(self) -> bool:

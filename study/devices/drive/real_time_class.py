@@ -2,7 +2,7 @@
 
 `realtime_drive`, `force_dimension.rig` and `opening.raise_thread_priority` enter `request_real_time_class` in their
 threads. Where the system refuses the rights, the loop runs without them; `check_real_time_rights` reports that with the
-remedy (`hapteq doctor`, timing check).
+remedy (`hapteq doctor`).
 
 The priority is below that of interrupt threads (50 on Linux), because the device's own USB transfers must come first. A
 loop that hangs cannot starve the computer under Linux's default, which reserves 5 % of every second for ordinary

@@ -1,17 +1,17 @@
 """Control ticks in real time: a thread runs them as they become due. Used by `study.devices.safe.SafeDevice`.
 
-Theory of operation. Tick k is due at t_0 + k / rate (1 kHz). In each tick the loop senses (position, acceleration),
-computes the force within its limits (`governor.govern`) and writes it, in this order: no force is written that was not
-computed from this tick's reading. The due time is counted from the start, not from the last tick, so that delays do not
-add up. The loop sleeps until `SPIN_S` before the due time, then polls the clock, because a sleep alone ends late.
+Theory of operation. Tick k is due at t_0 + k / rate. In each tick the loop senses (position, acceleration), computes
+the force within its limits (`governor.govern`) and writes it, in this order: no force is written that was not computed
+from this tick's reading. The due time is counted from the start, not from the last tick, so that delays do not add up.
+The loop sleeps until `SPIN_S` before the due time, then polls the clock, because a sleep alone ends late.
 
 A stimulus is a function of time. Late ticks of a simulated rig, whose time waits, are run afterwards; those of a real
 device are counted as missed, and the waveform continues at the present time: it is never stretched.
 
-The thread monitors its callers (the governor's watchdog), and every caller monitors the thread (`check`).
+The thread monitors its callers (the governor's watchdog), and they monitor the thread (`check`).
 
-The ticks of a rig with compiled `sense` and `write` run in compiled code while the thread has no other work, so that
-the interpreter lock of another thread delays no tick; `run_due_ticks` runs them from Python.
+Ticks of a rig with compiled `sense` and `write` run in compiled code, if that can read the clock, while the thread has
+no other work, so that the interpreter lock of another thread delays none; `run_due_ticks` runs ticks from Python.
 
 Readings while nothing moves are taken by the same thread, so that only a single thread drives a rig and a stimulus that
 begins meanwhile cannot collide with the reading. A driver that hangs delays a caller by at most `READING_TIMEOUT_S`.
@@ -143,11 +143,9 @@ class RealtimeDrive:
         self._thread.start()
 
     def start(self, begin_stimulus: Callable[[], None]) -> bool:
-        """Call `begin_stimulus`, which prepares the governor, while no tick runs; from then on ticks fall due.
-
-        Returns False, without calling it, where a stimulus is in progress, or the drive has failed or is closing. A
-        loop whose thread ended or keeps the lock counts as failed.
-        """
+        """Call `begin_stimulus`, which prepares the governor, while no tick runs; from then on ticks fall due. Returns
+        False, without calling it, where a stimulus is in progress, or the drive has failed or is closing. A loop whose
+        thread ended or keeps the lock counts as failed."""
         if not (self._thread.is_alive() and self._take_lock()):
             if not self._closing:  # a closing drive's thread may have ended, which is no failure
                 self._runner.give_up(TimeoutError("its loop hangs"))

@@ -1,10 +1,10 @@
 """The runner of a device's control ticks: its interface, and its implementation for simulated (compiled) devices.
 
 A tick reads the sensors (sense), decides the force (govern) and applies it (advance). `CompiledRunner` runs whole
-blocks of ticks of a simulated device without Python; `stepped_runner` drives real devices. The drives (`virtual_drive`,
-`realtime_drive`) call a runner, which `study.devices.safe` makes. The parts of a tick are passed as function pointers,
-not inlined: one loop is compiled for all rigs, its machine code can be cached on disk, and it never contains an
-outdated copy of a part."""
+blocks of ticks of a simulated device without Python; `stepped_runner` drives the other devices tick by tick. The drives
+(`virtual_drive`, `realtime_drive`) call a runner, which `study.devices.safe` makes. The parts of a tick are passed as
+function pointers, not inlined: one loop is compiled for all rigs, its machine code can be cached on disk, and it never
+contains an outdated copy of a part."""
 
 from typing import Any, Protocol
 
@@ -33,11 +33,8 @@ _GOVERNOR_TYPE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE
 
 
 class FunctionPointer(types.WrapperAddressProtocol):
-    """Pointer to a compiled part of a tick, whose address is looked up once.
-
-    For a plain function numba looks the address up at every call of the loop, which takes 0.3 ms, as long as a hundred
-    ticks.
-    """
+    """Pointer to a compiled part of a tick, whose address is looked up once. For a plain function numba looks the
+    address up at every call of the loop, which takes 0.3 ms, as long as a hundred ticks."""
 
     def __init__(self, function: Any, pointer_type: Any) -> None:
         self._numba_type_ = pointer_type
@@ -164,7 +161,7 @@ class CompiledRunner:
         self._governor = governor
         self._block_ticks = block_ticks
         self.failure: BaseException | None = None
-        self._run_block(0)  # compiles in advance, so that no stimulus is delayed
+        self._run_block(0)  # the first call takes longer: now, not when a stimulus is due
 
     @property
     def moving(self) -> bool:

@@ -59,7 +59,7 @@ class StandbyThread:
 
 
 ZERO_TIMEOUT_S = 0.1
-"""Longest wait for a zero force to be written (s): a hundred times the duration of a normal write."""
+"""Longest wait for a zero force to be written (s). Chosen far above the duration of a normal write."""
 
 DEVICE_CLOSE_TIMEOUT_S = 1.0
 """Longest wait for the driver to close its device (s). Chosen: ends an orderly close soon if the driver hangs."""
@@ -241,10 +241,8 @@ class SteppedRunner:
         return reading
 
     def _stop_with_zero_force(self, fault: Fault) -> None:
-        """Write zero force, then stop the governor with this fault: the end is reported only when no force acts.
-
-        Where zero force could not be written in time, the rig is marked as gone and the fault is FORCE_LEFT.
-        """
+        """Write zero force, then stop the governor with this fault: the end is reported only when no force acts. Where
+        zero force could not be written in time, the rig is marked as gone and the fault is FORCE_LEFT."""
         is_zero_written = False
         try:
             is_zero_written = (

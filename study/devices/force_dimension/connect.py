@@ -76,11 +76,8 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:
     """Enable forces up to cap_n (N), starting with zero. Returns the watchdog's timeout (s): how long the device holds
     a force without commands; 0: without limit. effector_mass_kg: for the gravity compensation, None = the model's or,
-    where that is None, the library's.
-
-    Raises `DeviceError` for a device without power or calibration, or that does not switch its forces on, and for a
-    failed call of the library. The caller has to disconnect it then.
-    """
+    where that is None, the library's. Raises `DeviceError` for a device without power or calibration, or that does not
+    switch its forces on, and for a failed call of the library. The caller has to disconnect it then."""
     try:
         _check_power_and_calibration(handle, model)
         handle.disable_time_guard()

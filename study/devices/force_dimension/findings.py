@@ -193,8 +193,8 @@ def _report_masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
 
 def _check_gravity(handle: Handle) -> list[DeviceFinding]:
     """Check the vertical drift of the handle (z is up) by its positions, and whether the library's velocity agrees with
-    it within `DRIFT_LIMIT_MPS` plus half of it; NaN does not agree. Empty where positions cannot be read: the caller of
-    `examine`, `examine_setup`, then opens the device and reports that. Raises `LibraryError`."""
+    it within `DRIFT_LIMIT_MPS` plus half of it; NaN does not agree. Empty where positions cannot be read, which
+    `examine_setup` reports when it opens the device. Raises `LibraryError`."""
     _send_zero_forces(handle, FREE_MOTION_S)
     try:
         start_s, start_height_m = time.monotonic(), handle.read_position_m()[2]

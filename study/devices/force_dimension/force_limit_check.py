@@ -2,7 +2,7 @@
 `study.devices.opening.accept_device`.
 
 1. A stimulus above the cap must be refused. Then more than the cap is commanded, first through the safety layer's
-   ticks, then directly through the vendor's library: the device must report no force above the cap
+   ticks, then directly through the vendor's library: the device must report no force above the cap, but for 5 %
    (`check_cap_holds`).
 2. A small constant force is held, and its commands stop on purpose. The device's watchdog must switch it off in time
    (`check_force_vanishes`).
@@ -107,10 +107,8 @@ def require_testable(rig: object) -> None:
 
 def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
     """Part 1: command more than the cap of each layer in turn. Returns the largest force that the device reported (N).
-
     device: opened without a spring and with caps of TEST_FORCE_N. Raises `DeviceError` where the stimulus was not
-    refused, the cap was exceeded, or the force was too small or ended too early for the test to be valid.
-    """
+    refused, the cap was exceeded, or the force was too small or ended too early for the test to be valid."""
     oscillation = _make_oscillation(device.info.sample_rate_hz)
     try:
         device.hold(oscillation)
@@ -154,11 +152,8 @@ def _check_reported_force(cap_name: str, reported_n: float) -> None:
 
 def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
     """Part 2: stop the commands while a force is held. Returns the time (s) after which the device reported its forces
-    as off.
-
-    device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
-    `DeviceError` where the force remained, or was too small or off before the commands stopped.
-    """
+    as off. device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
+    `DeviceError` where the force remained, or was too small or off before the commands stopped."""
     device.hold(_make_constant_force(device.info.sample_rate_hz))
     _keep_alive_for(device, HOLD_DURATION_S)
     if device.fault() is not Fault.NONE or not rig.force_on():

@@ -30,8 +30,7 @@ POWERED_INDEX, CALIBRATED_INDEX, FORCE_ON_INDEX, BRAKING_INDEX, OFF_CAUSE_INDEX 
 """Indices in the array of dhdGetStatus."""
 
 UNPOWERED_CAUSE, UNCALIBRATED_CAUSE, BRAKED_CAUSE = 101, 102, 103
-"""Causes for which the library has no code: it reports forces as on, and these conditions in other entries of the
-status."""
+"""Causes for which the library has no code: it reports these conditions in other entries of the status."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
     2: "the handle moved faster than the device allows",
@@ -82,8 +81,8 @@ class Status:
 
 
 class Handle:
-    """An open device: the vendor's functions with values in place of pointers. Methods raise `LibraryError` where the
-    library reports a failure, except `disconnect`, `read_system_name` and, for a missing watchdog, `arm_watchdog`."""
+    """An open device. Methods raise `LibraryError` where the library reports a failure, except `disconnect`,
+    `read_system_name` and, for a missing watchdog, `arm_watchdog`."""
 
     def __init__(self, library: Library, number: int) -> None:
         self.library = library

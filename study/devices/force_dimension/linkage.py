@@ -2,8 +2,8 @@
 
 For a position of the handle the library gives encoder counts, joint angles q, Jacobian J = dx/dq, inertia matrix and
 gravity torques tau; the force that holds the weight is pinv(J^T) tau. The device gets no force and stays braked. The
-actual position of the handle is used only in `check_frame`, the present angles of a wrist for the inertia. Opened by
-`study.devices.opening.open_linkage`, for `study.workflows.recording.calibrate_linkage`.
+actual position of the handle is used only in `check_frame`, the present angles of a wrist for inertia and gravity.
+Opened by `study.devices.opening.open_linkage`, for `study.workflows.recording.calibrate_linkage`.
 """
 
 import contextlib

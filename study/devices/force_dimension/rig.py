@@ -2,9 +2,9 @@
 
 The compiled functions of `tick_io` do the reading and writing; this class owns their memory cells, the threads and the
 errors. In addition to the safety layer, `tick_io` never sends a force whose norm is above the cap or NaN. Any failure
-is raised as a `DeviceError`: the safety layer then writes a zero force, and if that fails too, the device's watchdog
-switches the force off. Made by `open_rig`; the acceptance test (`force_limit_check`) also calls `force_on`, `given_n`,
-`given_past_this_n` and `withhold`, whose names its protocols define.
+is raised as a `DeviceError`: the safety layer then writes a zero force, and if that fails too, the device's watchdog,
+if it has one, switches the force off. Made by `open_rig`; the acceptance test (`force_limit_check`) also calls
+`force_on`, `given_n`, `given_past_this_n` and `withhold`, whose names its protocols define.
 """
 
 import contextlib
@@ -114,8 +114,8 @@ class ForceDimensionRig:
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
-        """Command a force (3,), N. A zero force is sent even after a failure. Raises `study.errors.DeviceError` after a
-        failure, and for a force above the cap or NaN, in place of which a zero is sent."""
+        """Command a force (3,), N. A zero force is sent even after a failure. Raises `DeviceError` where sending fails,
+        for another force after a failure, and for one above the cap or NaN, in place of which a zero is sent."""
         self._raise_for_code(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
@@ -124,8 +124,8 @@ class ForceDimensionRig:
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
-        """Simulate a stopped control loop, to test the watchdog: nothing is sent for this time (s), not even zeros.
-        Returns the time of the last force (s, monotonic clock)."""
+        """Simulate a stopped control loop, to test the watchdog: `write` sends nothing for this time (s), not even
+        zeros. Returns the time of the last force (s, monotonic clock)."""
         with self._send_lock:
             self._cells[loop_cells.WITHHELD_UNTIL_S] = time.monotonic() + seconds
             return float(self._cells[loop_cells.SENT_S])

@@ -129,7 +129,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
 
 @njit_inline
 def _is_watchdog_expired(calls: Addresses, cells: FloatArray) -> bool:
-    """Whether no force was sent for longer than the timeout of the device's watchdog."""
+    """Whether no force was sent for longer than the timeout of the device's watchdog; False without one."""
     return bool(read_clock_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
 

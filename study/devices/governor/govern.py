@@ -1,4 +1,4 @@
-"""The safety layer's control tick: the only code in the program that decides a force.
+"""The safety layer's control tick: decides the force on the handle.
 
 Steps of `tick`, in this order:
 
@@ -6,11 +6,9 @@ Steps of `tick`, in this order:
 2. the position reading is checked (`plausibility`); an implausible one is a fault, which starts the safety fade;
 3. the stimulus is capped, faded and added to spring and damper (`feedback`); the sum is capped, its slew rate limited;
 4. the result is capped once more, independent of all steps before: no force above the cap, and none that is not a
-   number, is ever written.
+   number, leaves `tick`.
 
-Machine code that is cached on disk is invalidated when any of these files changes: see `compiling`. The entry points
-`tick`, `publish` and `record_missed_ticks` are called by the loops of `study.devices.drive`, the last also by
-`governor`.
+Entry points: `tick`, `publish` and `record_missed_ticks`.
 """
 
 import math
@@ -59,8 +57,7 @@ MISSED_TICKS_SIGNATURE = types.void(VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE, types
 
 @njit_inline
 def _start_safety_fade(state: FloatArray, fault: int) -> None:
-    """Begin the fade of the last force to zero, which depends on neither readings nor requests. The first fault is
-    kept."""
+    """Begin the fade of the last force to zero. The first fault is kept."""
     state[PHASE] = LETTING_GO
     state[LET_GO_START] = state[TICK]
     for i in range(3):
@@ -106,8 +103,8 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
 
 @njit_inline
 def _compute_fade_gain(ticks: float, fade_ticks: float, raised_cosine: float) -> float:
-    """Compute the gain of a fade-in, from 0 at 0 ticks to 1 at `fade_ticks` ticks: linear, or (1 - cos(pi ticks /
-    fade_ticks)) / 2 where raised_cosine is not 0."""
+    """Compute the gain of a fade-in: 1 from `fade_ticks` ticks on, else 0 up to 0 ticks; between, linear, or (1 -
+    cos(pi ticks / fade_ticks)) / 2 where raised_cosine is not 0."""
     if ticks >= fade_ticks:
         return 1.0
     if ticks <= 0:
@@ -199,8 +196,8 @@ def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArra
 
 @njit_inline
 def _record_row(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
-    """Write command, excitation and reading of a tick of the recorded part into the recording ring, in place of the
-    oldest row; do nothing outside of it."""
+    """Write command, excitation and reading (without its last element) of a tick of the recorded part into the
+    recording ring, in place of the oldest row of a full one; do nothing outside of that part."""
     if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:
         row = int(state[RECORDED_ROWS]) % buffer.shape[0]
         for i in range(3):
@@ -216,8 +213,7 @@ def _compile_publish(sources_fingerprint: int) -> Any:
 
     @njit(PUBLISH_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def publish(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
-        """Write the row of a tick into the telemetry ring, after its force was written; nothing for a ring without
-        rows."""
+        """Write the row of the tick just computed into the telemetry ring; do nothing for a ring without rows."""
         _ = sources_fingerprint
         if ring.shape[0] > 1:
             write_row(state, settings, ring, reading)
@@ -230,7 +226,7 @@ def _compile_tick(sources_fingerprint: int) -> tuple[Any, Any]:
 
     @njit(MISSED_TICKS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def record_missed_ticks(state: FloatArray, buffer: FloatArray, missed_reading: FloatArray, ticks: int) -> None:
-        """Record missed ticks: their rows contain the last force, and `missed_reading` (NaN) as the reading."""
+        """Count missed ticks; recorded rows contain the last force, and `missed_reading` as the reading."""
         _ = sources_fingerprint
         for _tick_number in range(ticks):
             _record_row(state, buffer, missed_reading)

@@ -1,8 +1,6 @@
 """Python interface of the safety layer's tick: owns its arrays, starts stimuli, sends requests, reads the counters.
 
-The cells of the arrays are defined in `cells`; `govern.tick` computes with them. Drive and runners read or write only a
-few of them directly, such as the time stamp; all other access goes through this class. Made by `study.devices.safe`,
-one per device.
+The cells of the arrays are defined in `cells`; `govern.tick` computes with them.
 """
 
 import math
@@ -18,8 +16,8 @@ from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 VELOCITY_CUTOFF_HZ = 50.0
-"""Cutoff frequency (Hz) of the velocity low-pass of the damper: far above the natural frequency of the spring, far
-below the encoders' quantization noise. Chosen."""
+"""Cutoff frequency (Hz) of the low-pass for the velocity of the damper, which reduces the encoders' quantization noise.
+Chosen."""
 
 ACCELERATION_TIME_CONSTANT_S = 0.02
 """Time constant (s) of the low-pass for the acceleration of the position readings, a plausibility check. Chosen: 20
@@ -44,8 +42,7 @@ class Governor:
     """
 
     def __init__(self, info: DeviceInfo, settings: DeviceSettings, ring: FloatArray | None = None) -> None:
-        """ring: rows of the telemetry ring (`study.devices.telemetry`), where each tick writes a row; None: no
-        telemetry."""
+        """ring: the telemetry ring (`study.devices.telemetry`); None: no telemetry."""
         self._rate_hz = info.sample_rate_hz
         self._longest_hold_s = settings.limits.longest_hold_s
         self._keep_s = settings.keep_s
@@ -65,7 +62,7 @@ class Governor:
 
     @property
     def playing(self) -> bool:
-        """Whether a stimulus is in progress and not yet being released."""
+        """Whether a stimulus is in progress and not yet fading out."""
         return bool(self.state[cells.PHASE] == cells.PLAYING)
 
     @property
@@ -84,8 +81,7 @@ class Governor:
         return int(self.state[cells.MISSED])
 
     def begin_hold(self, stimulus: HeldStimulus) -> None:
-        """Set up a stimulus that is repeated until its release; the next tick is its first. The limits are checked
-        before, in `study.devices.admission`."""
+        """Set up a stimulus whose loop is repeated until its release; the next tick is its first. Checks no limit."""
         fade_in, fade_out = self._count_ticks(stimulus.fade_in_s), self._count_ticks(stimulus.fade_out_s)
         self._reset_run(stimulus.onset_then_loop, self._count_recorded_rows(len(stimulus.loop)))
         state, onset_ticks = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
@@ -101,7 +97,7 @@ class Governor:
 
     def begin_play(self, commands: Signal) -> None:
         """Set up commands (n, 3), N, that are played once, after `SETTLE_S` with the spring alone; the next tick is the
-        first of these."""
+        first of that time. Checks no limit."""
         settle_ticks = self._count_ticks(SETTLE_S)
         self._reset_run(commands.samples, len(commands))
         state = self.state
@@ -118,12 +114,11 @@ class Governor:
         self.state[cells.BEGIN_TIME_S] = now_s
 
     def restart_watchdog(self) -> None:
-        """Restart the timeout of the safety layer's watchdog, at the next tick. Called for each keep-alive of the
-        program."""
+        """Restart the timeout of the safety layer's watchdog, at the next tick."""
         self.state[cells.KEEP_ALIVE] = 1.0
 
     def request_release(self) -> None:
-        """Request the fade-out that the stimulus specifies."""
+        """Request the fade-out of the stimulus."""
         self.state[cells.RELEASE_REQUEST] = 1.0
 
     def request_let_go(self) -> None:

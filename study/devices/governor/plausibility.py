@@ -1,10 +1,9 @@
 """Plausibility of position readings: workspace, step length, acceleration, and stale (frozen) readings.
 
 Spring and damper turn a false position into force, so that an implausible reading releases the force. A reading is
-stale if it does not change although the force must have moved even a firmly gripped handle, which is simulated as
-m a + b v + k x = F after dry friction. Bounds and their reasons: `protocols.definition.plausibility`. A false reading
-within them causes at most the feedback's force limit. Called by `govern` at every tick of a stimulus and of its
-fade-out.
+stale if it does not change although the force must have moved even a firmly gripped handle (simulated: m a + b v + k x
+= F after dry friction). Bounds and their reasons: `protocols.definition.plausibility`. A false reading within them
+causes at most the feedback's force limit.
 """
 
 import math
@@ -60,8 +59,8 @@ MAX_COMPONENT_M = 0.5
 upper bound of the workspace's radius in `protocols.definition.plausibility`."""
 
 GRIPPED_KG, GRIPPED_N_S_PER_M, GRIPPED_N_PER_M = 1.0, 60.0, 3000.0
-"""Mass, damping and stiffness of a handle in a hard grip; a real handle moves no less. A whole arm has 0.55 kg,
-6.5 N s/m, 135 N/m (Sci. Rep. srep18004), a hard grip some 20 times that stiffness."""
+"""Mass, damping and stiffness of a handle in a hard grip; assumed: a real handle moves no less. A whole arm has 0.55
+kg, 6.5 N s/m, 135 N/m (Sci. Rep. srep18004), a hard grip some 20 times that stiffness."""
 
 AXIS_STRETCH_RATIO, AXIS_STRETCH_COUNT = 4.0, 2
 """Length of the stretches of time over which a single axis is tested, in units of `STALE_TICKS`, and number of
@@ -69,13 +68,12 @@ successive stretches, each with an expected motion, after which an unchanged axi
 whole position, because friction of the linkage can hold one axis while the others move."""
 
 MOTION_CORNER_HZ = 80.0
-"""Corner frequency (Hz) of the two first-order low-passes before the expected motion. Faster forces move a gripped
-handle by less than the resolution; the friction model, computed at the loop rate, would turn them into a drift that
-does not occur."""
+"""Corner frequency (Hz) of the two first-order low-passes before the expected motion. Faster forces hardly move a
+gripped handle; the friction model, computed at the loop rate, would turn them into a drift that does not occur."""
 
 QUANTISATION_STEPS = 2.0
 """Largest effect of quantisation, in units of the resolution, on the second difference of three readings, each wrong by
-half a step. Also the expected motion from which an unchanged reading is stale."""
+half a step. Also the expected motion beyond which an unchanged reading is stale."""
 
 
 @njit_inline
@@ -95,9 +93,9 @@ def _integrate_gripped_handle(
 
 @njit_inline
 def _update_expected_motion(state: FloatArray, settings: FloatArray) -> None:
-    """Update the motion that the stimulus must have caused in a gripped handle over the last tick. Static forces are
-    left out: a hand at rest balances them. Dry friction follows the play operator (Prandtl): the force that moves the
-    handle changes only where the stimulus differs from it by more than the friction."""
+    """Update the motion that the stimulus, without spring and damper, must have caused in a gripped handle over the
+    last tick. Dry friction follows the play operator (Prandtl): the force that moves the handle changes only where the
+    stimulus differs from it by more than the friction."""
     for i in range(3):
         state[SMOOTHED_STIMULUS + i] += settings[STIMULUS_SMOOTHING] * (
             state[EXCITATION + i] - state[SMOOTHED_STIMULUS + i]
@@ -205,7 +203,7 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
     """Whether the low-passed acceleration of the readings exceeds its bound. Updates it and the last step.
     x, y, z: the latest step, in m per tick."""
     last_x = state[LAST_STEP]
-    if not math.isnan(last_x):  # NaN before the second reading
+    if not math.isnan(last_x):  # NaN at the first step
         step_change_m = compute_norm(x - last_x, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
         step_change_m = max(0.0, step_change_m - QUANTISATION_STEPS * settings[RESOLUTION])
         acceleration_mps2 = step_change_m / (settings[TICK_S] * settings[TICK_S])

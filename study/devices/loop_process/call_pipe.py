@@ -1,9 +1,9 @@
 """Caller's end of the pipes to the process of the device loop: remote calls with progress, timeout and cancellation.
-`start` makes the pipes, `remote_device` calls through them; the process's end is `serve`.
+The process's end is `serve`.
 
 Each pipe has a thread that writes and reads, so that an interrupted caller leaves no incomplete message in the pipe and
 waits no longer than its timeout for a process that hangs. Messages are pickled: (name, arguments) as request; (kind,
-value) as progress or answer.
+value) as progress or answer, a bool as the reply to a progress.
 """
 
 import contextlib
@@ -37,8 +37,7 @@ ANSWER_GRACE_S = 0.5
 """Additional wait (s) after a timeout: after a suspension of this process an answer is late without a fault. Chosen."""
 
 CLOSE_TIMEOUT_S = 6.0
-"""Time (s) beyond the fade in which the process may end in an orderly way; a driver that hangs is abandoned sooner.
-Chosen."""
+"""Time (s) beyond the fade in which the process may end in an orderly way. Chosen."""
 
 
 class LoopGoneError(Exception):
@@ -68,8 +67,7 @@ class Call:
         return self._final_message is not None
 
     def receive(self, message: tuple[int, Any]) -> None:
-        """Store a message of the process: progress, or the answer that ends the call. Called by the thread of the
-        pipe, or by `queue_call` once that has ended."""
+        """Store a message of the process: progress, or the answer that ends the call."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
         else:

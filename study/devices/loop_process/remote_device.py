@@ -1,7 +1,7 @@
 """Device port over a device whose control loop runs in a separate process. Every call has a timeout.
 
 A process that has ended or does not answer is a lost device. It is killed if it still runs, so that it commands no
-further force; the device's own watchdog switches off its last force. Called by `study.devices.opening`.
+further force; the device's own watchdog switches off its last force.
 """
 
 import atexit
@@ -23,8 +23,7 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 OPENING_TIMEOUT_S = 180.0
 """Timeout (s) for starting the process, compiling where necessary, and opening the device. Chosen."""
 ANSWER_TIMEOUT_S = 3.0
-"""Timeout for an answer (s). Chosen: longer than the delays of a busy computer and the safety layer's timeouts (0.1 s
-for a hanging loop, 0.1 s for a zero force, 1 s after the fades for a device that does not become still)."""
+"""Timeout for an answer (s). Chosen: longer than the delays of a busy computer and the safety layer's own timeouts."""
 STOP_TIMEOUT_S = 0.5
 """Timeout of an emergency stop (s), after which the process is killed at once. Chosen."""
 SENT_S_PER_RECORDED_S = 0.05
@@ -108,7 +107,7 @@ class RemoteDevice:
             raise
 
     def keep_alive(self) -> None:
-        """Restart the watchdog. Does not raise for a lost process, which `fault` reports."""
+        """Restart the watchdog. Does not raise for a lost or closed device."""
         with contextlib.suppress(DeviceError):
             self._call_remote(self._process.signs, "keep_alive")
 
@@ -123,15 +122,16 @@ class RemoteDevice:
         return fault
 
     def health(self) -> Health:
-        """Counters of the loop; where the process is lost, those that it reported last."""
+        """Counters of the loop; for a lost or closed device, those that it reported last."""
         try:
             return self._store_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
             return self._make_health_when_lost()
 
     def release(self) -> PlaybackResult:
-        """Release the stimulus and return what was played. Where the process is lost: no recording, and the counters
-        that it reported last. After an interruption, a further call gets the answer of the same release."""
+        """Release the stimulus and return what was played. For a lost or closed device: no recording, and the counters
+        reported last, or `DeviceError` where nothing was held. After an interruption, a further call gets the answer of
+        the same release."""
         if self._loss_reason or self._closed:
             if self._held_stimulus is None:
                 self._require_connected()
@@ -171,7 +171,7 @@ class RemoteDevice:
         return result
 
     def look(self) -> Look:
-        """Snapshot of the device; without a position or an acceleration where the process is lost."""
+        """Snapshot of the device; without a position or an acceleration for a lost or closed device."""
         with contextlib.suppress(DeviceError):
             look: Look = self._call_remote(self._process.look, "look")
             return look

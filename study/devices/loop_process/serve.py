@@ -1,5 +1,5 @@
 """Main program of the process of the device loop: opens a device behind its safety layer and executes the remote calls
-of another process, the caller, with a thread for each pipe. `start` starts the process with `run`.
+of another process, the caller, with a thread for each pipe. Begin at `run`.
 
 Keep-alive calls always come from the caller: `keep_alive` runs only on its call, and `play` continues only while the
 caller answers each progress message. When the caller's end of a pipe closes, for any reason, the force fades, the
@@ -36,7 +36,7 @@ to be faded out then. Chosen."""
 
 EXIT_GRACE_S = CLOSE_TIMEOUT_S + 3.0
 """Time (s) in addition to the fade after which a process that does not end is terminated: it hangs, in the driver or in
-an exit handler. Chosen: 3 s more than the caller waits for an orderly end."""
+an exit handler. Chosen."""
 
 
 class PlaybackCancelledError(Exception):
@@ -209,8 +209,8 @@ def _install_signal_handlers(received_signals: list[int]) -> None:
 
 
 def _call_function(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[int, Any]:
-    """Call a function. Returns its value or its exception as a message (kind, value). Raises EOFError or
-    ConnectionError where the caller is gone."""
+    """Call a function. Returns its value or its exception as a message (kind, value), but raises EOFError and
+    ConnectionError: the caller is gone."""
     try:
         return VALUE, function(*arguments)
     except (EOFError, ConnectionError):  # the caller ended during its answer to a progress

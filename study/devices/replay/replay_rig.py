@@ -1,10 +1,9 @@
-"""A recording as a rig: the handle moves as recorded, independent of the commanded force.
+"""A recording as a rig (device `replay:FILE`): the handle moves as recorded, independent of the commanded force.
 
 Before each stimulus, the stretch is searched whose recorded excitation is nearest to the stimulus (least squares over
 the whole stretch), and its motion is replayed: exactly for commands that were recorded, else that of the nearest ones.
 A stimulus that is repeated repeats its stretch, with a cross-fade from its end to its beginning where the recording is
-longer than the stretch. Between stimuli the handle is at rest, and its sensor has noise. Made by
-`study.devices.rigs_by_name` for the device `replay:FILE`.
+longer than the stretch. Between stimuli the handle is at rest, and its sensor has noise.
 """
 
 from pathlib import Path
@@ -45,8 +44,8 @@ _RANDOM_STATE = types.uint64[::1]
 
 def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
     """Compile `sense` and `advance`. sources_fingerprint: captured so that a change of a source invalidates numba's
-    cache. Arguments of both: state, with the indices above; parameters, the recorded readings row by row, and last the
-    half width of the noise (m/s²)."""
+    cache. Arguments of both: state, with the indices above; parameters, with the recorded readings row by row, and last
+    the half width of the noise (m/s²)."""
 
     @njit(types.void(_VECTOR, _VECTOR, _RANDOM_STATE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:

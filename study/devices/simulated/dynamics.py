@@ -1,5 +1,4 @@
-"""Integrate the equations of motion of the simulated device over a tick of 1 ms. Called by `compiled`. Equations and
-their reasons: docs/simulated_omega3.md.
+"""Integrate the equations of motion of the simulated device over a tick of 1 ms. Reasons: docs/simulated_omega3.md.
 
     M (dv/dt, d2r/dt2) = (J^T t + f + f_stop - I_a J^T (dJ/dt) v,  N^T f - K r - C dr/dt)
 

@@ -1,8 +1,8 @@
 """Write the named parameters of the simulated omega.3 into the flat array that its compiled functions read.
 
-Called by `omega3` (a device) and `simulated_linkage`; `layout` defines the elements of the array. Derived quantities
-are computed here: modal stiffness m w² and damping 2 zeta m w from frequency and damping ratio, the coefficients of
-first-order low passes, noise from its density, and the depth at which the linkage is isotropic.
+`layout` defines the elements of the array. Derived quantities are computed here: modal stiffness m w² and damping 2
+zeta m w from frequency and damping ratio, the coefficients of first-order low passes, noise from its density, and the
+depth at which the linkage is isotropic.
 """
 
 import math

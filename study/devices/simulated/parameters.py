@@ -1,8 +1,8 @@
-"""Physical parameters of the simulated omega.3, one set for all figures; see docs/simulated_omega3.md.
+"""Physical parameters of the simulated omega.3; see docs/simulated_omega3.md.
 
-No link length, inertia, friction or stiffness of the omega.3 is public. The numbers below describe a device of its
-size. The docstrings state their source, or the feature of the published measurements for which they were chosen.
-`omega3` takes them from here, `packing` converts them to the array of the compiled functions.
+No link length, inertia, friction or cable stiffness of the omega.3 is public. The numbers below describe a device of
+its size. The docstrings state their source, or the feature of the published measurements for which they were chosen.
+`packing` converts them to the array of the compiled functions.
 """
 
 from dataclasses import dataclass, field

@@ -3,8 +3,8 @@ the simulated device that fit the linkage and the inertia of a calibration.
 
 Four lengths and a common turn of the azimuths are fitted to the Jacobians (nonlinear least squares), then the moving
 mass and the inertia of the arms to the inertia matrices (linear least squares). A device of another design (hinge
-offsets, arms of unequal weight) is only approximated; `FittedLinkage` states the misfit. `study.devices.opening` calls
-`make_simulated_linkage`, `study.devices.rigs_by_name` calls `fit_linkage`.
+offsets, arms of unequal weight) is only approximated; `FittedLinkage` states the misfit. Begin at
+`make_simulated_linkage` and `fit_linkage`.
 """
 
 from dataclasses import dataclass, replace

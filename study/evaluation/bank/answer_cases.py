@@ -5,7 +5,6 @@ It gets only the folder of open cases. It reads a case name per line on standard
 case's folder, and prints the name when that is done. So that the test is blind, the process cannot import the code that
 made the cases, and an audit hook stops it from opening the files of that code or any other file of the bank, such as
 the labels (`isolate_process`).
-Other modules use only its hashes: `follow_up`, `write_proof` and `inject_real`.
 """
 
 import hashlib

@@ -1,8 +1,7 @@
-"""Run the diagnosis of a bank's unanswered cases in worker processes (`answer_cases`), each for many cases. Called by
-`prove`, `follow_up`, `run_controls`, `laws.prove_laws` and, for real recordings, `study.evaluation.real.inject_real`.
+"""Run the diagnosis of a bank's unanswered cases in worker processes (`answer_cases`).
 
-The processes run on this computer, or on the workers of an executor. A case is tried up to `MAX_ATTEMPTS` times, with a
-new process where the last died or exceeded `CASE_TIMEOUT_S`; then it counts as failed.
+The processes run on this computer, each for many cases, or on the workers of an executor. A case is tried up to
+`MAX_ATTEMPTS` times, with a new process where the last died or exceeded `CASE_TIMEOUT_S`; then it counts as failed.
 """
 
 import json
@@ -267,8 +266,8 @@ def _write_failed_answer(case_folder: Path) -> None:
 
 
 def delete_answered_recordings(case_folder: Path) -> None:
-    """Delete the recordings of an answered case to save disk space, and ignore errors; nothing for an unanswered one.
-    The label, where there is one, has their hash, and the seed reproduces them."""
+    """Delete the recordings of an answered case, but not its clean ones, to save disk space, and ignore errors; nothing
+    for an unanswered one."""
     if is_answered(case_folder):
         for path in (case_folder / RECORDING_FILE, *case_folder.glob(FURTHER_RECORDING_FILE.format("*"))):
             with suppress(OSError):

@@ -3,7 +3,6 @@
 The simulated device of the sealed case plays the experiments that the diagnosis proposed and, for comparison, as many
 (at least one) drawn at random from the same menu. Separate processes diagnose each set together with the first
 recording. The number of effects that the diagnosis still returns shows whether its proposals are better than chance.
-Called by `prove`.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Run a blind test of the diagnosis: a bank of simulated cases with concealed effects (`hapteq prove`).
 
 Order: draw and seal the cases, diagnose them in separate processes without access to the truth, reveal and pair labels
-with answers, follow up undecided cases, run the controls, score. Called by `study.cli.prove`.
+with answers, follow up undecided cases, run the controls if they are requested, score. Begin at `prove`.
 """
 
 from collections.abc import Mapping

@@ -1,6 +1,4 @@
-"""Draw the cases of a bank and write them: open inputs for the diagnosis, and sealed labels with the truth. Called by
-`prove` and `follow_up`; `laws.seal_laws` and `study.evaluation.real.inject_real` seal other cases by the same steps,
-`laws.prove_laws` reads their names.
+"""Draw the cases of a bank and write them: open inputs for the diagnosis, and sealed labels with the truth.
 
 A seal is a commitment by hash: the SHA-256 of every label is written, and can be published, before any case is
 diagnosed, so that truth and answers cannot be changed to suit each other. Labels hold a random salt; without it, the
@@ -124,8 +122,7 @@ def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -
 
 
 def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str, Any]:
-    """Make the label of a case: its draw, the truth, and the hashes of recording and model. Without the random salt,
-    the content could be guessed from the hash, because there are few effects."""
+    """Make the label of a case: its draw, the truth, the hashes of recording and model, and the salt."""
     draw_fields = asdict(case_draw)
     return {
         "name": case_folder.name,

@@ -3,8 +3,7 @@
 `write_proof` writes into the folder of the test: `proof.json` (all figures), `proof.csv` (one row per case),
 `report.html`, and its pictures in figures/. A figure is a number, such as the share of correct answers. `write_table`
 writes the figures and the misses as small CSV tables that can be kept under version control. Both state the commit and
-the digests of the code that answered, so that figures can be traced to it. Called by `hapteq prove`; `write_law_proof`
-uses `FigureRow` and `read_current_commit`."""
+the digests of the code that answered, so that figures can be traced to it."""
 
 import json
 import subprocess

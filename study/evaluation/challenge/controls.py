@@ -2,7 +2,7 @@
 
 Negative controls (shuffled, silent, model of another device, wrong hypothesis) must not be explained by an effect.
 Symmetry controls (axes exchanged, signs mirrored, names changed) must give the corresponding answer. The claims are
-judged in `analysis.evaluation.blind_test.control_claims`. Called by `study.evaluation.bank.run_controls`.
+judged in `analysis.evaluation.blind_test.control_claims`.
 """
 
 from collections.abc import Callable
@@ -74,7 +74,7 @@ def _shuffle_samples(seed: int, settings: CaseSettings) -> tuple[ControlInput, .
 
 
 def _exchange_models(seed: int, settings: CaseSettings) -> tuple[ControlInput, ...]:
-    """Combine the recording of a device with the model of another device, whose stated tolerances are as tight."""
+    """Combine the recording of a device with the calibrated model of another device."""
     return (ControlInput(_draw_control_case(seed, settings).recording, _draw_intact_case(seed + 1, settings).model),)
 
 

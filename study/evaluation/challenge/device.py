@@ -1,8 +1,7 @@
 """The true device of a case: the linear bench with all physics that its model may lack, and its sensor.
 
-Path of the signal: command -> law of the drive, skipped commands -> `actuator_kernel` -> `mechanism_kernel` (motion)
--> `sensor` (readings). By default a device has none of the effects. `draw_case` and `laws.draw_law` build the devices;
-`record` simulates a measurement of one.
+Path of the signal: command -> law of the drive, skipped commands -> `actuator_kernel` -> `mechanism_kernel` (motion) ->
+`sensor` (readings). By default a device has none of the effects. `record` simulates a measurement.
 """
 
 from collections.abc import Callable

@@ -1,9 +1,9 @@
 """Composition of a bank of concealed effects: draws the case of each number, stratified in blocks of forty cases.
 
 A block of forty cases has ten with nothing missing, eighteen with one effect, four with two, four with an effect
-outside the catalogue, and four where the diagnosis may not name the true effect. Five of the forty have larger
-nuisance effects, and five come from a second physics engine. The order within a block is random. All counts
-and shares are chosen. Called by `study.evaluation.bank.seal_cases`; `laws.draw_law` uses two constants.
+outside the catalogue, and four where the diagnosis may not name the true effect. Five of the forty have larger nuisance
+effects, and five come from a second physics engine. The order within a block is random. All counts and shares are
+chosen.
 
 The random streams of a bank's seed have the keys 1 (order of a block), 2 (a case) and 3 (order of the effects, and
 first strength of each).
@@ -84,9 +84,9 @@ class CaseDraw:
 
 def draw_case_plan(seed: int, number: int, short_periods: bool = False) -> CaseDraw:
     """Draw the design of a case. The same seed and number give the same case in a bank of any size. short_periods: 1000
-    samples per period in place of 2000, for tests. The model is calibrated or retuned with equal probability, but
-    always calibrated with a concealed hand. A multisine has three periods with short periods or fewer than three axes,
-    else four."""
+    samples per period in place of 2000. The model is calibrated or retuned with equal probability, but always
+    calibrated with a concealed hand. A multisine has three periods with short periods or fewer than three axes, else
+    four."""
     block_number, position_in_block = divmod(number, len(CASE_BLOCK))
     block_order = np.random.default_rng([seed, 1, block_number]).permutation(len(CASE_BLOCK))
     kind, bank = CASE_BLOCK[block_order[position_in_block]]

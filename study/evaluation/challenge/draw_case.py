@@ -1,8 +1,7 @@
 """Draw a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
 
 Steps: draw bench and excitation, add nuisance effects (`nuisance_effects`), draw and build in the concealed effects,
-simulate and measure, make the model that a laboratory would have (`nominal_models`). Called by `draw_bank`,
-`controls` and `laws.draw_law`; the other simulations of this folder use its parts."""
+simulate and measure, make the model that a laboratory would have (`nominal_models`). Begin at `draw_case`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +68,7 @@ class Case:
     model: MechanicalModel
     truth: tuple[Truth, ...]
     record_again: RecordAgain
-    """Records the same device again under other commands."""
+    """Records the same device again under other commands; raises ValueError for a device with a concealed law."""
     detectability: float = 0.0
     """Detectability: change of the readings by the concealed effects over the noise, both rms, in the worst channel."""
 
@@ -91,8 +90,8 @@ def draw_case(
     (weakest) to 1, a single value for all or a value each; None draws it uniformly. name: of the device; empty for one
     with the seed. The same arguments give the same case.
 
-    Raises ValueError for an unknown name, a strength outside 0..1, a wrong number of strengths, or a hand with a
-    re-tuned model, which would absorb the hand into the device.
+    Raises ValueError for an unknown name, a strength outside 0..1, a wrong number of strengths, a hand with a re-tuned
+    model, which would absorb the hand into the device, or a motion that diverges.
     """
     chosen_effects = [_find_effect(effect) for effect in effects]
     if origin == "retuned" and any(effect.name == "hand_impedance" for effect in chosen_effects):

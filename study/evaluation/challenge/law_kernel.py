@@ -1,7 +1,7 @@
 """Forces of concealed laws outside the catalogue of effects, at one integration step (compiled by Numba).
 
 Each law is a row of numbers: its kind, axes and parameters. The formulas and the ranges of the parameters are in
-`laws.concealed_laws`, by the same kinds. Called by `mechanism_kernel` at each step, and by `laws.build_law`.
+`laws.concealed_laws`, by the same kinds.
 """
 
 from math import atan, pi, sin, sqrt, tanh
@@ -14,7 +14,7 @@ KIND, AXIS, OTHER_AXIS, SIZE, PARAMETER_A, PARAMETER_B, SIGN = range(7)
 """Columns of a row: kind of law; axis on which it acts, 0 to 2; the second axis of a law of two axes; size k and
 parameters a and b of its formula, in SI units; its sign s, +1 or -1."""
 COLUMN_COUNT = 7
-"""Number of the columns above; `device` makes an empty table of laws with it."""
+"""Number of the columns above."""
 (
     SPEED_POWER, POSITION_POWER, POSITION_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG,
     CONTACT, ONE_SIDED_DRAG, GAIN_RIPPLE, PUMPED_STIFFNESS, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING,

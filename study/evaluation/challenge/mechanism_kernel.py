@@ -1,6 +1,4 @@
-"""Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled). Called
-by `study.evaluation.challenge.device`; `laws.build_law` and `laws.draw_law` use `Motion`, `effects.hand` the columns
-of the modulation.
+"""Equations of motion of the mechanism, integrated by semi-implicit Euler with many steps per sample (compiled).
 
     M(q) d2q/dt2 = -C dq/dt - K q + (drive + friction + handle forces + coupling + creep + modulation + laws, 0)
 

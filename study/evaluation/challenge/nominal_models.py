@@ -3,8 +3,8 @@
 Calibrated model: mass, damping and stiffness of the bench without the effect, at each of the driven axes, with
 independent normal errors whose standard deviation is the stated tolerance (a few per cent). Re-tuned model: these
 parameters are fitted by `retune` to the response of the true device at 1.5 N, so that they absorb as much of the
-concealed effect as they can; the stated tolerances are wide. Off-diagonal elements and modes are exact in both, but for
-rounding. Called by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`.
+concealed effect as they can; the stated tolerances are wide. Off-diagonal elements and modes are those of the bench in
+both, but for rounding.
 """
 
 from dataclasses import replace

@@ -2,7 +2,6 @@
 
 The table was sealed by its SHA-256 before the diagnoses (`hapteq kit seal`). Its hash is checked first, so that labels
 that were changed afterwards are refused. `analysis.evaluation.blind_test.lab_kit` defines which diagnoses are right.
-Called by `study.cli.kit`.
 """
 
 import re

@@ -1,5 +1,4 @@
-"""Diagnose one recording of a real device. Called by `real_recordings` (`hapteq real`); `inject_real` imports
-recordings with it.
+"""Diagnose one recording of a real device (`hapteq real`). Begin at `diagnose_real`.
 
 1. The recording is imported by its map. Its model is the map's, or a linear model or force balance fitted to it.
 2. `diagnose` searches for missing effects. Where a recording from before a known change exists, it is the reference.
@@ -49,7 +48,7 @@ class RealDiagnosis:
     findings: Findings | None
     """None where the recording was refused."""
     parents: tuple[Path, ...]
-    """Input files (`RealRecording.parents`)."""
+    """`RealRecording.parents`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

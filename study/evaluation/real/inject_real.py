@@ -2,8 +2,7 @@
 
 Each case contains an intact half of a recording (`injected_halves`), given to the diagnosis as clean, and another with
 up to two simulated faults. The labels (the injected faults) are hashed before any diagnosis, so that later changes
-would show (`proof_seals`); the diagnoses run in separate processes. `run_injections` is called by `real_recordings` for
-`hapteq real --inject`.
+would show (`proof_seals`); the diagnoses run in separate processes. Begin at `run_injections` (`hapteq real --inject`).
 """
 
 import json

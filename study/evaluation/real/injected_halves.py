@@ -1,7 +1,4 @@
-"""Split a real recording into an intact half and a half for an injected fault, and measure how visible the fault is.
-
-Called by `inject_real`, which injects the fault into the second half.
-"""
+"""Split a real recording into an intact half and a half for an injected fault, and measure how visible the fault is."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,8 +1,7 @@
 """Inventory of a folder of real recordings: sub-folders of recordings with import maps, or headers in place of these.
 
 A map may also state that a recording only tests the diagnosis of another one (`tests`), and that two were made before
-and after a change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`;
-`diagnose_real`, `inject_real` and `reuse_answers` use `RealRecording`.
+and after a change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Begin at `read_real_folder`.
 """
 
 from collections.abc import Sequence

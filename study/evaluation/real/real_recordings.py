@@ -3,7 +3,7 @@
 `diagnose_folder` lists the recordings, reuses the answers of an earlier run whose inputs are unchanged, diagnoses the
 other recordings in this process or on the workers of an executor, injects faults if `RealPlan.inject` is above 0, and
 writes page and table. Each answer is written as soon as it is known, so that an interrupted run can be resumed. The
-last 2 % of the progress are for page and table. Called by `study.cli.real`.
+last 2 % of the progress are for page and table.
 """
 
 import errno
@@ -67,8 +67,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class RealPlan:
-    """Settings of `diagnose_folder`: folder of recordings, folder for the results, limit of the search, faults to
-    inject."""
+    """Settings of `diagnose_folder`. folder: of recordings; out: folder for the results."""
 
     folder: Path
     out: Path

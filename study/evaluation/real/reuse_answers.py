@@ -1,4 +1,4 @@
-"""Reuse of answers of an earlier run of `hapteq real`; called by `real_recordings`.
+"""Reuse of answers of an earlier run of `hapteq real`.
 
 An answer is reused if the hashes of its input files and its settings are unchanged. If any of them has changed, the
 whole run is refused before any work, with a list of the changes.

@@ -1,5 +1,5 @@
 """Write the results of `hapteq real`, the diagnosis of a folder of recordings of real devices: an HTML page, tables
-(CSV) and figures. Called by `real_recordings`; `real_summary` uses its result."""
+(CSV) and figures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,7 +126,7 @@ def _delete_stale_table(path: Path) -> None:
 
 
 def _make_row(real_answer: RealAnswer) -> RealRow:
-    """Make the row of a recording; its errors are None without held-out data."""
+    """Make the row of a recording; the errors of its model are None without held-out data."""
     held_out_errors = real_answer.held_out
     error_as_given, error_retuned, error_with_effects, noise_floor = (
         (None, None, None, None)

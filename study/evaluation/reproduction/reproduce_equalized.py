@@ -1,9 +1,7 @@
 """Reproduction of the paper's figure 5: playback on the simulated device with and without equalization.
 
 One row per combination of driver, place in the workspace, target signal and device: the rows are listed, played one by
-one (`reproduce_playback`), and split into those of the figure and those of the table only. Called by
-`reproduce_paper`; `reproduce_baselines` uses the drivers (functions that make the forces of a playback), and
-`reproduction_results` contains the result.
+one (`reproduce_playback`), and split into those of the figure and those of the table only. Begin at `play_equalized`.
 """
 
 from collections.abc import Callable, Mapping, Sequence

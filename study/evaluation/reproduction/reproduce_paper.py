@@ -1,5 +1,4 @@
-"""Reproduce the published figures 1 to 5 on the simulated omega.3. Called by `study.cli.reproduce` (`hapteq
-reproduce`).
+"""Reproduce the published figures 1 to 5 on the simulated omega.3 (`hapteq reproduce`).
 
 Steps: record the device (`reproduce_recordings`), run the study with simulated participants, identify the models, play
 the equalizer and the baselines, write figures, document and page. Sessions, recordings and models are reused by the

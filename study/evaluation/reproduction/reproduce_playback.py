@@ -2,8 +2,7 @@
 
 Figure 5 of the paper compares target and delivered accelerations with and without the equalizer. Each row of the figure
 is one position of the handle, one device and one way to convert the target acceleration to forces (a driver). The three
-axes are played one after the other, all rows at the same peak force. Called by `reproduce_equalized` and
-`reproduce_baselines`.
+axes are played one after the other, all at the same peak force.
 """
 
 import contextlib
@@ -31,7 +30,8 @@ from study.store.formats.protocol_files import read_recording_protocol
 ACCELERATION_CHANNELS = ("ax", "ay", "az")
 """Names of the channels of a target acceleration."""
 PEAK_FORCE_RATIO = 0.93
-"""Peak of the norm of the force, as a fraction of the protocol's force cap. Chosen: far above friction, not clipped."""
+"""Peak of the norm of the force, as a fraction of the protocol's force cap. Chosen: far above friction, below the
+cap."""
 PLAYED_PERIODS = 2
 """Number of periods played: the transient decays in the first, and the last is measured."""
 FADE_S = 0.5

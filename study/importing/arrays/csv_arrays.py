@@ -1,7 +1,7 @@
-"""Read the columns of a text table (CSV) as arrays; called by `read_arrays`, and `workbook_arrays` for its sheets.
+"""Read the columns of a text table (CSV) as arrays. Begin at `read_csv_arrays`.
 
 Encoding, delimiter, decimal sign, header and units are detected (`table_text`, `table_layout`). Empty fields are
-missing samples. A column of numbers and words is reported, with line and column, only where it is used."""
+missing samples. A column of numbers and words is an error, with line and column, only where it is used."""
 
 import io
 import re
@@ -97,7 +97,7 @@ def parse_lines(lines: list[Line], settings: CsvMap) -> Table:
 
 def _classify_columns(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
     """Convert columns to numbers or seconds; leave out those of words only. A column with words among its numbers is
-    replaced by its problem. Raises ValueError for a number in another notation."""
+    replaced by its problem. Raises ValueError for a number in another notation, and as `read_stamps`."""
     arrays: dict[str, npt.NDArray[Any]] = {}
     stamps, text_names = {}, []
     for name, column in columns.items():

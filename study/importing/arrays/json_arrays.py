@@ -1,9 +1,8 @@
-"""Read arrays from JSON files. Called by `study.importing.arrays.read_arrays`; `study.cli.show` uses
-`is_hapteq_document`.
+"""Read arrays from JSON files.
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
 record per line; https://jsonlines.org). Arrays inside an object have its name as prefix (`run1/u`), unless it is the
-only object with arrays.
+only object with arrays of several values.
 """
 
 import re

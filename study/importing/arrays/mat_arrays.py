@@ -1,5 +1,4 @@
-"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7); called by `study.importing.arrays.read_arrays`.
-`header_map`, `map_skeleton` and `expressions.namespace` take from here the advice on arrays that are not read.
+"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7). Begin at `read_mat5_arrays`.
 
 The files are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
 memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; other cells, texts, objects,
@@ -21,7 +20,7 @@ from study.regular_file import read_regular
 from study.store.disk.declared_size import SizeLimit
 
 Array = npt.NDArray[Any]
-"""Array of numbers or texts, or a placeholder (an object array with one entry) for one that is not read."""
+"""Array of numbers, or a placeholder (an object array with one entry) for one that is not read."""
 MAX_MAT_BYTES = 2**32
 """Largest file that is read (4 GiB). Chosen."""
 MAX_STRUCTURE_DEPTH = 32

@@ -1,7 +1,4 @@
-"""Fields of a text table: split a row into fields, and classify each as number, text, unit, time stamp or missing.
-
-Called by `table_marks`, `table_layout` and `csv_arrays`; `json_arrays` and `workbook_arrays` classify texts with it.
-"""
+"""Fields of a text table: split a row into fields, and classify each as number, text, unit, time stamp or missing."""
 
 import csv
 import re

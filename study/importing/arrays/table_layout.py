@@ -1,7 +1,7 @@
 """Detect the layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
 
 The rows of numbers are found first, because nearly every table has them. The row above them is the header, or a row of
-units with the header above it; rows further up are remarks. Called by `csv_arrays`; `json_arrays` calls `append_units`.
+units with the header above it; rows further up are remarks.
 """
 
 import re

@@ -1,5 +1,4 @@
-"""Detect delimiter, decimal sign and columns of words of a table: the choice by which most rows consist of numbers.
-Called by `table_layout`; `csv_arrays` uses the advice on thousands."""
+"""Detect delimiter, decimal sign and columns of words of a table: the choice by which most rows consist of numbers."""
 
 import re
 from collections import Counter

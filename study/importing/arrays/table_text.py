@@ -1,9 +1,9 @@
 """Decode the text of a table (CSV) whose character encoding the import map states, or detect it from the bytes.
 
-Called by `csv_arrays`. UTF-8 and UTF-16 are recognised by their structure. Legacy encodings accept nearly every byte
-sequence, so that the content decides: Windows-1252 if non-ASCII characters occur singly or in pairs within words, as in
-`µs`, `°` and `Größe`; else the only encoding in which the text contains a known word for a quantity (`FOREIGN_WORDS`).
-If there is none, or more than one, the error names the candidates.
+UTF-8 and UTF-16 are recognised by their structure. Legacy encodings accept nearly every byte sequence, so that the
+content decides: Windows-1252 if non-ASCII characters occur singly or in pairs within words, as in `µs`, `°` and
+`Größe`; else the only encoding in which the text contains a known word for a quantity (`FOREIGN_WORDS`). If there is
+none, or more than one, the error names the candidates.
 """
 
 import codecs

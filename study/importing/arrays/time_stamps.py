@@ -2,8 +2,7 @@
 
 A field holds a date, a clock time with or without an offset from UTC, or both. Where one column holds dates and another
 clock times, they are added. In dates that do not begin with the year, day and month cannot be distinguished: they are
-accepted only where all dates are the same. The year is the part with four digits. Called by `csv_arrays`, `table_cells`
-and `table_layout`."""
+accepted only where all dates are the same. The year is the part with four digits."""
 
 import math
 import re
@@ -78,8 +77,8 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
 
 def _compute_clock_s(filled_fields: "pd.Series[str]", parts: "pd.DataFrame") -> SecondsArray:
     """Compute the seconds (n,) since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds
-    above 59, for hours above 12 (AM), 23 (PM) or 24 (with a date), and where only some have a zone. filled_fields,
-    parts: the fields, and the groups of `_STAMP` in them."""
+    above 59, for hours above 12 (AM) or 23 (PM), for times after 24:00 with a date, and where only some have a zone.
+    filled_fields, parts: the fields, and the groups of `_STAMP` in them."""
     for index in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
         raise ValueError(f"'{filled_fields.iloc[index]}' is no clock time, with more than 59 minutes or seconds")
     if parts["zone"].isna().any() != parts["zone"].isna().all():

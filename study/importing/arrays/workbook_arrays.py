@@ -1,7 +1,7 @@
 """Read the sheets of a workbook (.xlsx, .xlsm) as tables: cells are converted to lines and read like a text file.
 
 Hidden sheets (unless the map names one) and sheets without rows of numbers are left out. With several sheets, the names
-of arrays begin with that of the sheet (`Run 1/force [N]`). Called by `read_arrays`.
+of arrays begin with that of the sheet (`Run 1/force [N]`).
 """
 
 import io
@@ -168,7 +168,7 @@ def _read_cell(cell: Any) -> Any:
 
 
 def _is_numeric_row(cells: Sequence[Any]) -> bool:
-    """Whether a row has two numbers or more, or only numbers. A text with a single number is taken as a setting."""
+    """Whether a row has two numbers or more, or only numbers; text with a single number is taken as a setting."""
     filled_cells = [cell for cell in cells if cell is not None]
     numbers = [cell for cell in filled_cells if isinstance(cell, int | float) or _is_numeric_text(cell)]
     return len(numbers) > 1 or (bool(numbers) and len(numbers) == len(filled_cells))

@@ -1,8 +1,7 @@
 """Evaluate the expressions of an import map: arithmetic over arrays.
 
-The text is parsed by Python's parser and evaluated here on the syntax tree, never by Python itself. All constructs
-that are not in the lists below are refused, such as attributes, other function calls, comprehensions. Called by
-`namespace`, and `map_library` for the names.
+The text is parsed by Python's parser and evaluated here on the syntax tree, never by Python itself. All constructs that
+are not in the lists below are refused, such as attributes, other function calls, comprehensions. Begin at `evaluate`.
 """
 
 import ast

@@ -1,6 +1,4 @@
-"""Look up the names in the expressions of an import map: arrays of a file, and definitions ([let]) of the map.
-`build_recording` and `map_library` make a namespace for each file; `part_signals`, `time_base` and `alignment` use
-it."""
+"""Look up the names in the expressions of an import map: arrays of a file, and definitions ([let]) of the map."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -122,10 +120,10 @@ class Namespace:
 
 
 def make_namespace(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
-    """Make the namespace of a file. Names that begin with the prefix are also known without it, and `fx [N]` as `fx`.
-    Of equal names, that without the prefix has precedence, then the name in the file, then that without the unit. The
-    budget is extended by the number of values of the file. Raises ImportProblemError if a prefix is given and no name
-    begins with it."""
+    """Make the namespace of a file. Names that begin with the prefix are also known without it, or without their unit
+    (`fx [N]` as `fx`), but not without both. Of equal names, that without the prefix has precedence, then the name in
+    the file, then that without the unit. The budget is extended by the number of values of the file. Raises
+    ImportProblemError if a prefix is given and no name begins with it."""
     unprefixed = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
     unitless = {split_bracketed_unit(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not unprefixed:

@@ -1,8 +1,7 @@
-"""Parse the TOML text of an import map into an `ImportMap`, or report its problems.
+"""Parse the TOML text of an import map into an `ImportMap` (`parse_map`), or report its problems.
 
 Steps: TOML syntax, keys and types (pydantic), then contradictions between keys; only the problems of the first step
-that fails are reported. `map_library` and `workflows.files.recognisers` call `parse_map`;
-`workflows.files.importing_docs` makes docs/importing.md from `MAP_SCHEMA`."""
+that fails are reported. docs/importing.md is made from `MAP_SCHEMA`."""
 
 import json
 import tomllib
@@ -21,7 +20,7 @@ KIND = "import map"
 """Kind of the document, for messages."""
 
 _ADAPTER: TypeAdapter[ImportMap] = TypeAdapter(ImportMap)
-"""Validator of a map, from which also its JSON Schema is made."""
+"""Validator of a map."""
 MAP_SCHEMA: Node = _ADAPTER.json_schema()
 """JSON Schema of a map."""
 
@@ -49,7 +48,7 @@ def parse_map(text: str, source: Path) -> ImportMap:
 
 
 def is_map(values: dict[str, Any]) -> bool:
-    """Whether TOML values are a map: only a map has a list `channel`."""
+    """Whether TOML values declare an import map: they have a list `channel`."""
     return isinstance(values.get("channel"), list)
 
 
@@ -57,7 +56,7 @@ def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
     """Describe each validation error of pydantic (`ValidationError.errors()`) in a clause."""
     for error in errors:
         location: ValuePath = error["loc"]
-        if error["type"] == "json_invalid":  # nested too deeply
+        if error["type"] == "json_invalid":  # such as one that is nested too deeply
             yield f"it cannot be read: {error['msg']}"
             continue
         key = format_key_path(MAP_SCHEMA, location)
@@ -70,7 +69,7 @@ def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
 
 
 def _describe_unknown_key(key: str, location: ValuePath) -> str:
-    """Describe in a clause a key that no map has, with the most similar key or else all keys of its table."""
+    """Describe an unknown key in a clause, with the most similar known key or else all known keys of its table."""
     table = find_node(MAP_SCHEMA, location[:-1])
     known_keys = list_keys(MAP_SCHEMA, table) if table else ()
     nearest_key = find_nearest_key(str(location[-1]), known_keys)

@@ -1,8 +1,7 @@
 """Interpret channel names: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and derive the
 roles of channels (command, response, ...) from them.
 
-`parse_signal_name` interprets one name; `assign_roles`, `list_open_roles` and `propose_roles` take all names of a file.
-Called by `header_map`, `map_skeleton`, `imposed_roles`, `surplus_arrays`, `namespace` and the readers in `arrays`.
+`parse_signal_name` interprets one name; `assign_roles`, `list_open_roles` and `propose_roles` take all those of a file.
 """
 
 import re
@@ -28,8 +27,7 @@ from study.importing.map_format.import_map import SignalRole
 _BRACKETED_UNIT = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
 """A name followed by its unit in brackets."""
 _UNIT_SEPARATOR = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
-"""Separator between a name and its unit without brackets (`force / N`, `force, N`, `Kraft in N`), as in standards and
-in files of testing machines."""
+"""Separator between a name and its unit without brackets (`force / N`, `force, N`, `Kraft in N`)."""
 _NO_UNIT_WORDS = ("n/a", "na", "none", "-", "--")
 """Words, in lower case, that are written in place of a unit where there is none."""
 _PEAK_MARK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
@@ -37,7 +35,7 @@ _PEAK_MARK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", r
 LONGEST_NAME = 300
 """Longest name (characters) in which a unit is searched, chosen: the search takes quadratic time."""
 _CACHE_SIZE = 2**14
-"""Number of names whose results are cached, because the headers of a file are interpreted repeatedly. Chosen."""
+"""Largest number of names whose results a function caches, as headers of a file are interpreted repeatedly. Chosen."""
 _FOREIGN_WORDS = {
     "time": ("时间", "時間", "時刻", "시간", "время", "χρόνος"),
     "force": ("载荷", "荷重", "하중", "сила", "усилие", "δύναμη"),
@@ -53,7 +51,7 @@ _FOREIGN_WORDS = {
 }
 """Words for a quantity in other scripts."""
 FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN_WORDS.items() for word in words}
-"""Quantity of each word in another script; the words are also used to detect an encoding."""
+"""Quantity of each word in another script."""
 _CERTAIN_UNITS = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
 """Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; units with a slash are unambiguous, too."""
 _JOINED_UNITS = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}

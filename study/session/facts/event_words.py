@@ -1,5 +1,4 @@
-"""Describe the log of a session in words: one line per event. `study.workflows.views.view_session` calls
-`describe_log`.
+"""Describe the log of a session in words: a line per event, and lines with the dates (`describe_log`).
 
 Answers to questions about health are left out. The direction of a trial that does not count (yet) is left out, too: the
 trial may be repeated, and the participant may see the text. Runs and trials count from 1 here, as on the screen of the
@@ -41,8 +40,8 @@ _PresentationKey = tuple[int, int, int]
 
 
 def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...]:
-    """Describe each event in a line, in the order of the log: time in `zone`, or its text where it is no time, and one
-    or more sentences. A line with the date comes first, and before each change of date or UTC offset."""
+    """Describe each event in a line, in the order of the log: time in `zone`, or its text where it is no time, and
+    sentences. A line with the date precedes the first event with a time, and each change of date or UTC offset."""
     events = tuple(events)
     measured_keys = {_get_presentation_key(event) for event in events if isinstance(event, TrialMeasured)}
     presentations = {
@@ -63,7 +62,7 @@ def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...
 
 
 def describe_event(event: Event) -> str:
-    """Describe one event alone. Direction and correctness of a trial, which depend on other events, are left out."""
+    """Describe one event alone. Direction and correctness of a trial are left out."""
     return _describe_in_context(event, {})
 
 

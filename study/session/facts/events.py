@@ -2,7 +2,7 @@
 
 A fact is an observation that the program cannot recompute, such as a presented stimulus, an answer or a measurement.
 Quantities that follow from facts (levels, reversals, thresholds) are computed from them (`study.session.state.fold`);
-where a fact states one of them, too, it serves as a check. `study.store.sessions.event_log` writes and reads the log.
+where a fact states one of them, too, it serves as a check.
 
 In all events, `run`, `trial` and `attempt` are indices from 0, `utc` is the wall-clock time, and `monotonic_s` is as in
 `sitting_events`. Units are in the names; ranges are in `fact_types`.
@@ -98,7 +98,7 @@ ADDED_FIELD_DEFAULTS: dict[str, object] = {
     "nominal_n": None,
     "sensor": None,
 }
-"""Default of each field that was added after the first logs; a field with this value is not written."""
+"""Defaults of fields that were added after the first logs; such a field is not written where it has its default."""
 
 
 @dataclass(frozen=True, config=FACT_CONFIG)

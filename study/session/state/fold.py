@@ -2,9 +2,7 @@
 
 `state.begin_session` makes the state from the first event, `apply_event` applies each further one. The state contains
 only what follows from the log, so that a session can be resumed after a crash. An event that cannot follow the previous
-ones raises LogContradictionError. The events of a trial are applied by `fold_trial`. Called by
-`study.workflows`, in `trial.sitting` and `session.resume_session` for new events and in `results.fold_session` for
-stored logs, and by `study.session.watching.followed_session` for the log of a running session.
+ones raises LogContradictionError. The events of a trial are applied by `fold_trial`.
 """
 
 import math
@@ -98,7 +96,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
             return _apply_close(state, event)
         case SessionOpened():
             raise LogContradictionError("a session cannot be opened twice")
-        case _:  # notes, interruptions, onset pulses and masking noise change nothing
+        case _:  # at notes, interruptions, onset pulses and masking noise, only time advances
             return state
 
 

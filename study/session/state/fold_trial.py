@@ -1,4 +1,4 @@
-"""Application of a trial's events (presented, answered, measured or void) to the state of a session; called by `fold`.
+"""Application of a trial's events (presented, answered, measured or void) to the state of a session.
 
 A trial is open from its presentation until it is measured or void. A measured trial moves the place in the run and,
 unless it is a practice or catch trial, the staircase; a void one is due again with the next attempt number. Each adds
@@ -161,8 +161,8 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
 
 
 def _set_sensor_facts(row: Trial, sensor: SensorFacts | None) -> Trial:
-    """Set the packets, bytes and fraction of samples that the accelerometer lost in the trial; the row is unchanged
-    without a sensor."""
+    """Set the accelerometer's lost packets, garbled bytes and fraction of missing samples; the row is unchanged without
+    a sensor."""
     if sensor is None:
         return row
     missing_fraction, garbled_bytes = sensor.missing, sensor.spoiled_bytes
@@ -198,8 +198,8 @@ def _is_run_over(state: SessionState) -> bool:
 
 
 def _start_next_run(state: SessionState) -> SessionState:
-    """Move the state to the beginning of the next run, with the rest that is due before it (s); no rest after the
-    last run."""
+    """Move the state to the beginning of the next run, with the rest that is due before it; no rest after the last
+    run."""
     is_last_run = state.run + 1 == len(state.runs)
     # No enforced rest after a practice run: it is short, and the participant reads its result afterwards.
     rest_s = 0.0 if is_last_run or state.runs[state.run].practice else state.protocol.rests.after_run_s

@@ -1,8 +1,8 @@
 """State machine of a session: the next action, as a function of the state that `fold` computes from the log.
 
-`find_next_preparation` gives the steps before the instructions of a sitting (forms, device check) and is called by
-`prepare_sitting`. `find_next_action` gives the steps after them and is called by `run_session`; its order of precedence
-is: end of the session, limits of the sitting (`find_reached_limit`), demonstration, rest, reference, probe, trial.
+`find_next_preparation` gives the steps before the instructions of a sitting (forms, device check), `find_next_action`
+those after them, in this order of precedence: end of the session, limits of the sitting (`find_reached_limit`),
+demonstration, rest, reference, probe, trial.
 """
 
 from dataclasses import dataclass

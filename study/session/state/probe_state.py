@@ -2,11 +2,9 @@
 
 A probe is a known multisine force of about a second, played between two trials; the acceleration that it causes gives
 the apparent mass of the handle with the hand on it, and so shows whether device or grip changed during the session. A
-reference is a longer force with no hand on the handle, played once per sitting and again after a long pause; it shows
-the device alone. Their forces: `study.session.stimulus.probe_stimulus`; their settings: `[probes]` of a protocol.
-
-`machine` calls `find_due_probe` and `find_due_reference`; `fold` calls the others, which map a state and an event to
-the next state.
+reference is a longer force with no hand on the handle, played once per sitting and again after a long pause or rest
+(`apply_break`); it shows the device alone. Their forces: `study.session.stimulus.probe_stimulus`; their settings:
+`[probes]` of a protocol.
 """
 
 from __future__ import annotations
@@ -22,8 +20,8 @@ if TYPE_CHECKING:
 
 LARGEST_WEIGHT_HZ = 11.4
 """Frequency (Hz) at which the weighting Wh of hand-arm vibration (`vibration_dose.compute_hand_arm_weight`, ISO 5349-1)
-is largest. A probe has many frequencies; its whole acceleration is weighted as if it were at this one, so that the dose
-is never underestimated."""
+is largest. A probe has many frequencies; its whole acceleration is weighted as if it were at this one, so that the
+weight is never underestimated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +37,12 @@ class ProbeState:
     """The probe whose measurement is not in the log: it is playing, or the program ended while it played."""
     since_probe_s: float | None = None
     """Time (s) since the last probe with a hand in this sitting, or since the end of a shorter pause after it; None
-    before the first, and after a long pause."""
+    before the first, and after a long pause or rest."""
     is_reference_done: bool = False
-    """Whether the reference that is due once in this sitting, and again after a long pause, was declined or begun; it
-    begins with the test whether the handle is free."""
+    """Whether the reference of this sitting, or since a long pause or rest, was declined or begun; it begins with the
+    test whether the handle is free."""
     hand_mass_kg: float | None = None
-    """Apparent mass of the handle with the hand at the last such probe since a long pause; None where not known."""
+    """Apparent mass of the handle at the last probe with a hand since a long pause or rest; None where not known."""
     hand_level_n: float = 0.0
     """Level (N) of the probe that gave `hand_mass_kg`."""
 
@@ -71,8 +69,8 @@ def find_due_probe(state: ProbeState, settings: ProbeSettings) -> Probe | None:
 
 
 def find_due_reference(state: ProbeState, settings: ProbeSettings) -> Reference | None:
-    """Return the reference if it is due: once in a sitting, and only after the first probe with a hand, because a
-    comparison with that probe shows whether the handle is free. None where it is not due or the protocol has none."""
+    """Return the reference if it is due: not done yet, and a probe with a hand was played, because a comparison with
+    that probe shows whether the handle is free. None where it is not due or the protocol has none."""
     is_due = settings.reference_s > 0 and not state.is_reference_done and state.since_probe_s is not None
     return Reference() if is_due else None
 

@@ -1,9 +1,8 @@
 """State of a sitting apart from its trials: forms, device check, demonstration, and the vibration dose of the day.
 
-Part of the session's state, `SessionState.sitting`, with a function per logged event that returns the next state;
-called by `fold`, `fold_trial`, `daily_dose` and, for the present time, `make_watch_view`. `machine` and
-`make_watch_view` read durations and dose. The dose is that of the daily exposure A(8) (`vibration_dose`); a rest of
-`DAILY_REST_H` without movement of the handle starts a new day.
+Part of the session's state, `SessionState.sitting`, with functions that return the state after an event or at a later
+time. The dose is that of the daily exposure A(8) (`vibration_dose`); a rest of `DAILY_REST_H` without movement of the
+handle starts a new day.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ class SittingState:
     for the whole session; set-up and device check for one sitting."""
 
     consented: bool = False
-    """Whether the participant consented."""
     included: bool = False
     """Whether the exclusion form was passed: no exclusion criterion applies."""
     ineligibility: Literal["", "refused", "excluded"] = ""
@@ -47,10 +45,10 @@ class SittingState:
     device_checked: bool = False
     demo_done: bool = False
     demo_count: int = 0
-    """Number of demonstrations played in the session."""
+    """Number of demonstration stimuli played in the session."""
     debriefed: bool = False
     last_moment: Moment = Moment("")  # noqa: RUF009 - frozen
-    """Time of the last log entry; all durations below are given for this time."""
+    """Time of the last log entry, or later (`pass_time`); `sitting_elapsed_s` and `still_s` are given for it."""
     sitting_elapsed_s: float | None = None
     """Seconds since the handle first moved in this sitting; None before."""
     busy_voids: int = 0
@@ -76,10 +74,9 @@ class SittingState:
 
 DAILY_REST_H = 10.0
 """Least rest (h) without movement of the handle that resets the daily dose to 0; chosen. The calendar date is not used,
-because midnight may fall into a sitting. Time is taken from the monotonic clock within a sitting and from the wall
-clock between sittings: setting the wall clock forward between sittings counts as rest, until it is set back."""
+because midnight may fall into a sitting. Time is taken from the monotonic clock within a sitting, where it was logged,
+otherwise from the wall clock: setting that forward between sittings counts as rest, until it is set back."""
 DAILY_REST_S = 3600 * DAILY_REST_H
-"""`DAILY_REST_H` in seconds."""
 
 
 def apply_form(sitting: SittingState, event: FormFilled) -> SittingState:

@@ -1,8 +1,7 @@
 """State of a session: an immutable value, computed from the logged events by `study.session.state.fold`.
 
-The state depends on the log alone, so that the same log always gives the same state (event sourcing); an interrupted
-session is resumed from its log. `fold` and `fold_trial` compute the states, `machine` the next action from a state;
-`study.workflows` and `study.session.watching` read the states.
+The state depends on the log alone (event sourcing), so that an interrupted session is resumed from its log. `machine`
+gives the next action from a state.
 """
 
 from dataclasses import dataclass, field, replace
@@ -28,7 +27,7 @@ class SessionState:
     """Position in the schedule, open trial, presentations so far, and state of the current sitting."""
 
     opened: SessionOpened
-    """The opening event of the log: participant, device, seed."""
+    """The opening event of the log, with the participant number of `assign_place`, if there is one."""
     protocol: StudyProtocol
     runs: tuple[Run, ...]
     """Schedule of the participant, in order."""
@@ -43,7 +42,7 @@ class SessionState:
     presented: TrialPresented | None
     """The presentation that is not completed; None between trials."""
     answered: AnswerGiven | None
-    """The answer of the open trial, whose measurement is not logged yet; None before it."""
+    """The answer of the open trial, whose measurement is not logged yet; None without one."""
     trials: tuple[Trial, ...]
     """All presentations so far, including void presentations, and the open trial as the last."""
     rest_due_s: float
@@ -121,7 +120,7 @@ def assign_place(state: SessionState, participant_number: int) -> SessionState:
 
 
 def make_current_rule(state: SessionState) -> StaircaseRule:
-    """Make the staircase rule of the current run; unused in a practice run. Raises IndexError if all runs are done."""
+    """Make the staircase rule of the current run. Raises IndexError if all runs are done."""
     return make_staircase_rule(state.protocol, state.runs[state.run].phase)
 
 

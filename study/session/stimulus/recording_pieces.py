@@ -1,12 +1,11 @@
 """Pieces of a recording: the segments of a protocol as commands, a piece for each sinusoid, sweep or multisine
-realisation.
+realisation (`make_pieces`).
 
     rest | fade in and settling | evaluated part | fade out | rest
 
 A sweep has no settling and no fade-out, and is evaluated from its beginning. An analysis uses only the evaluated part:
 whole periods at constant amplitude (except the first period of a sweep, which is faded in where others follow, and
-contains the transient). `workflows.recording.record_device` makes the pieces; `workflows.recording.play_pieces` plays
-each separately, and again with less force where the accelerometer clipped (`RecordingPiece.scale_to`).
+contains the transient).
 """
 
 from dataclasses import dataclass, replace
@@ -111,7 +110,7 @@ def _make_sweep_piece(
     protocol: RecordingProtocol, number: int, segment: SweepSegment, sample_rate_hz: float
 ) -> RecordingPiece:
     """Make the piece of a sweep. With several periods it is faded in during the first, which contains the transient;
-    every period ends at zero, so that no fade-out is needed."""
+    a period contains whole cycles and so ends near zero: no fade-out is needed."""
     period_samples = round(segment.duration_s * sample_rate_hz)
     wave = np.tile(
         make_log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period_samples, sample_rate_hz),
@@ -135,7 +134,7 @@ def _make_sweep_piece(
 def _make_multisine_pieces(
     protocol: RecordingProtocol, number: int, segment: MultisineSegment, sample_rate_hz: float
 ) -> list[RecordingPiece]:
-    """Make a piece for each realisation of a multisine. A multisine does not start at zero; therefore fades lie outside
+    """Make a piece for each realisation of a multisine. A multisine need not start at zero; therefore fades lie outside
     the evaluated periods."""
     period_samples, fade_samples = round(segment.duration_s * sample_rate_hz), round(protocol.fade_s * sample_rate_hz)
     harmonic_numbers = list_lines_between(

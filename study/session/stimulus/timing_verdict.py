@@ -2,8 +2,8 @@
 
 Lateness is the time from the moment at which a tick of the control loop is due to its actual wake-up. A real device
 does not wait: a loop that wakes up more than one tick late has missed that tick. A simulated device waits for its
-computer, so that lateness is only a warning there. Called by `study.workflows.checks` (`hapteq doctor`, device check);
-whether a single trial is void for its timing is decided by `study.workflows.trial.judge_trial`.
+computer, so that lateness is only a warning there. Whether a single trial is void for its timing is decided by
+`study.workflows.trial.judge_trial`.
 """
 
 import math
@@ -16,7 +16,6 @@ from study.session.facts.void_reasons import LOAD_PER_PROCESSOR
 from study.session.views.participant_views import DeviceFinding
 
 MS_PER_S = 1000.0
-"""Milliseconds per second."""
 
 MAX_P99_TICKS = 1.0
 """Limit, exclusive, of the 99th percentile of the lateness, in ticks: 1 ms at 1 kHz. A tick that is later is missed."""
@@ -33,7 +32,7 @@ BUSY_LOAD = 1.0
 """Load average per processor from which all cores count as busy: one running task per processor."""
 
 ADVICE = "Close other programs, switch power saving off, and measure again."
-"""Advice for a finding that is not fine because of late or missed ticks."""
+"""Advice for a finding that is not fine because of lateness."""
 
 
 @dataclass(frozen=True, slots=True)

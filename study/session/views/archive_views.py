@@ -1,7 +1,7 @@
 """Data classes of the start screen and of the viewers of past sessions and diagnoses.
 
 They contain plain values and import no analysis, so that a screen opens quickly. `study.workflows.views` fills them
-from files; `study.tui` and `study.cli` show them.
+from files.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,6 @@ class SessionLine:
     subject: str
     """Participant code."""
     protocol: str
-    """Name of the protocol."""
     begun_utc: str
     """Time (UTC, ISO 8601) at which the session was opened; for a withdrawn session the time of the withdrawal, for an
     unreadable one the time of the last change of its folder (empty if not known)."""
@@ -44,7 +43,6 @@ class SessionLine:
     runs: int
     """Number of runs in the plan."""
     standing: SessionStatus
-    """Status of the session."""
     remark: str = ""
     """Note for the list, such as the reason why the session cannot be read."""
 
@@ -94,7 +92,6 @@ class Staircase:
     levels_n: tuple[float, ...]
     """Level of the staircase at each trial (N), before roving."""
     correct: tuple[bool, ...]
-    """Whether the answer was right."""
     reversals: tuple[bool, ...]
     """Whether the staircase reversed at that trial."""
     threshold_n: float | None
@@ -129,7 +126,6 @@ class DiagnosisView:
     """Contents of one `diagnosis.json`."""
 
     path: str
-    """Path of the file."""
     verdict: str
     """Result in one sentence."""
     sentences: tuple[str, ...]

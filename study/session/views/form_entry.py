@@ -1,9 +1,7 @@
 """State machine of a form while it is filled in: each key, click or paste gives the next state from the previous one.
 
-States are immutable, and nothing is drawn here: `study.tui.screens.form` calls these functions and draws the state;
-`study.tui.widgets.choice_row` uses the functions of a single row of choices, `form_question` and line mode
-(`plain_forms`) other names of this module. Keys are applied in the order of arrival, so that an answer belongs to the
-question at which the cursor was when the key arrived, however fast the keys are pressed.
+States are immutable, and nothing is drawn here: `study.tui.screens.form` draws them. Keys are applied in the order of
+arrival, so that an answer belongs to the question at which the earlier keys have left the cursor.
 """
 
 from dataclasses import dataclass, replace

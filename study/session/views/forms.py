@@ -1,8 +1,7 @@
 """Forms of a session, made from its protocol, and the evaluation of a filled form.
 
 Consent, exclusion criteria, questionnaires before and after the trials, set-up, and release of the handle. The data
-classes are those of `form_views`. Called by `machine` (which form is due), `prepare_sitting` and `play_probe`;
-`study.cli.conduct` and `engine_commands` take the texts of a protocol (`make_words`).
+classes are those of `form_views`. Begin with `make_form` and `judge_form`.
 """
 
 from dataclasses import dataclass

@@ -1,10 +1,8 @@
 """Data classes that the participant's display shows, and the participant's replies to them.
 
-No value reveals level, frequency or correctness of a trial, so that the display cannot give hints. The module is quick
-to import, because a screen shows its first frame before numerical libraries are loaded. `study.workflows` makes the
-values, with `Progress` from `study.session.state.progress`; the displays (`study.tui`, simulated participants) show
-them and give the replies. The findings of device checks (`DeviceFinding`) are also made by `study.devices` and
-`study.session.stimulus.timing_verdict`, and printed by `hapteq doctor`.
+No value reveals level, frequency or correctness of a single trial, so that the display cannot give hints. The module
+is quick to import, because a screen shows its first frame before numerical libraries are loaded. `study.workflows`
+makes the values; the displays (`study.tui`, simulated participants) show them and give the replies.
 """
 
 from __future__ import annotations
@@ -43,14 +41,12 @@ class Welcome:
     """Information that a participant reads before the first trial."""
 
     title: str
-    """Title of the study."""
     picture: DirectionPicture
     runs: int
     """Number of runs in the session, without training and practice."""
     training_runs: int
     """Number of runs of training, practice included."""
     device: str
-    """Name of the device."""
     device_moves: bool
     """Whether a real device moves, so that the answers are not only practice; true for a simulated participant."""
     resumed_after: int
@@ -59,7 +55,7 @@ class Welcome:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of the session, computed from numbers of runs and trials only, because levels must not be revealed."""
+    """Progress of the session, computed without stimulus levels, because these must not be revealed."""
 
     share_done: float
     """Fraction of the session done, 0 to 1."""
@@ -143,7 +139,7 @@ DemoChoice = PlayDemo | DemoDone
 
 @dataclass(frozen=True, slots=True)
 class DeviceFinding:
-    """One finding of the device check, shown as a line."""
+    """One finding of a device check or of `hapteq doctor`, shown as a line."""
 
     name: str
     """What was checked."""

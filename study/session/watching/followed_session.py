@@ -2,8 +2,7 @@
 
 The state is computed from the log event by event, as in the running session (`study.session.state.fold`). What the
 state does not keep of them is kept in addition: notes, forms with their times, remarks on trials, recordings of probes,
-and why the sitting ended. `watch_session` and `session_references` apply the events; `make_watch_view`,
-`followed_trials` and `watch_alarms` read the result, and `session_drift` the probes.
+and why the sitting ended. Begin with `begin_watching` and `apply_followed_event`.
 """
 
 from dataclasses import dataclass, replace

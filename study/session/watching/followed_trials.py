@@ -1,4 +1,4 @@
-"""Trials and runs of a followed session as the experimenter's view shows them; called by `make_watch_view`.
+"""Trials and runs of a followed session as the experimenter's view (`watch_view`) shows them.
 
 The direction of a trial is withheld until its answer counts, because an experimenter who knows the direction could
 reveal it to the participant.
@@ -104,8 +104,8 @@ def list_last_trials(session: FollowedSession) -> tuple[ClosedTrial, ...]:
 
 def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
     """Make the table row of an answered or void trial. remark: reason of a void trial, or another remark."""
-    # The direction and correctness of a void trial stay hidden, because the same stimulus is presented again. They stay
-    # hidden, too, until the health of the device is judged, because the trial may still become void.
+    # The direction and correctness of a void trial stay hidden, because the same stimulus may be presented again. They
+    # stay hidden, too, until the health of the device is judged, because the trial may still become void.
     is_revealed = trial.is_valid and not _is_open(state, trial)
     phase = "practice" if state.runs[trial.run].practice else trial.phase.value
     return ClosedTrial(

@@ -1,7 +1,5 @@
-"""The experimenter's view of a followed session, computed from its log, its live state and the time.
-
-Called by `study.workflows.views.watch_session`. Without side effects: the same arguments give the same view.
-"""
+"""The experimenter's view of a followed session, computed from its log, its live state and the time without side
+effects (`make_watch_view`)."""
 
 from dataclasses import dataclass
 

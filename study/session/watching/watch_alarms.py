@@ -1,5 +1,5 @@
-"""Alarms for the experimenter who follows a session: faults of device, sensor, computer or program, limits that are
-reached, trials that go wrong, and adverse events. `make_watch_view` calls `find_alarms`.
+"""Alarms for the experimenter who follows a session (`find_alarms`): faults of device, sensor, computer or program,
+limits that are reached, trials that go wrong, and adverse events.
 
 Each check is a function of the situation (`Situation`), listed in order of urgency in `_RUNNING_CHECKS` and
 `_ENDED_CHECKS`; it returns one alarm, or None where there is no reason for one."""
@@ -285,7 +285,7 @@ def _check_answer_time(situation: Situation) -> Alarm | None:
 
 
 _END_KINDS = ("gone", "ended")
-"""Kinds of alarms about the end of a sitting, which `find_alarms` reports only for a limited time."""
+"""Kinds of alarms about the end of a sitting, which `find_alarms` reports to a new viewer for a limited time only."""
 _ENDED_CHECKS: tuple[Callable[[Situation], Alarm | None], ...] = (
     _check_log,
     _check_program_ended,

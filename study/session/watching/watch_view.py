@@ -2,8 +2,8 @@
 
 The view contains no seed, and the direction of a trial only once its answer counts, because an experimenter who knows
 the direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a
-screen adds 1. `make_watch_view` makes the view; screens, text lines and `hapteq watch --json` show it. Levels are
-stimulus amplitudes, stated as force (N). The values are plain, so that the module imports quickly.
+screen adds 1. Levels are stimulus amplitudes, stated as force (N). The values are plain, so that the module imports
+quickly.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,6 @@ class StaircasePoint:
     level_n: float
     """Level of the staircase (N), before roving."""
     correct: bool
-    """Whether the answer was right."""
     reversal: bool
     """Whether the staircase reversed its direction at this trial."""
 
@@ -68,7 +67,7 @@ class OpenTrial:
     level_n: float
     catch: bool
     presented_s: float
-    """Time since its presentation (s)."""
+    """Time since the presentation (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,19 +195,16 @@ class WatchView:
     utc: str
     """Time of the view (UTC, ISO 8601)."""
     session: str
-    """Name of the session."""
     subject: str
     """Code of the participant."""
     protocol: str
     """Title of the protocol."""
     device: str
-    """Name of the device."""
     simulated: bool
     """Whether the device is simulated, so that no real handle moves."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     standing: SittingStatus
-    """Status of the session."""
     reason: str
     """Reason why the session does not run, in words; empty while it runs."""
     activity: str

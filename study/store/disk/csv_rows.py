@@ -1,8 +1,5 @@
 """CSV tables whose columns are the fields of a frozen dataclass, in declared order: conversion to and from text.
 
-The tables of sessions, exports and proofs (`study.store.formats`, `study.workflows.results`, `study.evaluation`) are
-written and read by this module.
-
 Booleans are `true` and `false`, None is an empty field, enumerations are their values, and floats have all digits that
 are needed to read the same number again (`repr`).
 """
@@ -132,7 +129,7 @@ def format_csv_line(row_fields: Sequence[str]) -> str:
 
 def describe_type(column_type: Any) -> str:
     """Describe the content of a column in words, for the documentation of a table. column_type: bool, int, float, str,
-    an enumeration, or one of these or None; KeyError for others."""
+    an enumeration, or one of these or None."""
     if get_origin(column_type) in (Union, UnionType):
         (option_type,) = (option for option in get_args(column_type) if option is not NoneType)
         return f"{describe_type(option_type)}, or empty"

@@ -1,7 +1,6 @@
 """Errors for files that cannot be read, used or written, each with cause and remedy.
 
-They are shown to the user without further text. Raised by the readers and writers of files in `study`; the session log
-has errors of its own (`event_log`).
+They are shown to the user without further text.
 """
 
 import csv
@@ -101,7 +100,8 @@ _CAPITALIZED_WORDS = {
     "column",
     "and",
 }
-"""First words of problems that are capitalized; any other first word is a key or a name, which keeps its case."""
+"""First words of problems that are capitalized; any other first word is taken for a key or a name and keeps
+its case."""
 
 
 def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:

@@ -3,8 +3,7 @@ format is opened (`open_hdf5`); files are written atomically.
 
 A sealed file begins with a user block (bytes that the HDF5 library ignores), which states the SHA-256 checksum and the
 size of all bytes after it. The checksum is verified before the HDF5 library opens the file, because the library may
-hang on a damaged file. Called by the readers and writers of HDF5 formats in `study.store.formats` (recordings, models,
-calibrations), by `study.importing`, and by commands that recognise a file by its content.
+hang on a damaged file.
 """
 
 import hashlib
@@ -164,7 +163,7 @@ def open_any_hdf5(path: Path, kind: str, *, sealed: bool = False) -> Iterator[An
                 raise UnusableFileError(path, kind, (str(problem),)) from problem
             yield file
     except DAMAGE_ERRORS as problem:
-        # h5py raises all of these for damaged files; an UnusableFileError from above is none of them and passes.
+        # h5py may raise these for damaged files; an UnusableFileError from above is none of them and passes.
         raise UnusableFileError(
             path, kind, (f"it is not HDF5 that can be read, or it is cut off ({problem})",)
         ) from problem

@@ -1,8 +1,7 @@
 """Access rights: participants' data are readable only by the account that recorded them.
 
-Folders of a study have mode 700 and their files 600, regardless of the umask. A new file elsewhere gets the usual
-rights (666 minus umask) where its folder is open to others, otherwise 600. Called where files and folders are created
-(`study.store`, `study.workflows`, `study.cli`); commands (`study.cli`) and the screen show its warnings.
+Folders of a study have mode 700 and their files 600, unless a data folder is exempt (`explain_kept_rights`). A new
+file elsewhere gets the usual rights (666 minus umask) where its folder is open to others, otherwise 600.
 """
 
 import contextlib
@@ -55,7 +54,7 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
 
 def restrict_to_owner(folder: Path, *, recursive: bool = False) -> None:
     """Remove the rights of group and others from a folder; recursive: also from all its contents. Links are not
-    followed, and files of another account are unchanged. Never raises OSError."""
+    followed, and what cannot be changed is left as it is. Never raises OSError."""
     with contextlib.suppress(OSError), open_folder(folder.absolute()) as opened_folder:
         _restrict_folder(opened_folder, recursive)
 

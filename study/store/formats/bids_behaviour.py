@@ -1,7 +1,6 @@
 """Trials as BIDS behaviour: per participant and session a TSV, one JSON for all of them, and the dataset's other files.
 
-Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recordings)". Missing values are n/a. Called
-by `study.workflows.results.export_study`.
+Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recordings)". Missing values are n/a.
 """
 
 import json

@@ -1,8 +1,7 @@
 """Identified models as HDF5 files: the format `hapteq-model`, version 1.
 
 A model is a discrete-time linear state space, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k], with its band, units,
-uncertainty and quality; `equalizer.plant.identified_model` validates it. `identify_model` writes these files. They are
-read for playback, equalized stimuli, `export_controller`, the start screen, `hapteq validate` and reproductions.
+uncertainty and quality; `equalizer.plant.identified_model` validates it.
 """
 
 import json
@@ -117,7 +116,7 @@ def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrit
 
 
 QUALITY_NUMBER_NAMES = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
-"""Names of the numbers in `ModelQuality`; each is an attribute of the file."""
+"""Names of the numbers in `ModelQuality`, and of their attributes in the file."""
 
 
 def _write_quality(file: Any, quality: ModelQuality) -> None:

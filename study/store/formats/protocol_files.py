@@ -1,8 +1,7 @@
 """Read protocols, shipped ones by name and others by path; write and check the locks of protocols.
 
 A lock (`NAME.lock.json`) fixes a protocol before data are collected (preregistration): a protocol that differs from its
-lock is refused. Called by the commands that take a protocol (`study.cli`), by `study.workflows` and by
-`study.evaluation.reproduction`.
+lock is refused. Begin with `read_protocol`.
 """
 
 import os

@@ -2,8 +2,7 @@
 
 Psych-DS, schema version 0.4.0 (https://psych-ds.github.io), sets the file names (`keyword-value` pairs, ending in
 `_data.csv`) and `dataset_description.json` (schema.org JSON-LD that names every column). The protocol is stored in
-`materials/`, so that `hapteq analyze` can analyse the dataset again. Called by
-`study.workflows.results.export_study`; `tidy_csv` reads its tables with `read_described_trials`.
+`materials/`, so that `hapteq analyze` can analyse the dataset again.
 """
 
 import json

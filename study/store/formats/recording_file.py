@@ -1,9 +1,8 @@
 """Recordings as HDF5 files: read into SI units with all checks, written atomically.
 
-`recording_layout` defines the format. Called wherever recordings are read or written, for example by
-`study.workflows.recording` and `study.workflows.equalizer`. Helpers that read a part of the file raise ValueError with
-the problem; `read_recording` collects these, so that the user sees all of them at once, and checks the consistency of
-the recording where there are none.
+`recording_layout` defines the format. Helpers that read a part of the file raise ValueError with the problem;
+`read_recording` collects these, so that the user sees all of them at once, and checks the consistency of the recording
+where there are none.
 """
 
 import json
@@ -81,9 +80,9 @@ def write_recording(
     precision: Literal["float32", "float64"] = "float64",
     overwrite: bool = False,
 ) -> None:
-    """Write a recording. `precision` applies to all signals but the position; position and time are always float64, to
-    resolve micrometres in a large workspace. Raises AlreadyExistsError where the file exists and `overwrite` is False,
-    CannotWriteError where it cannot be written, ValueError for an inconsistent recording."""
+    """Write a recording. `precision` applies to all signals but the position, which is always float64, to resolve
+    micrometres in a large workspace. Raises AlreadyExistsError where the file exists and `overwrite` is False,
+    CannotWriteError where it cannot be written, ValueError for an inconsistent recording or NaN in the metadata."""
     if inconsistencies := check_recording(recording):
         raise ValueError(f"this recording cannot be written: {'; '.join(inconsistencies)}")
 

@@ -2,7 +2,6 @@
 
 A folder is named by participant code and session number, as in `P01_001`. Folders of withdrawn sessions remain, with a
 tombstone (a small file that states the withdrawal) in place of the data, so that their numbers are not used again.
-Called by all workflows that open, create or list sessions, and by the commands that take the name of a session.
 """
 
 import contextlib
@@ -51,7 +50,7 @@ class SessionFolder:
 
     @property
     def tombstone(self) -> Path:
-        """Path of the tombstone; the file exists only after a withdrawal."""
+        """Path of the tombstone, which only a withdrawal writes."""
         return self.path / TOMBSTONE_NAME
 
     @property

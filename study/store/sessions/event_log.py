@@ -2,8 +2,7 @@
 
 A program appends the line and syncs it to the disk (fsync) before it acts on the event (write-ahead), so that no action
 follows from an event that the log lacks. Lines are never rewritten; only an incomplete last line, which a crash or a
-failed write leaves, is removed. Written by `open_session`, `resume_session`, `sitting` and `take_note`; read by the
-workflows that show, analyse or continue a session.
+failed write leaves, is removed. `EventLog` writes a log, `read_log` reads it.
 """
 
 import contextlib

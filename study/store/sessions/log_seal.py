@@ -4,10 +4,6 @@ The hash chain of the log alone (`log_chain`) cannot show that lines are missing
 with its chain; the seal shows both. A seal is never rewritten: a note that is added after closing gets a further seal
 (`seal-2.json`, ...). Each seal covers the log from its beginning to the length at which the seal was written. There is
 no key: the replacement of both log and seal is not detected.
-
-`study.workflows.session.run_session`, `session_results` and `take_note` write seals;
-`study.workflows.results.fold_session` checks them before the answers of a session are used, and `session_line` before a
-session is listed from its log without applying the events.
 """
 
 import hashlib
@@ -126,8 +122,7 @@ def check_seals(folder: Path, log_contents: LogContents) -> int:
 
 def is_sealed(folder: Path, log_bytes: bytes) -> bool:
     """Whether there is a seal, all lines are complete, and none contradicts the hash chain; events are not parsed.
-    log_bytes: content of the log. Raises StudyError as `check_seals`.
-    """
+    log_bytes: content of the log. Raises StudyError as `check_seals`."""
     *lines, incomplete_line = log_bytes.split(b"\n")
     chain = Chain()
     try:

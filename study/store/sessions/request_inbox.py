@@ -2,8 +2,7 @@
 
 The sender writes a file under a temporary name and renames it, so that the session never reads an incomplete request;
 the session reads and removes it. The final name is unique and begins with the kind of request, so that a stop is
-recognised even if its content cannot be read. Sent by `study.workflows.views` (`send_request`, `watch_session`),
-`hapteq watch` and `hapteq stream`, taken by the session's program (`study.workflows.session.conduct_session`).
+recognised even if its content cannot be read.
 """
 
 import errno
@@ -91,8 +90,8 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """Remove all files but notes, such as old requests to stop or pause and unusable requests, at the start of a
-        sitting. Notes are kept for the log. Never raises."""
+        """Remove all files but unread notes, such as old requests to stop or pause and unusable requests, at the start
+        of a sitting. Notes are kept for the log. Never raises."""
         try:
             self._make_folder()
             names = os.listdir(self._folder)  # noqa: PTH208
@@ -103,10 +102,10 @@ class RequestInbox:
                 self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
-        """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first; invalid ones are set
-        aside. Never raises."""
+        """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first; invalid ones other than
+        stops are set aside. Never raises."""
         try:
-            # listdir takes half the time of Path.iterdir, twenty times a second.
+            # listdir takes half the time of Path.iterdir.
             file_names = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
         except OSError:
             return ()

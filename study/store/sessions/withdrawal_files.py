@@ -2,9 +2,7 @@
 
 The intent is a single file in the data folder, `<code>.withdrawal.json`, with all that will be erased, so that an
 interrupted withdrawal can be completed. While it exists, no session of the participant may be used as data. A
-tombstone, `withdrawn.json`, replaces the contents of a session folder and holds no measured value. Called by
-`study.workflows.session` (`withdraw_participant`, `participant_traces`, `participant_number`), and by
-`session_line` and `session_recognisers`, which describe a withdrawal that is not complete.
+tombstone, `withdrawn.json`, replaces the contents of a session folder and holds no measured value.
 """
 
 from collections.abc import Mapping
@@ -27,7 +25,7 @@ WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
 @dataclass(frozen=True, slots=True)
 class SessionParticipant:
     """Participant of a withdrawn session as its tombstone states it: protocol, whether simulated, and place in the
-    counterbalanced order. It contains no measured value."""
+    counterbalanced order."""
 
     protocol: str
     simulated: bool

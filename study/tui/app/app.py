@@ -2,7 +2,7 @@
 never blocks on work.
 
 A second process, the engine (`study.tui.engine`), controls the device, writes to disk and analyses; both exchange
-messages by `EngineConnection`. Run by `study.cli.screen`.
+messages by `EngineConnection`.
 """
 
 from __future__ import annotations
@@ -48,9 +48,8 @@ from study.tui.watch.watch_controller import WatchController
 
 class HapteqApp(App[None]):
     """The application of `hapteq study` and `hapteq resume`; handlers `on_...` and `action_...` are called by textual.
-    On every screen F1 shows help, F9 changes the colours, Ctrl-C switches the force off, Ctrl-Q leaves; in a sitting F2
-    shows the experimenter's view once the session is open, F4 records a note (with Shift: an adverse event), F7
-    pauses."""
+    F1 shows help, F9 changes the colours, Ctrl-C and Ctrl-Q leave; in a sitting they switch the force off, F2 shows the
+    experimenter's view once the session is open, F4 records a note (with Shift: an adverse event), F7 pauses."""
 
     TITLE = "hapteq"
     # Notifications are at the top, because the instructions and keys of a screen are at the bottom.
@@ -108,8 +107,7 @@ class HapteqApp(App[None]):
         return self._engine.pid
 
     def close_engine(self) -> None:
-        """Wait until the force is off and the log is closed, and store the outcome of a sitting that still ran. Called
-        after `run`."""
+        """Wait until the engine has ended, and store the outcome of a sitting that still ran. Called after `run`."""
         self._watch_controller.end_feed()
         self._engine.close()
         if self._sitting is not None:

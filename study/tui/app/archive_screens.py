@@ -1,9 +1,9 @@
 """Screens of the terminal interface outside sittings: start screen, past sessions, diagnoses, calibration of the
 sensor.
 
-Used by `app`. Screens exchange messages with the engine, a separate process that reads files and computes
-(`study.tui.engine`). Their modules are imported when they are first shown, or before in the background
-(`load_screens`), so that the program starts quickly.
+Screens exchange messages with the engine, a separate process that reads files and computes (`study.tui.engine`). Their
+modules are imported when they are first shown, or before in the background (`load_screens`), so that the program starts
+quickly.
 """
 
 from __future__ import annotations

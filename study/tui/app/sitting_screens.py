@@ -2,7 +2,7 @@
 
 The engine runs the session in another process. A request (`ScreenRequest`) for a trial arms the trial's screen, which
 is opened at the first; each other request opens a screen on top. The result is sent back with the number of the
-request. Used by `app`.
+request.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class SittingScreens:
         self._preparing_screen: PreparingScreen | None = None
 
     async def handle_message(self, message: FromEngine) -> None:
-        """Handle one message of the engine, in the order of arrival."""
+        """Handle one message of the engine; those that do not concern a sitting are ignored."""
         match message:
             case ScreenRequest():
                 await self._open_request_screen(message)

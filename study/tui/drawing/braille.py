@@ -1,8 +1,7 @@
 """Raster graphics in a UTF-8 terminal: a canvas of braille characters (from U+2800), each with 2 x 4 dots.
 
-Used by the drawings of staircases, directions, numbers, recordings and the target of the handle. Lines are sampled at
-each dot; filled shapes are convex polygons, drawn row by row (scan lines). The grid of dots is nearly square, because a
-character cell is about twice as high as wide. Coordinates are in dots.
+Lines are sampled at each dot; filled shapes are convex polygons, drawn row by row (scan lines). The grid of dots is
+nearly square, because a character cell is about twice as high as wide. Coordinates are in dots.
 """
 
 import math

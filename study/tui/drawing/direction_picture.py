@@ -1,10 +1,8 @@
 """Drawings and descriptions of the two directions between which a participant decides.
 
 A direction is a line segment in a plane at an angle in degrees, counted from the plane's first axis towards its second;
-it has no sign. The two segments differ in number, position and line style, not in colour, so that they can be
-distinguished on every terminal. They are drawn with Braille dots (2 x 4 per character). Proportions of segments,
-arrowheads, dashes and barbs are chosen by hand. Called by the widget `direction_panel` and by line mode
-(`plain_question`, `plain_demo`).
+it has no sign. The two segments differ in angle and line style, not in colour, so that they can be distinguished on a
+terminal without colours. Proportions of segments, arrowheads, dashes and barbs are chosen by hand.
 """
 
 import math
@@ -52,8 +50,8 @@ def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9)
 
 @lru_cache(maxsize=64)
 def draw_large_direction(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
-    """Draw one direction (1 or 2) as large as fits into columns x rows characters: a thick segment with an arrowhead at
-    both ends; 1 solid, 2 dashed. The results are cached."""
+    """Draw one direction (1 or 2) in columns x rows characters: a thick segment with an arrowhead at both ends; 1
+    solid, 2 dashed. Its length: `_compute_half_length`."""
     canvas = Canvas(columns, rows)
     unit_right, unit_up = _project_to_screen(picture.plane, picture.angle_deg[number - 1])
     centre_x, centre_y = canvas.centre

@@ -1,7 +1,7 @@
 """Client of the engine process in the process that draws the screen: start it, deliver its messages, detect its end.
 
 The engine is the process that drives the device and runs the session; the screen only draws. The drawing thread never
-blocks: one further thread starts the engine and reads from it, another writes to it. Called by `app.engine_connection`.
+blocks: one further thread starts the engine and reads from it, another writes to it.
 """
 
 import contextlib

@@ -1,9 +1,8 @@
 """Main program of the engine process, which runs sessions, drives the device, writes to disk and analyses.
 
 A separate process is used so that none of this can block the screen. It receives commands and sends results through a
-pipe, and runs as long as the pipe exists. `study.tui.engine.client`, in the screen's process, starts it. When the
-screen's process ends for any reason, the device is released, the log of a running session records its interruption, and
-the engine ends.
+pipe, and runs as long as the pipe exists. When the screen's process ends, the device is released, the log of a running
+session records its interruption, and the engine ends; by force where its main thread hangs (`_force_exit`).
 """
 
 import faulthandler
@@ -27,10 +26,10 @@ if TYPE_CHECKING:
     from study.tui.engine.engine_commands import EngineCommands
 
 SESSION_MODULES = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
-"""Modules that are imported while the user types the participant's code, so that a session starts quickly."""
+"""Modules that are imported while no command waits, so that a session starts quickly."""
 
 ANALYSIS_MODULES = ("study.workflows.results.analyze_data",)
-"""Modules of statistics and plots, imported next if no command waits, so that results appear quickly."""
+"""Modules of statistics and plots, imported next, so that results appear quickly."""
 
 FORCED_EXIT_S = 5.0
 """Time (s) from the loss of the screen to the forced end of this process. The device was stopped before. Chosen by

@@ -1,8 +1,8 @@
 """Commands of the screen, as the engine performs them one after another.
 
 They are: lists and views of sessions and diagnoses, whole sittings, analyses, diagnoses, withdrawals, the calibration
-of the accelerometer, and requests to sessions of other programs. Results and progress are sent to the screen as
-messages of `from_engine`. `study.tui.engine.engine` calls `EngineCommands.perform`.
+of the accelerometer, and requests to sessions of other programs (`EngineCommands.perform`). Results and progress are
+sent to the screen as messages of `from_engine`.
 """
 
 import contextlib

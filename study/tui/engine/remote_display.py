@@ -1,8 +1,8 @@
 """The engine's implementation of the display port (`study.workflows.trial.display.Display`), by messages to the screen
-process. Made by `engine_commands` for each sitting.
+process.
 
-While a stimulus may play, `sign_of_life` (the keep-alive call that resets the device's watchdog) is called at least
-every `KEEPALIVE_INTERVAL_S`, so that the safety limits of the vibration hold even if the screen hangs. A missing
+While a stimulus may play, `sign_of_life` (the keep-alive call that resets the device's watchdog) is called after waits
+of at most `KEEPALIVE_INTERVAL_S`, so that the safety limits of the vibration hold even if the screen hangs. A missing
 heartbeat of the screen ends the trial.
 """
 
@@ -38,7 +38,7 @@ from study.workflows.checks.computer_load import get_load_per_processor
 from study.workflows.trial.display import SignOfLife
 
 KEEPALIVE_INTERVAL_S = 0.04
-"""Longest interval (s) between two calls of `sign_of_life`. Chosen: well below the 0.1 s that the port allows
+"""Longest wait (s) before a call of `sign_of_life`. Chosen: well below the 0.1 s that the port allows
 (`display.SignOfLife`)."""
 HANDLE_POLL_INTERVAL_S = 0.1
 """Interval (s) at which the wait for the handle reads its position again. Chosen by hand."""

@@ -1,4 +1,4 @@
-"""The engine's end of the pipe to the screen. Used by `engine`, `engine_commands` and `remote_display`.
+"""The engine's end of the pipe to the screen.
 
 A thread reads all messages while the main thread runs a session, so that Ctrl-C at the screen switches the force off at
 once. It sorts messages into commands, replies and requests, and detects that the screen's process has ended.
@@ -84,7 +84,7 @@ class ScreenLink:
             return None
 
     def drop_replies(self) -> None:
-        """Drop replies to an earlier sitting, whose requests had the same numbers."""
+        """Drop replies to an earlier sitting, whose requests may have had the same numbers."""
         while not self._replies.empty():
             self._replies.get()
 

@@ -1,8 +1,7 @@
 """Messages from the screen's process to the engine process, sent pickled through the pipe.
 
 They are plain values, and the module imports no slow module, so that the first frame appears soon. `from_engine` has
-the messages of the other direction. The application (`study.tui.app`) and its screens send them; `screen_link` receives
-them, and `engine_commands` performs the commands.
+the messages of the other direction.
 """
 
 from dataclasses import dataclass
@@ -18,7 +17,6 @@ class SessionOrder:
     protocol: str
     """Name of a shipped protocol, or path of a protocol file."""
     device: str
-    """Name of the device."""
     subject: str
     """Participant code."""
     data: str
@@ -73,7 +71,6 @@ class Resume:
     session: str
     """Path of its folder, or its name in the data folder."""
     device: str
-    """Name of the device."""
     data: str
     """Path of the data folder."""
 
@@ -116,7 +113,6 @@ class CalibrateSensor:
     port: str
     """Name of the serial port."""
     baud: int
-    """Baud rate of the serial port."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +147,7 @@ class Interrupt:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """Sign of life of the screen's event loop, ten times a second."""
+    """Sign of life of the screen's event loop."""
 
 
 @dataclass(frozen=True, slots=True)

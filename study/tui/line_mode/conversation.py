@@ -1,7 +1,6 @@
 """Dialogue of line mode: write sentences to the terminal and wait for typed lines.
 
-While it waits, it calls the sign of life of the session, which keeps the device running and may end the wait. Used by
-`PlainDisplay` and the functions of `plain_forms`, `plain_demo`, `plain_question` and `plain_pause`.
+While it waits, it calls the sign of life of the session, which keeps the device running and may end the wait.
 """
 
 import textwrap
@@ -125,7 +124,7 @@ class Conversation:
 
 
 def remove_control_characters(text: str) -> str:
-    """Remove control characters, such as those of arrow keys, and surrounding blanks."""
+    """Remove control characters and surrounding blanks."""
     return "".join(character for character in text if character.isprintable()).strip()
 
 

@@ -1,6 +1,6 @@
 """Line mode: the demonstration menu, and the waits while a stimulus plays or the handle is moved to its place.
 
-Called by `PlainDisplay`. During each wait, `sign_of_life` is called at every poll; it returns False to end the wait.
+During each wait, `sign_of_life` is called at every poll; it returns False to end the wait.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Line mode: the display of a session in plain sentences, for any terminal, a screen reader, or answers from a pipe.
 
 `PlainDisplay` implements the display port by the functions of `plain_forms`, `plain_demo`, `plain_question` and
-`plain_pause`, which share a `Conversation`. Made by `study.cli.conduct`.
+`plain_pause`, which share a `Conversation`.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Line mode: forms, one question after another, and the device check. Called by `PlainDisplay`."""
+"""Line mode (sessions in plain lines of text): forms, one question after another, and the device check."""
 
 from protocols.wording.words import Words
 from study.session.views.form_entry import CONFIRMED_KINDS
@@ -13,7 +13,7 @@ BACK = "b"
 
 def ask_form(form: Form, conversation: Conversation) -> FormReply:
     """Ask all fields of a form, one after another; `b` returns to the previous field. In the forms of `CONFIRMED_KINDS`
-    (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt when the participant leaves."""
+    (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt for q and at the end of input."""
     conversation.discard_early_lines()
     words = conversation.words
     conversation.say("", form.title, *filter(None, (form.introduction, describe_form_origin(form, words))))

@@ -1,8 +1,7 @@
 """Screen of the labelled demonstration before the trials, in which a participant feels each direction of motion.
 
-The participant plays both directions at each vibration frequency, any number of times, with the labels shown, and so
-learns what the answers of the later trials mean. The screen returns one choice at a time; the session plays it. Opened
-by `study.tui.app.sitting_screens`.
+The participant can play both directions at each vibration frequency, any number of times, with the labels shown, to
+learn what the answers of the later trials mean. The screen returns one choice at a time; the session plays it.
 """
 
 from typing import ClassVar
@@ -95,7 +94,6 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
             self._redraw(describe_felt_directions(self._menu, self._vibration, self.words))
 
     def action_pause(self) -> None:
-        """Ask the application for a pause."""
         self.post_message(self.PauseWanted())
 
     def action_done(self) -> None:

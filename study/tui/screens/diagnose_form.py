@@ -1,7 +1,7 @@
 """Form for the input of a diagnosis: recordings or a session, and the model of the device to compare with.
 
-The form checks only that the entered paths exist, and posts `DiagnoseRequested`; the engine process runs the diagnosis.
-Opened by the start screen (`home`) and the screen of a session (`session`).
+The form checks only that the entered recordings and model exist, and posts `DiagnoseRequested`; the engine process runs
+the diagnosis.
 """
 
 import shlex

@@ -2,7 +2,6 @@
 
 It shows the verdict, the identified effects, alternative explanations (candidates and rivals), the recording that is
 recommended next, and tables of errors before and after the effects are added. The contents come from `DiagnosisView`.
-Opened by `study.tui.app.archive_screens`.
 """
 
 from typing import ClassVar

@@ -1,8 +1,7 @@
 """Screen of a form, such as consent, exclusion criteria, questionnaires or set-up.
 
 The rules of filling in (valid answers, movement of the cursor, changes to be confirmed) are in
-`study.session.views.form_entry`: each key turns a `FormEntry` into the next, and this screen draws the result. Opened
-by `study.tui.app.sitting_screens`.
+`study.session.views.form_entry`: each key turns a `FormEntry` into the next, and this screen draws the result.
 """
 
 from dataclasses import dataclass
@@ -55,9 +54,8 @@ FOOTER_KEYS = frozenset(key for key, *_ in FOOTER_ENTRIES)
 
 
 class FormScreen(TranslatedScreen[FormReply]):
-    """Screen that draws a `FormEntry`: introduction, questions, and the button Continue; the keys are in
-    `FOOTER_ENTRIES`. Its result is the reply. No widget has the focus: the screen itself receives keys, clicks and
-    pastes, and applies them in order of arrival."""
+    """Screen that draws a `FormEntry`: introduction, questions, and the button Continue. Its result is the reply. No
+    widget has the focus: the screen itself receives keys, clicks and pastes, and applies them in order of arrival."""
 
     PAGE = "help_form"
     DEFAULT_CSS = """
@@ -107,7 +105,6 @@ class FormScreen(TranslatedScreen[FormReply]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        """Draw the empty form."""
         self._show(self._entry)
 
     @property
@@ -122,7 +119,6 @@ class FormScreen(TranslatedScreen[FormReply]):
         return index < len(self._entry.form.fields) and self.query(FormQuestion)[index].stacked
 
     def on_key(self, event: Key) -> None:
-        """Apply a key to the form."""
         is_handled = self._apply(apply_key(self._entry, event.key, event.character, self.stacked))
         # Otherwise the binding of a footer key would act on it, later than on the keys that follow.
         if is_handled or event.key in FOOTER_KEYS:
@@ -130,7 +126,6 @@ class FormScreen(TranslatedScreen[FormReply]):
             event.prevent_default()
 
     def on_paste(self, event: Paste) -> None:
-        """Insert pasted text."""
         event.stop()
         self._apply(paste_text(self._entry, event.text))
 

@@ -1,8 +1,6 @@
-"""The start screen: a form to begin a new session, and the list of past sessions.
+"""The start screen: a form to begin a new session, and the list of sessions.
 
-It appears before the engine has read the list of sessions, which is filled in later (`HomeScreen.show`). Opened by
-`study.tui.app.archive_screens`.
-"""
+It appears before the engine has read the list of sessions, which is filled in later (`HomeScreen.show`)."""
 
 from typing import ClassVar
 
@@ -92,7 +90,7 @@ In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SES
 
 
 class HomeScreen(Screen[None]):
-    """Form of a new session, and list of past sessions. F2 and F3 move to form and list, F4 opens a file, F6 reads the
+    """Form of a new session, and list of sessions. F2 and F3 move to form and list, F4 opens a file, F6 reads the
     list again, F7 calibrates the accelerometer, F8 diagnoses recordings. Requests are posted as messages of
     `study.tui.home_messages`. home: content; None if it is not loaded yet."""
 

@@ -1,7 +1,4 @@
-"""Panel after a sitting, a stop or a failure: what happened, what was saved, and the next steps with their keys.
-
-Opened by `study.tui.app.app`; `study.tui.app.outcomes` makes the content.
-"""
+"""Panel after a sitting, a stop or a failure: what happened, what was saved, and the next steps with their keys."""
 
 from __future__ import annotations
 

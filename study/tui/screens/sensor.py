@@ -1,8 +1,7 @@
 """Screen that guides through the six-position calibration of the accelerometer, step by step.
 
 The engine reads the sensor and computes the calibration (`study.devices.accelerometer.calibration`); this screen shows
-its messages and sends the user's replies. Opened by the start screen (`home`); `study.tui.app.archive_screens` passes
-the messages of the engine to it.
+its messages and sends the user's replies.
 """
 
 from typing import ClassVar

@@ -1,7 +1,6 @@
 """Screen of one past session: its facts, thresholds, staircases, log and report, and the actions that it allows.
 
-The screen shows a `SessionView` and posts messages, on which the application and its engine act. Opened by
-`study.tui.app.archive_screens`; `diagnosis` uses `open_report`.
+The screen shows a `SessionView` and posts messages, on which the application and its engine act.
 """
 
 from pathlib import Path

@@ -1,8 +1,7 @@
 """Screen of a trial: a two-alternative forced choice between two directions, or two intervals, by the keys 1 and 2.
 
 Nothing on it depends on level or frequency. Whether an answer was right is shown only where the protocol gives
-feedback. `study.tui.app.sitting_screens` arms the screen for each question and forwards its replies to the engine.
-"""
+feedback."""
 
 import time
 from dataclasses import dataclass
@@ -41,7 +40,7 @@ REQUEST_VALIDITY_S = 3.0
 """Time (s) for which a request to pause or leave that is made between two questions is kept. Chosen. A question that
 comes within it is answered with the request at once."""
 NUM_LOCK_OFF_KEYS = {"end", "down", "kp_begin"}
-"""Names of the keys that a numeric keypad sends while Num Lock is off, in place of digits."""
+"""Names of the keys that a numeric keypad sends in place of 1, 2 and 5 while Num Lock is off."""
 
 
 class TrialScreen(TranslatedScreen[None]):
@@ -226,7 +225,7 @@ class TrialScreen(TranslatedScreen[None]):
             self._time_limit_timer = None
 
     def _explain_refused_key(self, event: Key) -> None:
-        """Show why a key that is no reply has no effect; keys without a character are ignored."""
+        """Show why a key that is no reply has no effect; other keys without a character are ignored."""
         if event.key in NUM_LOCK_OFF_KEYS:
             self._show_message(self.words["num_lock"])
         elif event.is_printable or event.key == "enter":

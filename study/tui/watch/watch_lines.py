@@ -1,8 +1,8 @@
 """Format the state of a running session as lines of text, for `hapteq watch --plain`, which works without a full-screen
 terminal.
 
-Called by `study.cli.watch`. `format_changes` gives a line for each difference between two views, `format_view` the
-whole view. What a view may contain, so that the experimenter cannot give away an answer, is decided in `watch_view`.
+`format_changes` gives lines for the differences between two views, `format_view` the whole view. What a view may
+contain, so that the experimenter cannot give away an answer, is decided in `watch_view`.
 """
 
 from study.session.watching.watch_view import ClosedTrial, WatchView

@@ -62,7 +62,7 @@ def format_status_line(view: WatchView) -> Content:
 
 
 def format_alarms(new_alarms: Sequence[Alarm], acknowledged_alarms: Sequence[Alarm]) -> Content:
-    """Format alarms with their times: new ones first, acknowledged ones below."""
+    """Format alarms: new ones first, with their start times, acknowledged ones below."""
     new_lines = [
         Content.assemble((f"▲ {alarm.sentence}", "bold $text-error"), (f"  since {format_local_time(alarm.since)}", ""))
         for alarm in new_alarms

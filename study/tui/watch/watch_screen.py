@@ -1,5 +1,5 @@
 """Screen of `hapteq watch`, and of F2 and w in `hapteq study`: the experimenter's view of a running session, without
-the direction of the open trial, with keys for stop, pause and notes. Shown by `watch_app` and `watch_controller`."""
+the direction of the open trial, with keys for stop, pause and notes."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _make_key(alarm: Alarm) -> AlarmKey:
 POLL_EVERY_S = 0.1
 """Interval (s) at which the source is asked for a new view, and the alarms are updated. Chosen."""
 STOP_TIMEOUT_S = 2.0
-"""Time (s) after which a stop without effect is an alarm. Chosen: a session reads requests twenty times a second."""
+"""Time (s) after which a stop without effect is an alarm. Chosen."""
 STALE_AFTER_S = 3.0
 """Time (s) without a new view after which an alarm states that the view is out of date. Chosen."""
 MESSAGE_DURATION_S = 8.0
@@ -163,7 +163,7 @@ class WatchScreen(Screen[None]):
         self.poll()
 
     def poll(self) -> None:
-        """Check for a new view, for alarms, and whether a stop was executed. Called every `POLL_EVERY_S`."""
+        """Check for a new view, for alarms, and whether a stop was executed."""
         view = self._source.latest()
         if view is not None and view is not self._latest_view:
             self._latest_view = view

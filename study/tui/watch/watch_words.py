@@ -1,8 +1,5 @@
 """Texts of the experimenter's view of a running session, shared by its screen (`watch_screen`, `watch_panels`) and
-`hapteq watch --plain` (`watch_lines`).
-
-Each function but `is_unmeasured` formats a value of a `WatchView` as words or as a number with its unit.
-"""
+`hapteq watch --plain` (`watch_lines`)."""
 
 from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import split_time_in_zone
@@ -156,8 +153,8 @@ def describe_device(view: WatchView) -> str:
 
 
 def describe_drifts(view: WatchView) -> str:
-    """Describe the number of drifts that the probes show (friction, gain, delay, grip), and how many exceed their
-    limits; "none in 3 probes" without a drift, empty without probes."""
+    """Describe the number of drifts that the probes show, and how many exceed their limits; "none in 3 probes" without
+    a drift, empty without probes."""
     if not view.probes:
         return ""
     over_limit_count = sum(drift.beyond for drift in view.drifts)

@@ -1,7 +1,4 @@
-"""Selection of a single choice among a few (radio buttons), side by side if they fit, otherwise listed vertically.
-
-Used by the screens `form` and `note`, and by `form_question`.
-"""
+"""Selection of a single choice among a few (radio buttons), side by side if they fit, otherwise listed vertically."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -21,10 +18,9 @@ CHOICE_GAP_CELLS = 3
 
 
 class ChoiceRow(Widget, can_focus=True):
-    """Choices side by side, or one below the other where they do not fit. Arrow keys move the cursor; Space or a click
-    selects, Enter selects and goes to the next question, a digit or first letter selects (`find_choice`). Nothing is
-    selected unless `chosen`, the index of an earlier answer, is given. Moving the cursor does not select, because
-    consent must be deliberate."""
+    """Row or list of choices. Arrow keys move the cursor; Space or a click selects, Enter selects and posts
+    `Submitted`, a digit or first letter selects (`find_choice`). Nothing is selected at first unless `chosen`, the
+    index of an earlier answer, is given. Moving the cursor does not select, because consent must be deliberate."""
 
     DEFAULT_CSS = """
     ChoiceRow { height: auto; width: 1fr; }
@@ -85,7 +81,7 @@ class ChoiceRow(Widget, can_focus=True):
             self._select_choice(index)
 
     def find_choice_at(self, x: int, y: int) -> int | None:
-        """Find the index of the choice drawn in the cell at column x and row y; None between choices."""
+        """Find the index of the choice drawn in the cell at column x and row y; None where there is none."""
         for index, (column, row) in enumerate(self._place_choices(self.size.width)):
             if row == y and column <= x < column + len(self._format_label(index)):
                 return index
@@ -143,8 +139,8 @@ class ChoiceRow(Widget, can_focus=True):
         return [(sum(label_widths[:index]) + CHOICE_GAP_CELLS * index, 0) for index in range(len(label_widths))]
 
     def _move_vertically(self, step: int) -> bool:
-        """Move the cursor through vertically listed choices. Returns False beyond their ends and for choices side by
-        side; the form then handles the key and goes to another question."""
+        """Move the cursor through vertically listed choices. Returns False beyond their ends, for Up without a cursor,
+        and for choices side by side."""
         new_cursor = move_mark(self.cursor, step, len(self._choices), stop_at_ends=False) if self.stacked else None
         if new_cursor is None:
             return False

@@ -1,8 +1,7 @@
-"""Form of the start screen (`study.tui.screens.home`) that begins a session: participant, protocol, device, and a model
+"""Form of the start screen (`study.tui.screens.home`) for a new session: participant, protocol, device, and a model
 where the protocol needs one.
 
-Problems are shown while typing, from the list of sessions on the screen; the program that begins a session checks
-again.
+Problems are shown while typing, from the list of sessions on the screen.
 """
 
 from typing import ClassVar
@@ -85,7 +84,7 @@ class NewSessionForm(Vertical):
     @on(Input.Submitted, "#code")
     @on(Button.Pressed, "#begin")
     def _submit(self) -> None:
-        """Post `BeginRequested`, or show the problem and focus its field. Does nothing while the button is disabled."""
+        """Submit the form (see the class); does nothing while the button is disabled."""
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
@@ -171,8 +170,8 @@ class NewSessionForm(Vertical):
         return value if isinstance(value, str) else ""
 
     def _set_options(self, selector: str, options: list[tuple[str, str]]) -> None:
-        """Set the options (text, value) of a list; the selection is kept where it is still available. The texts contain
-        names of files: brackets in them are no markup, and control characters are not printed."""
+        """Set the options (text, value) of a list; the selection is kept where it is still available, else it is the
+        first. Brackets in the texts, as in names of files, are no markup, and control characters are replaced."""
         select: Select[str] = self.query_one(selector, Select)
         previous_value = select.value
         values = [value for _, value in options or PLACEHOLDER_OPTIONS]
@@ -214,6 +213,5 @@ def _extract_file_name(path: str) -> str:
 
 
 def _extract_protocol_name(name_or_path: str) -> str:
-    """Extract the name of a protocol that is given by name or path. Assumes that a file is named after its protocol;
-    for other files the notice about an unfinished session is not shown."""
+    """Extract the name of a protocol that is given by name or path. Assumes that a file is named after its protocol."""
     return name_or_path.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")

@@ -89,8 +89,7 @@ class SessionTable(DataTable[Content | str]):
     def _fit_columns(self, start_title: str) -> dict[str, int]:
         """Compute the column widths (cells) by title, and store the table's width for which they hold. The column of
         answers is left out where the protocols do not fit on one line, that of runs where less than
-        `_MIN_PROTOCOL_WIDTH` remains: the start screen states both below the list. start_title: title of the column of
-        times."""
+        `_MIN_PROTOCOL_WIDTH` remains then. start_title: title of the column of times."""
         self._fitted_width = self.size.width
         names, protocols = ([getattr(line, attribute) for line in self._lines] for attribute in ("name", "protocol"))
         widths = {_NAME_TITLE: max(map(len, (_NAME_TITLE, *names))), _STATUS_TITLE: _FIXED_WIDTHS[_STATUS_TITLE]}
@@ -156,7 +155,7 @@ class SessionTable(DataTable[Content | str]):
             self.post_message(WatchRequested(self._selected_line.path))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Show in the footer only actions that apply to the session under the cursor."""
+        """Disable actions that do not apply to the session under the cursor, and hide them in the footer."""
         needed_status = {"resume": "unfinished", "watch": "running"}.get(action)
         return needed_status is None or (
             self._selected_line is not None and self._selected_line.standing == needed_status

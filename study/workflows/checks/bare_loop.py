@@ -1,9 +1,8 @@
 """Reference for the timing of a device's control loop: an empty real-time loop in C (`bare_loop.c`), run in parallel.
 
-It gives the least number of late ticks that this computer can reach under the same load. The program is compiled for
-each measurement, by the system's compiler or that of the optional dependency `compiler`; without a compiler, on
-Windows, and where compiling or running it fails, the finding states that no comparison was made. Called by
-`examine_setup` (`hapteq doctor`).
+It estimates the least number of late ticks that this computer can reach under the same load. The program is compiled
+for each measurement, by the system's compiler or that of the optional dependency `compiler`; without a compiler, on
+Windows, and where compiling or running it fails, the finding states that no comparison was made.
 """
 
 import contextlib

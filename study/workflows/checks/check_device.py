@@ -1,7 +1,6 @@
 """Check whether a device is fit for a session: kind, readings, position, accelerometer, sample rate, largest force.
 
-The idle device is read `READING_COUNT` times, which takes half a second; no force is commanded. Limits without a stated
-source are heuristic. Called before every sitting (`prepare_sitting`) and by `hapteq doctor` (`examine_setup`).
+The idle device is read for half a second; no force is commanded. Limits without a stated source are heuristic.
 """
 
 import math
@@ -18,7 +17,7 @@ from study.session.views.participant_views import DeviceFinding, DeviceReport
 READING_COUNT = 50
 """Number of readings. Chosen: enough for a mean position and a noise level, within half a second."""
 READING_INTERVAL_S = 0.01
-"""Interval between two readings (s). Chosen: ten ticks of the device's loop, so that every reading is a new one."""
+"""Interval between two readings (s). Chosen: ten ticks at 1 kHz, so that every reading is a new one."""
 
 MIN_ANSWER_FRACTION = 0.9
 """Smallest accepted fraction of valid readings (with a position or an acceleration); also, of the valid readings, of
@@ -26,8 +25,7 @@ those with a position and of those with an acceleration. Chosen below 1, because
 one."""
 
 MAX_DISTANCE_MM = 20.0
-"""Largest accepted distance of the handle from the place where trials start (mm). At this distance the centring spring
-of the shipped protocols pulls with a few newtons."""
+"""Largest accepted distance of the handle from the place where trials start (mm). Chosen."""
 
 MAX_NOISE_MPS2 = 1.0
 """Largest accepted acceleration at rest (m/s², root of the summed variances of the three axes). Chosen above the
@@ -37,7 +35,6 @@ REQUIRED_RATE_HZ = 1000.0
 """Sample rate of the device's loop for which stimuli are made (Hz)."""
 
 MM_PER_M = 1000.0
-"""Millimetres per metre."""
 
 ORIGIN_M = (0.0, 0.0, 0.0)
 """Place where trials start if none is given: the origin of the device's coordinates (m)."""
@@ -51,8 +48,8 @@ def check_device(
     safety: SafetySettings | None = None,
     with_sensor: bool = True,
 ) -> DeviceReport:
-    """Check an idle device, and return a finding for each property; takes `READING_COUNT` times `READING_INTERVAL_S`.
-    Faults are findings, not exceptions. Position and accelerometer are judged only if a reading is valid.
+    """Check an idle device, and return a finding for each property that can be judged: position and accelerometer only
+    if a reading is valid. Faults are findings, not exceptions.
 
     place_m: position (x, y, z) where trials start (m). total_cap_n: largest force that will be commanded (N); None:
     unknown. safety: force limits for the finding that states them; None: no such finding. with_sensor: False if the

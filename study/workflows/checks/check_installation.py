@@ -1,7 +1,7 @@
 """Check that this computer meets the requirements of a study: Python and packages, terminal, data folder, privacy.
 
 Each check returns one or more `DeviceFinding`, with advice where something is wrong; a missing part is a finding, not
-an error. Called by `examine_setup`; `hapteq doctor` (`study.cli.doctor`) passes the detected terminal.
+an error. `check_installation` runs all of them.
 """
 
 import importlib.util
@@ -29,7 +29,7 @@ IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
 """Top-level packages of hapteq, whose generic names another distribution or file could shadow."""
 
 MIN_TERMINAL_SIZE = (80, 24)
-"""Columns and rows of a terminal in which every screen fits."""
+"""Columns and rows of a terminal for which the screens are made."""
 
 MIN_FREE_BYTES = 10**9
 """Free disk space (bytes) below which it is reported: 1 GB, chosen as enough for about ten sessions with all
@@ -48,8 +48,8 @@ class Terminal:
 
 
 def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """Run all checks, for `hapteq doctor`. data: folder of the sessions. terminal: from `detect_terminal()`. Writes a
-    temporary empty file into `data`, or into its nearest existing parent."""
+    """Run all checks. data: folder of the sessions. terminal: from `detect_terminal()`. Writes a temporary empty file
+    into `data`, or into its nearest existing parent."""
     distributions_by_package, package_folder = packages_distributions(), Path(study.__file__).parents[1]
     return (
         *check_packages(),

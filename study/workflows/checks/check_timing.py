@@ -2,8 +2,7 @@
 
 Two measures: the ticks that the loop itself counts as late or missed, and the lateness of its readings or, without
 telemetry and for a simulated device, of this program's wake-ups. `study.session.stimulus.timing_verdict` holds the
-limits. `examine_setup` (`hapteq doctor`) calls `check_timing`; `prepare_sitting` calls `check_computer` before each
-sitting.
+limits. `check_computer` is a shorter check before a sitting.
 """
 
 from collections.abc import Callable
@@ -51,7 +50,7 @@ class Timing:
     lateness: Lateness
     """Lateness of the readings or wake-ups, see `check_timing`."""
     findings: tuple[DeviceFinding, ...]
-    """Judgements of loop, missed and late ticks, lateness and force, for the user."""
+    """Judgements of loop, missed ticks, late ticks (of a real device), lateness and force."""
 
 
 def check_timing(
@@ -110,9 +109,9 @@ def measure_wake_lateness_s(
 def _measure_loop_lateness_s(
     device: Device, clock: Clock, duration_s: float, should_continue: Callable[[float], bool]
 ) -> FloatArray:
-    """Measure the lateness (s), (n,), of the readings of a real device's loop, from the time stamps of its telemetry;
-    without telemetry, and for a simulated device, of this program's wake-ups. A single value, duration_s, where no tick
-    was read.
+    """Measure the lateness (s), (n,), of the readings of a real device's loop, from the time stamps of its telemetry (a
+    single value, duration_s, where it has no tick); without telemetry, and for a simulated device, of this program's
+    wake-ups.
 
     The lateness of tick k is its time stamp minus k / rate, relative to the smallest such difference. After missed
     ticks it is counted from the time at which the first of them was due.
@@ -129,7 +128,7 @@ def _measure_loop_lateness_s(
         missed_count_blocks.append(ticks.missed)
     raw_lateness_s = np.concatenate(raw_lateness_blocks_s or [np.zeros(0)])
     if not len(raw_lateness_s):
-        return np.array([duration_s])  # no tick was read: late by the whole time
+        return np.array([duration_s])  # late by the whole time
     cumulative_missed: FloatArray = np.concatenate(missed_count_blocks)
     lateness_s: FloatArray = (
         raw_lateness_s - raw_lateness_s.min() + np.diff(cumulative_missed, prepend=cumulative_missed[:1]) / rate_hz
@@ -148,7 +147,7 @@ def _keep_device_alive(device: Device, on_progress: Callable[[float], None], don
 def _judge_timing(
     device: Device, duration_s: float, health: Health, lateness: Lateness, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    """Judge loop, missed ticks, for a real device late ticks, lateness, and whether no force was commanded."""
+    """Make the findings of `Timing.findings`."""
     simulated, late_ticks = device.info.simulated, health.late_ticks + health.missed_ticks
     late_finding = judge_late_ticks(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
     return (

@@ -1,7 +1,7 @@
 """Daily check of a device: play the excitation of its acceptance without a hand, and compare both recordings.
 
-`hapteq doctor` carries it out (`study.cli.doctor`, `examine_setup`); before each sitting, `prepare_sitting` reads the
-last result (`judge_last_check`).
+`record_baseline` records at the acceptance, `check_today` carries out the check, and `judge_last_check` reads the last
+result before a sitting.
 """
 
 import contextlib
@@ -101,7 +101,7 @@ def _record_baseline_on(device: Device, plan: RecordingPlan, motion_callbacks: M
 
 
 def require_acceptable_device(device_name: str) -> None:
-    """Require a device that can be accepted. Raises WrongUseError for a device that is never accepted."""
+    """Raise WrongUseError for a device that is never accepted, such as a simulated one."""
     if not needs_real_time(device_name):
         raise WrongUseError(
             "There is nothing to compare with", f"{device_name!r} is never accepted.", "Leave --daily out."
@@ -226,7 +226,7 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
 
 
 def _find_baseline_digest(info: DeviceInfo) -> str:
-    """Find the SHA-256 of the baseline of this device's acceptance; empty where it is not accepted now."""
+    """Find the SHA-256 of the baseline of this device's acceptance; empty where it has none or is not accepted now."""
     try:
         return find_accepted_baseline(info, datetime.now(UTC).date())[1]
     except DeviceError:

@@ -1,5 +1,4 @@
-"""Run all checks of a set-up before a study: installation, device, and timing of the 1 kHz force loop. Called by
-`hapteq doctor` (`study.cli.doctor`).
+"""Run all checks of a set-up before a study (`hapteq doctor`): installation, device, timing of the 1 kHz force loop.
 
 The timing of the device's loop is compared with that of a bare loop in a process of its own, which separates delays of
 the computer from those of this program. After a successful examination a device may be accepted for use with a hand.
@@ -72,8 +71,8 @@ def examine_setup(
     device_name: str, data: Path, timing_s: float, terminal: Terminal | None, on_progress: Callable[[float], None]
 ) -> Examination:
     """Run all checks in real time. device_name: as `open_device` takes it; data: data folder; terminal: None outside a
-    terminal. timing_s: duration of the timing (s), 0 for none; on_progress: as for `check_timing`. A device that cannot
-    be opened, or is lost, results in a finding, not an error."""
+    terminal. timing_s: duration of the timing (s), 0 for none; on_progress: as for `check_timing`. A DeviceError is a
+    finding; the StudyError for an unusable recording or calibration of a simulated device escapes."""
     installation = check_installation(data, terminal)
     device_report, timing = _examine_device(device_name, timing_s, on_progress)
     return Examination(installation, device_report, timing)
@@ -132,8 +131,7 @@ def _make_settings(device_name: str, timing_s: float) -> DeviceSettings:
 
 
 def require_sensor(examination: Examination) -> None:
-    """Require a working accelerometer, without which a daily check would record no acceleration. Raises DeviceError
-    otherwise."""
+    """Raise DeviceError where a finding about the accelerometer is not fine: a daily check records accelerations."""
     if not examination.is_sensor_fine:
         raise DeviceError(
             "The daily check did not begin",
@@ -147,9 +145,9 @@ def accept_examined_device(
     device_name: str, examination: Examination, operator: str, motion_callbacks: MotionCallbacks
 ) -> str:
     """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
-    `operator`; returns a sentence about it. Without a working accelerometer no baseline is recorded. Raises DeviceError
-    without a timing, with a wrong finding other than of `OPTIONAL_FINDINGS`, and where baseline or acceptance fail,
-    WrongUseError for a simulated device."""
+    `operator`; returns a sentence about it. Without a working accelerometer no baseline is recorded. Raises StudyError
+    for a simulated device, without a timing, with a wrong finding other than of `OPTIONAL_FINDINGS`, and where baseline
+    or acceptance fail."""
     if not needs_real_time(device_name):
         raise WrongUseError("There is nothing to accept", f"{device_name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing

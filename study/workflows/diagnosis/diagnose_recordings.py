@@ -1,5 +1,4 @@
-"""Find the physics that a mechanical model lacks from recordings, and write the result folder; called by
-`hapteq diagnose` and, for the screens, by `diagnose_at_screen`.
+"""Find the physics that a mechanical model lacks from recordings, and write the result folder (`hapteq diagnose`).
 
 Steps: read the input, take or fit the model to compare with, add the virtual spring of a session, run the diagnosis
 (`analysis.diagnosis.diagnose`), write the results.

@@ -1,9 +1,7 @@
 """Read the input of a diagnosis: recordings or the trials of a session, and the model to compare with.
 
 Recordings are checked for consistent channels, units and rates, converted to forces where a force constant is given,
-and brought into the form in which they can be compared. Refusals of the analysis become StudyErrors.
-Called by `diagnose_recordings`, `fit_first_model`, `clean_recordings`, `fit_without_model` and
-`study.evaluation.real.diagnose_real`.
+and brought into the form in which they can be compared.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,16 +38,16 @@ class DiagnosisInput:
     spring_n_per_m: float = 0.0
     """Stiffness of the virtual spring that held the handle, whose force is not part of the commands (sessions only)."""
     constants: tuple[float, ...] = ()
-    """Force constants by which commands were multiplied, N or N m per unit of the command; empty for a session."""
+    """Force constants by which commands were multiplied, N or N m per unit of the command; empty without any."""
 
 
 def read_input(
     sources: Sequence[Path], seed: int, for_force_balance: bool = False, constants: tuple[float, ...] = ()
 ) -> DiagnosisInput:
-    """Read recordings, or the folder of one session. seed: of the choice among a session's trials. for_force_balance:
-    convert to one motion per force, as a force balance needs (`one_motion_per_force`). constants: see
-    `convert_commands_to_forces`; not used for a session, whose commands are forces. A session with reference probes is
-    represented by these (`find_references`) instead of its trials. Raises StudyError."""
+    """Read recordings, or the folder of one session; a session with reference probes is represented by these instead of
+    its trials (`find_references`). seed: of the choice among a session's trials. for_force_balance: convert to one
+    motion per force, as a force balance needs (`one_motion_per_force`). constants: see `convert_commands_to_forces`;
+    not used for a session, whose commands are forces. Raises StudyError."""
     session_folders = [source for source in sources if source.is_dir()]
     if session_folders and len(sources) > 1:
         raise make_not_diagnosable_error(
@@ -115,7 +113,7 @@ def _collect_notes(recordings_with_notes: Sequence[tuple[Recording, tuple[str, .
 
 
 def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalModel:
-    """Read the given model. Raises StudyError if it does not fit the recordings' device."""
+    """Read the given model. Raises StudyError, also if it does not fit the recordings' device."""
     model = read_mechanical_model(path)
     try:
         require_model_of(model, diagnosis_input.recordings)

@@ -1,8 +1,8 @@
 """Save discovered laws as Python files (effect files) and load them, as candidates of a later diagnosis.
 
 A diagnosis compares a catalogue of known physical effects, and may discover a formula without a name. Saved under a
-name, the formula joins the catalogue's effects in diagnoses of other recordings. Loading a file runs its code: load
-only files from a trusted source. Called by `hapteq effect` and, for the option --effect-file, by `diagnose_recordings`.
+name (`hapteq effect`), the formula joins the catalogue's effects in diagnoses of other recordings (--effect-file).
+Loading a file runs its code: load only files from a trusted source.
 """
 
 import importlib.util
@@ -98,8 +98,8 @@ def read_entries(paths: Sequence[Path], recordings: Sequence[Recording]) -> tupl
 
 
 def read_entry(path: Path) -> LawEntry:
-    """Load an effect file by running it. Raises StudyError if it does not exist, does not end in .py, fails, or defines
-    no ENTRY with a new valid name."""
+    """Load an effect file by running it. Raises StudyError if it does not exist, is no Python file, fails, or defines
+    no ENTRY with a valid name that is not in the catalogue."""
     module_spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
     if module_spec is None or module_spec.loader is None or not path.is_file():
         raise _make_effect_error(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
@@ -124,7 +124,7 @@ def read_entry(path: Path) -> LawEntry:
 
 def _read_laws(source: Path) -> list[Law]:
     """Read the discovered laws of a diagnosis (effects first, then candidates) or of a model file (.toml), in their
-    order. Raises StudyError."""
+    order. Raises StudyError for a file that cannot be read."""
     if source.suffix == ".toml":
         return [effect.law for effect in read_mechanical_model(source).effects if effect.law is not None]
     document: Diagnosis = read_diagnosis(source / "diagnosis.json" if source.is_dir() else source)

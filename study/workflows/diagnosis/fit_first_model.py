@@ -1,4 +1,4 @@
-"""Fit a first mechanical model (mass, damping, stiffness, modes) to recordings and write it; called by `hapteq model`.
+"""Fit a first mechanical model (mass, damping, stiffness, modes) to recordings and write it (`hapteq model`).
 
 The structure is given or chosen by `analysis.diagnosis.first_model.choose_structure`. The file also states why the
 structure was chosen and its largest error, over the channels, on held-out parts.
@@ -91,8 +91,8 @@ def fit_and_write_first_model(plan: FirstModelPlan, on_progress: Callable[[float
 
 
 def format_first_model(first_model: FittedFirstModel) -> tuple[str, ...]:
-    """Format lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters
-    with 95 % intervals, held-out error of each channel (%), and a sentence on the error that remains."""
+    """Format lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters,
+    held-out error of each channel (%), and a sentence on the error that remains."""
     choice, fit = first_model.choice, first_model.choice.fit
     parameter_lines = [_format_parameter(parameter) for parameter in fit.parameters]
     error_lines = [
@@ -114,7 +114,7 @@ def format_first_model(first_model: FittedFirstModel) -> tuple[str, ...]:
 
 
 def summarise_first_model(first_model: FittedFirstModel) -> dict[str, Any]:
-    """Summarise the fitted model as plain values, for the JSON document of `hapteq model --json`."""
+    """Summarise the fitted model as plain values, for a JSON document."""
     choice, fit = first_model.choice, first_model.choice.fit
     return {
         "model": str(first_model.plan.out),

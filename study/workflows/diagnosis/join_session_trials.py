@@ -3,10 +3,10 @@
 The recording of a trial begins in the middle of a vibration, whereas a simulation starts from rest. Therefore a lead-in
 precedes each trial: the trial's command, continued periodically and faded in, with an unknown response (NaN).
 
-The command is the planned excitation. The virtual spring that held the handle becomes part of the model, because a
-simulation that is driven by the recorded force of the spring would drift. Positions are left out: the encoders are on
-the motors' side of the cables, and the position at which a handle with friction comes to rest is random.
-`diagnosis_input` calls `join_session_trials` for the folder of a session.
+The command is the planned excitation where it was recorded. The virtual spring that held the handle then becomes part
+of the model, because a simulation that is driven by the recorded force of the spring would drift. Positions are left
+out: the encoders are on the motors' side of the cables, and the position at which a handle with friction comes to rest
+is random.
 """
 
 import math
@@ -34,8 +34,8 @@ information."""
 LEAD_S = 0.4
 """Duration of the lead-in before each trial (s). Chosen: a handle that is held by a hand settles in less time."""
 COMMON_PERIOD_S = 0.2
-"""Chosen period (s) of a trial's segment in the joined recording if it is a multiple of the trial's own period, so that
-more of the signal is compared; otherwise the trial's own period is used (`_choose_period`)."""
+"""Period (s) of a segment of the joined recording where it is a multiple of the trial's own period (`_choose_period`).
+Chosen, so that more of the signal is compared."""
 LEVEL_CLASS_DB = 4.0
 """Width (dB) of a class of levels, chosen: a staircase has too many levels to compare individually."""
 TRIALS_PER_TEST_TRIAL = 4
@@ -71,7 +71,7 @@ class _Trial:
 
 def join_session_trials(session: Path, seed: int) -> JoinedTrials:
     """Read the trials of a session and concatenate them. session: its folder. seed: of the random choice of trials if
-    there are too many, and of those held out for the test. Raises StudyError if no trial is usable."""
+    there are too many, and of those held out for the test. Raises StudyError, also if no trial is usable."""
     session_folder = find_session(str(session), session.absolute().parent)
     folded_session = fold_session(session_folder)
     session_opened = folded_session.state.opened
@@ -105,8 +105,8 @@ def join_session_trials(session: Path, seed: int) -> JoinedTrials:
 
 def _read_trial(path: Path, logged_hashes: Mapping[str, str | None]) -> _Trial | None:
     """Read a trial; None if samples are missing, if the recording has flags of a problem, if frequency, level or
-    segments are not stated, or if the file's hash differs from the log. logged_hashes: SHA-256 by file name, None where
-    the log has none (the trial is then left out)."""
+    segments are not stated, or if the file's hash differs from the log. logged_hashes: SHA-256 by the file's path below
+    the session's folder, None where the log has none (the trial is then left out)."""
     logged_name = f"{path.parent.name}/{path.name}"
     if logged_name in logged_hashes and compute_sha256(path) != logged_hashes[logged_name]:
         return None

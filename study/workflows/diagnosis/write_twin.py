@@ -1,5 +1,4 @@
-"""Identify a device's nominal mechanical model (digital twin) from recordings made for this purpose. Called by
-`study.cli.twin` (`hapteq twin`) and, for a session on the simulated device, by `diagnose_recordings`.
+"""Identify a device's nominal mechanical model (digital twin, `hapteq twin`) from recordings made for this purpose.
 
 Steps: record multisines at two amplitudes well above friction; fit masses, dampings, stiffnesses and modes to the
 stronger recording; estimate the equivalent viscous damping of dry friction from the increase of damping at the lower
@@ -64,7 +63,7 @@ class TwinPlan:
     band_hz: tuple[float, float] = (3.0, 60.0)
     """Fitted band: the frequencies of the shipped study with a margin. Modes above it would slow down simulations."""
     calibration: Path | None = None
-    """Calibration of the device's linkage, if any. The model then states how the inertia changes along each axis; a
+    """Calibration of the device's linkage, if any. The model then states how the inertia changes along each axis; the
     simulated device is given the calibration's linkage and masses."""
 
     @property

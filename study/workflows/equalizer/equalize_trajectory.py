@@ -2,7 +2,7 @@
 
 The forces are the feedforward of a finite-horizon LQR tracker (`equalizer.tracking.feedforward`) for identified models
 of the device, under a force cap. With `--physics`, forces that compensate known nonlinear effects along the predicted
-motion are added. Called by `study.cli.equalize` and, for solving without writing, by `repeat_trajectory`.
+motion are added. `equalize_trajectory` solves and writes, `solve_trajectory` does not write.
 """
 
 import math
@@ -39,8 +39,8 @@ gain; near the relative spacing of 64-bit floats (2e-16) it would be lost in rou
 class EqualizePlan:
     """Request of an equalization. models: files of identified models. trajectory: table of target accelerations. out:
     table of forces to write. at_m: place in the workspace (m), needed for models of several places. cap_n: largest
-    norm of the force (N); the default is the cap of the published study. constrain: keep the forces below the cap at
-    the cost of accuracy, instead of raising an error."""
+    norm of the force (N). constrain: keep the forces within the cap at the cost of accuracy, instead of raising an
+    error."""
 
     models: tuple[Path, ...]
     trajectory: Path
@@ -51,7 +51,7 @@ class EqualizePlan:
     cap_n: float = 3.0
     constrain: bool = False
     physics: Path | None = None
-    """Mechanical model whose named effects are compensated."""
+    """Mechanical model whose effects are compensated as far as possible; None: no compensation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

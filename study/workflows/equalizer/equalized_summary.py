@@ -1,8 +1,7 @@
 """Summary of `hapteq equalize`: predicted accuracy of the accelerations that the computed forces produce.
 
-`study.cli.equalize` prints it, as lines of text or as plain values in JSON; `repeat_trajectory` extends it by measured
-errors. Predicted errors of accelerations are rms errors in the band, relative to the rms of the reference trajectory,
-the accelerations that the device is to reproduce, in that band.
+Predicted errors of accelerations are rms errors in the band, relative to the rms of the reference trajectory, the
+accelerations that the device is to reproduce, in that band.
 """
 
 from typing import Any
@@ -126,8 +125,8 @@ def _format_quality_lines(equalized: EqualizedTrajectory) -> list[str]:
 
 
 def get_predicted_error(equalized: EqualizedTrajectory) -> float:
-    """Return the relative rms error that the model predicts. Under an active cap this is `TrackingLoss.error_capped`,
-    the error of the capped forces, so that it can be compared with the error without a cap."""
+    """Return the relative rms error that the model predicts; under an active cap that of the capped forces
+    (`TrackingLoss.error_capped`)."""
     loss = equalized.feedforward.loss
     return equalized.feedforward.error if loss is None else loss.error_capped
 

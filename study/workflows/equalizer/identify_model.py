@@ -1,10 +1,8 @@
-"""Identify a linear state-space model of a device from recordings, and write it to a file. Called by
-`study.cli.identify` (`hapteq identify`) and `reproduce_paper`.
+"""Identify a linear state-space model of a device from recordings, and write it to a file (`hapteq identify`).
 
 Steps: subtract the effects of a mechanical model, if one is given; estimate the frequency response and fit the model
 (`identify_recordings`); test it by free simulation of held-out segments (`validate_on_test`); write it with its
-quality, the position of the handle (place) and provenance. The result also contains the data for the report about it
-(`report_identification`).
+quality, the position of the handle (place) and provenance.
 """
 
 from collections.abc import Callable, Sequence
@@ -71,7 +69,7 @@ class IdentifiedDevice:
 
     plan: IdentifyPlan
     recordings: tuple[Recording, ...]
-    """Recordings as used for the fit: effects subtracted, and with the excitation as command (`plan.with_spring`)."""
+    """Recordings as fitted: effects subtracted (`plan.physics`), excitation as command (`plan.with_spring`)."""
     estimate: FrequencyResponse
     fitted: FrequencyResponse
     """Frequency response that the model was fitted to: the estimate, or its local averages."""
@@ -183,8 +181,7 @@ def _add_provenance(
 
 
 def _find_peak_amplitude_n(recordings: Sequence[Recording]) -> float:
-    """Find the largest amplitude (N) of the fitted segments; 0 without any. The model contains the equivalent
-    linearisation of friction at this amplitude."""
+    """Find the largest amplitude (N) of the fitted segments; 0 without any."""
     segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
     return max((segment.amplitude for segment in segments), default=0.0)
 

@@ -67,8 +67,8 @@ class ContactPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedTransient:
-    """Commands (N, 3), N, and measured acceleration (N, 3), m/s², in the model's band, of a play of the transient.
-    error: relative error in the band, as measured; noise included."""
+    """A play of the transient: commands (N, 3), N, and measured acceleration (N, 3), m/s², the latter in the model's
+    band. error: relative error in the band, as measured; noise included."""
 
     forces: FloatArray
     measured: FloatArray

@@ -1,8 +1,7 @@
 """Play computed forces on a device without a hand on the handle, and read the acceleration that they caused.
 
-Used by `repeat_trajectory` and `repeat_playback` (iterative learning) and by `play_contact` (a controller that renders
-contact): settings of the device (spring and safety limits), the notice before the first motion, the playback, and the
-check that the measured acceleration may be used.
+Settings of the device (spring and safety limits), the notice before the first motion, the playback, and the check that
+the measured acceleration may be used.
 """
 
 import math

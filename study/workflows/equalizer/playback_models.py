@@ -2,7 +2,7 @@
 
 Three cases: a single model; models of several places, between which the forces or the models are interpolated
 (`equalizer.tracking.workspace`); a narrow and a wide model of the same place (`equalizer.tracking.bands`). Models that
-cannot play a table of accelerations are refused. Used by `equalize_trajectory` and the workflows that play forces.
+cannot play a table of accelerations are refused.
 """
 
 import hashlib
@@ -74,7 +74,7 @@ class PlaybackModels:
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """Frequency band (Hz) for which an error is predicted: that common to all models with a weight above 0."""
+        """Band (Hz) for which an error is predicted: that common to the models of `at_place` with a weight above 0."""
         return select_used_models(self.at_place)[0][1].band_hz
 
     @property

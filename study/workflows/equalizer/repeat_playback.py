@@ -1,8 +1,7 @@
 """Iterative learning control on the device: play forces, measure the acceleration, correct the forces, play again.
 
 Order: check the plan, open the device, announce the motion, measure the noise at rest, then play and correct until the
-iteration ends or all repeats are played; the best forces are written. Called by `repeat_trajectory` (`hapteq equalize
---repeat N`).
+iteration ends or all repeats are played; the best forces are written if the plan names a file.
 """
 
 import contextlib
@@ -49,7 +48,7 @@ OnProgress = Callable[[int, float], None]
 def repeat_playback(
     plan: RepeatPlan, on_progress: OnProgress, before_moving: BeforeMoving = refuse_unannounced
 ) -> RepeatResult:
-    """Play the forces, then correct them and play again, at most `plan.repeats` times; write the best forces.
+    """Play the forces, then correct them and play again, at most `plan.repeats` times; write the best to `plan.out`.
 
     before_moving: see `BeforeMoving`. Raises StudyError before anything moves if a person holds the handle, the rates
     differ, forces exceed the cap, or an output exists or has no folder. Raises UserInterruptError after an interruption

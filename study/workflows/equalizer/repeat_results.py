@@ -1,7 +1,7 @@
 """Arguments and result of repeated playback (iterative learning control), and their files.
 
 The best forces are written as a table, with a JSON document next to it. A later run continues from these forces only if
-trajectory, model and table are unchanged (SHA-256). Called by `repeat_trajectory` and `repeat_playback`.
+trajectory, model and table are unchanged (SHA-256).
 """
 
 import hashlib

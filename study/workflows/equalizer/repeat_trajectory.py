@@ -1,4 +1,4 @@
-"""Iterative learning control of a trajectory on a device (`hapteq equalize --repeat N`, `study.cli.equalize`).
+"""Iterative learning control of a trajectory on a device (`hapteq equalize --repeat N`).
 
 `solve_trajectory` computes forces from the model; the convergence test of `equalizer.tracking.learning.convergence`
 limits the gain of the corrections; `repeat_playback` then plays the forces, measures the error of the acceleration and
@@ -39,8 +39,7 @@ from study.workflows.equalizer.repeat_playback import OnProgress, make_not_repea
 from study.workflows.equalizer.repeat_results import RepeatPlan, RepeatResult, read_earlier_forces
 
 SAFE_GAIN_FRACTION = 0.9
-"""Ratio of the gain that is used to the largest gain with which every error decreases (`Convergence.safe_beta`);
-chosen by hand."""
+"""Factor on the largest gain with which every error decreases (`Convergence.safe_beta`). Chosen."""
 
 
 @dataclass(frozen=True, slots=True)

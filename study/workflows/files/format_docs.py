@@ -1,8 +1,7 @@
 """Generate docs/formats.md, docs/importing.md and docs/schemas/*.json from the code that reads and writes the files.
 
-A program: `python -m study.workflows.files.format_docs docs`, which the Makefile calls, updates them;
-`tests/study/workflows/files/test_format_docs.py` fails where they differ from the code. Fixed texts of the pages are in
-`format_text` and `importing_text`.
+A program: `python -m study.workflows.files.format_docs docs` updates them; a test (`test_format_docs.py`) fails where
+they differ from the code. Most fixed texts of the pages are in `format_text` and `importing_text`.
 """
 
 import json
@@ -167,8 +166,8 @@ def generate_documents() -> dict[str, str]:
 
 
 def write_documents(folder: Path) -> None:
-    """Write all generated files into `folder`, the docs of the repository, replacing older ones. Raises
-    CannotWriteError."""
+    """Write all generated files into `folder`, the docs of the repository, replacing older ones. Raises OSError, and
+    CannotWriteError for a file."""
     for name, text in generate_documents().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / name, text, overwrite=True)

@@ -1,6 +1,6 @@
 """Prose of docs/formats.md: the paragraphs between its generated tables, in Markdown.
 
-`format_docs` puts them together with the tables. Numbers come from the constants of the code that reads and writes the
+`format_docs` puts them together with the tables. Limits come from the constants of the code that reads and writes the
 files, so that page and code agree.
 """
 
@@ -15,20 +15,16 @@ GENERATED_PAGE_NOTE = (
     "This page is generated from the code (`python -m study.workflows.files.format_docs docs`): change the code, not "
     "the page."
 )
-"""Note at the top of docs/formats.md."""
 
 INTRODUCTION = (
     f"{GENERATED_PAGE_NOTE} `hapteq validate FILE` checks any of these files and lists its problems.",
     "Every HDF5 file and every JSON document states its `format` and `version`. TOML and CSV files are recognised by "
     f"their keys or header. Units: {UNITS_CLAUSE}. `g` is standard gravity. Time is the first dimension of each array.",
 )
-"""Paragraphs at the top of the page."""
 
 SIGNAL_TABLE_NOTE = "Each of `command`, `response`, `position`, `excitation`, `condition` has these attributes:"
-"""Sentence above the table of the attributes of a signal."""
 
 SEGMENT_TABLE_NOTE = "A row of `segments` has these fields:"
-"""Sentence above the table of the fields of a segment."""
 
 RECORDING_NOTES = (
     "With a plant that has direct feedthrough, `response[k]` depends on `command[k-1]`. If the sensor is faster than "
@@ -125,13 +121,10 @@ REPEATS_DESCRIPTION = (
     "next to a table of forces found by repetition: errors of each play, and the trajectory, model and device that the "
     "forces belong to"
 )
-"""Description of the document of repeats."""
 
 LIVE_STATE_DESCRIPTION = "`live.json`, the present state of a running session; replaced several times a second"
-"""Description of the document of a running session's state."""
 
 REQUEST_DESCRIPTION = (
     "a file in a session's folder `requests/`: a request of another program to the session, removed when it is read. A "
     "file name that begins with `stop` is a request to stop, with any content"
 )
-"""Description of a request to a running session."""

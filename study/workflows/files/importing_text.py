@@ -142,7 +142,6 @@ _FILES = """\
   them, as in `let = { y = "y_test" }`.
 * **Duplicate rows** (same time stamp, same values) are left out and counted. If a stamp repeats with other values, the
   time does not advance: the import is refused, with the keys that correct it."""
-"""Section on the types of files."""
 
 _CHANNELS = f"""\
 ## Channels, names and units
@@ -168,7 +167,6 @@ _CHANNELS = f"""\
 * **Free motion.** A recording without a command gets a command of zeros for each axis: `[[computed]]` with
   `role = "command"`, `name = "none"`, `value = "0 * clock_s"`, `unit = "N"` (`"N m"` for angles).
 * **Left out** of the proposed map, and reported: columns without any number, and repeated columns of the same time."""
-"""Section on names, units and roles of channels."""
 
 _TIME = f"""\
 ## Time and rate
@@ -211,7 +209,6 @@ _TIME = f"""\
   equally well, the import is refused.
 * **Hold.** With `hold = "zero-order"`, `command[k]` is held from t_k to t_(k+1), and `response[k]` is sampled just
   before `command[k]`. With `"band-limited"` or `"linear"`, both are samples of the same instant."""
-"""Section on time stamps, clocks, rates and resampling."""
 
 _PARTS_AND_EXAMPLE = """\
 ## Parts and segments

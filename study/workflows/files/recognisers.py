@@ -1,4 +1,4 @@
-"""Recognisers of hapteq's own file formats, one function per format. Called by `validate` (`hapteq validate`).
+"""Recognisers of hapteq's own file formats, one function per format (`hapteq validate`).
 
 A recogniser identifies a format by its format attribute or entry, its top-level keys or its header, then reads the
 whole file with the reader of that format and returns a description in words. A new format adds its function to
@@ -209,16 +209,16 @@ def recognise_trajectory(content: FileContent) -> str | None:
 
 
 def recognise_trials(content: FileContent) -> str | None:
-    """Recognise a CSV table of trials by the first two columns of its header."""
-    # A header with an error in one column is still recognised, so that `read_trials` reports the error. Two columns are
-    # compared, because tables of thresholds also begin with the subject.
+    """Recognise a CSV table of trials by its header."""
+    # Two matching columns suffice, so that `read_trials` reports an error in another one; one does not, because tables
+    # of thresholds also begin with the subject.
     if content.header[:2] != TRIALS_HEADER[:2] and find_header_problem(content.header, TRIALS_HEADER):
         return None
     return f"table of {_format_count(len(read_trials(content.path)), 'trial')}"
 
 
 def recognise_thresholds(content: FileContent) -> str | None:
-    """Recognise a CSV table of thresholds by the first two columns of its header."""
+    """Recognise a CSV table of thresholds by its header, as `recognise_trials` does."""
     if content.header[:2] != THRESHOLDS_HEADER[:2] and find_header_problem(content.header, THRESHOLDS_HEADER):
         return None
     noun = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"

@@ -1,5 +1,4 @@
-"""Recognisers of the files of a study, for `hapteq validate` (called by `validate`): sessions, JSON documents of
-sessions and studies, locks.
+"""Recognisers of the files of a study (`hapteq validate`): sessions, JSON documents of sessions and studies, locks.
 
 A session folder is checked as a whole: its log is replayed against the rules, the recordings of trials are compared
 with the SHA-256 in the log, and the tables with what the log gives. Recordings of probes are not compared.

@@ -2,7 +2,6 @@
 
 The recognisers are tried in turn on the content. A file that none of them recognises, and that may be a recording of
 another program, is read as `hapteq import` would read it. Remarks on access rights and on idle commands are added.
-Called by `validate_in_process`; `check_model_channels` extends its results.
 """
 
 import tomllib
@@ -71,7 +70,7 @@ def _describe_idle_commands(validation: Validation) -> tuple[str, ...]:
 
 
 def _is_folder(path: Path) -> bool:
-    """Whether the path is an existing folder. Never raises."""
+    """Whether the path is an existing folder."""
     try:
         return path.is_dir()
     except OSError:  # not a possible file name

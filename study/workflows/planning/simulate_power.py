@@ -1,4 +1,4 @@
-"""Statistical power by number of participants, from simulated studies. Called by `study.cli.power` (`hapteq power`).
+"""Statistical power by number of participants, from simulated studies (`hapteq power`).
 
 The studies are simulated and tested by `analysis.psychophysics.power` in chunks on any executor. Each finished chunk is
 appended to `studies.jsonl`, so that an interrupted simulation continues; power.json and a figure are written last.
@@ -115,7 +115,7 @@ def simulate_power(
 
 def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -> None:
     """Draw the power curves and write them into `folder`. Raises CannotWriteError."""
-    # Imported here: workers, which draw nothing, would take as long to load Matplotlib as to simulate ten studies.
+    # Imported here: workers, which draw nothing, would have to load Matplotlib, too.
     from analysis.figures.power_curves import make_power_picture
     from study.workflows.picture_files import write_pictures
 
@@ -127,8 +127,7 @@ def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -
 
 
 def judge_chunk(plan: PowerPlan, chunk: StudyChunk) -> list[StudyVerdict]:
-    """Simulate and test the studies of one chunk: `STUDIES_PER_CHUNK`, or fewer at the end of a sample size. Runs in a
-    worker process."""
+    """Simulate and test the studies of one chunk: `STUDIES_PER_CHUNK`, or fewer at the end of a sample size."""
     sample_size, first_study = chunk
     end_study = min(first_study + STUDIES_PER_CHUNK, plan.studies)
     return [

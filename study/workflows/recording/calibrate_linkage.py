@@ -2,7 +2,7 @@
 
 Joint angles, Jacobian, inertia and gravity are read from the device's library over a grid of handle positions, checked
 for consistency, and filled in from mirror positions where the library gives none. The result is an HDF5 file, which
-`hapteq twin --calibration` reads. Called by `study.cli.calibrate`.
+`hapteq twin --calibration` reads.
 """
 
 from collections.abc import Callable
@@ -151,8 +151,8 @@ def format_calibration_lines(result: CalibrationResult) -> tuple[str, ...]:
 def _read_grid(
     linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]
 ) -> CalibrationResult:
-    """Read the calibration over the whole grid, without writing it. All readings are checked before an error is raised,
-    so that it can list all problems. Raises CalibrationError, DeviceError."""
+    """Read the calibration over the whole grid, without writing it. Raises CalibrationError with the problems of all
+    grid positions, or with those of the centre, which is checked first; DeviceError."""
     azimuths_rad = estimate_arm_azimuths(_read_centre_jacobian(linkage))
     readings, unread_positions_m, max_difference_error = [], [], 0.0
     problems: list[str] = []

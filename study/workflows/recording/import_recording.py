@@ -2,8 +2,7 @@
 
 An import map states which columns are commands and responses, and their units. It is given, found with the files or
 among the shipped maps, or derived from the header of a table; recordings in hapteq's own format need none. The result
-states files, map and notes, so that its origin can be traced. Called by `hapteq import`, `validate` and
-`read_any_recording`, and exported as `study.import_recording`.
+states files, map and notes, so that its origin can be traced. `read_foreign` imports in memory, without writing.
 """
 
 import hashlib
@@ -50,7 +49,7 @@ class ImportPlan:
     """Files to import, the map to use, and the file to write."""
 
     files: tuple[Path, ...]
-    """Files, or a single folder in which data and a map are searched."""
+    """Files, or a single folder in which data and a map are searched; with `map`, folders may be among the files."""
     map: str | None
     """Name of a shipped map, or path of a map; None to find a map, or to derive one from headers."""
     out: Path
@@ -141,7 +140,7 @@ def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path,
 
 
 def _import_by_map(map_file: MapFile, files: Sequence[Path], on_progress: ProgressCallback) -> ForeignRecording:
-    """Import files by a map; its hash becomes part of the result."""
+    """Import files by a map."""
     built_recording = build_recording(map_file.map, files, on_progress)
     map_hash = hashlib.sha256(map_file.text.encode()).hexdigest()
     return ForeignRecording(built_recording.recording, tuple(files), map_file.name, map_hash, built_recording.notes)

@@ -1,4 +1,4 @@
-"""Play the pieces of a recording on a device one after another. Called by `record_device`.
+"""Play the pieces of a recording protocol on a device one after another.
 
 A piece is a sinusoid, a sweep or a multisine realisation; each play of a piece is a take. Where the sensor or the force
 reached its limit, and the protocol allows it (`lower_on_clip`), the piece is played again with a lower amplitude; the
@@ -120,5 +120,5 @@ def _play_take(device: Device, piece: RecordingPiece, on_progress: Callable[[flo
 
 
 def describe_piece_direction(piece: RecordingPiece) -> str:
-    """Describe the direction of a piece in a sentence: an axis, a test direction, or "all axes"."""
+    """Describe the direction of a piece: an axis, a test direction, or "all axes"."""
     return "all axes" if piece.direction_name == "all" else piece.direction_name

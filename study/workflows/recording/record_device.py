@@ -1,8 +1,7 @@
 """Record a device: play all pieces of a recording protocol on it, and write commands and readings into one HDF5 file.
 
 Each piece is one excitation with a rest before and after it (`recording_pieces`). If the user interrupts or the device
-fails, the pieces that are complete are written. Called by `study.cli.record` (`hapteq record`), `write_twin`,
-`daily_check` and `reproduce_recordings`.
+fails, the pieces that are complete are written.
 """
 
 import contextlib
@@ -47,7 +46,7 @@ class RecordingPlan:
 
     @property
     def total_s(self) -> float:
-        """Duration (s) of all pieces, each played once, at the nominal rate, without repeats and pauses."""
+        """Duration (s) of all pieces, each played once, at the nominal rate."""
         return sum(piece.commands.duration_s for piece in make_pieces(self.protocol, NOMINAL_RATE_HZ))
 
 

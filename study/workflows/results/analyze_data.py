@@ -1,8 +1,7 @@
 """Analysis of a folder of sessions (`hapteq analyze`): thresholds.csv, detection.csv, anova.json, figures, HTML report.
 
-The sessions that belong together are selected (`collect_sessions`), analysed (`analyse_study`: thresholds, hierarchical
-model, analysis of variance) and written with their provenance. Also called by `hapteq rehearse`, and by `write_results`
-at the end of a session.
+The sessions that belong together are selected (`collect_sessions`) and analysed (`analyse_study`: thresholds,
+hierarchical model, analysis of variance); the results are written with their provenance.
 """
 
 import errno
@@ -37,11 +36,10 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 def analyze_data(
     data: Path | str, out_folder: Path | str, ellipsoid: Path | str | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
-    """Analyse all sessions in `data`; an earlier analysis in `out_folder` is replaced. data: folder of sessions, a
+    """Analyse the sessions in `data`; an earlier analysis in `out_folder` is replaced. data: folder of sessions, a
     single session, or an exported dataset. ellipsoid: recording whose acceleration ellipses the report shows.
-    protocol_name: protocol to analyse where there are several. Raises StudyError where there is nothing to analyse,
-    where rows contradict their protocol, where ellipses cannot be computed, or where files cannot be written.
-    """
+    protocol_name: protocol to analyse where sessions follow several. Raises StudyError where there is nothing to
+    analyse, rows contradict their protocol, ellipses cannot be computed, or files cannot be written."""
     data, out_folder, ellipsoid = Path(data), Path(out_folder), None if ellipsoid is None else Path(ellipsoid)
     collected_trials = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
@@ -156,7 +154,7 @@ def _write_files(
         make_folder(figure_folder)
         if figure_folder.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
-        # The report is removed first and written last: while it is missing, the other files may be of different runs.
+        # The report is removed before the figures and written last: without it, files may be of different runs.
         for outdated_path in list_analysis_outputs(folder):
             if outdated_path.parent == figure_folder or outdated_path.name in (DETECTION_NAME, PAGE_NAME):
                 outdated_path.unlink()

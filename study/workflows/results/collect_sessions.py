@@ -1,8 +1,7 @@
 """Select the sessions for one analysis: one protocol, one population, none withdrawn or unreadable.
 
-Used by `analyze_data`, `hapteq export`, `hapteq power` and the reproduction of the paper. People, simulated
-participants, and people at a device that did not move are never analysed together (`Population`). Every exclusion is
-reported as a sentence. Tables and seals of closed sessions that are missing or out of date are written.
+People, simulated participants, and people at a device that did not move are never analysed together (`Population`).
+Exclusions are reported as sentences.
 """
 
 from collections.abc import Sequence
@@ -25,11 +24,11 @@ from study.workflows.results.session_results import finish_tables
 
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedTrials:
-    """Collect the sessions in `data` (or `data` itself, a session) that belong together. Of several protocols: the
-    named one (name, or first 12 digits of its hash); else, of those with test or detection runs, the one with the most
-    sessions. Of several populations: the first in the order of `Population`. Missing or outdated tables and seals of
-    all usable closed sessions are written (`_finish_result_files`). Raises StudyError where there is nothing to
-    analyse."""
+    """Collect the sessions in `data` (or `data` itself, a session) that belong together. Of several protocols (with
+    protocol_name, its name or the first 12 digits of its hash, only those): one with test or detection runs, if any,
+    then the one with the most sessions. Of several populations: the first in the order of `Population`. Missing or
+    outdated tables and seals of usable closed sessions are written (`_finish_result_files`). Raises StudyError where
+    there is nothing to analyse."""
     folders = _list_folders(data)
     usable_sessions, exclusions = _fold_sessions(folders)
     session_states = [(folder, session.state) for folder, session in usable_sessions]

@@ -1,8 +1,7 @@
-"""Export a study's trials for other tools (`study.cli.export`), and read exported datasets for an analysis
-(`analyze_data`).
+"""Export a study's trials for other tools (`hapteq export`), and read exported datasets for an analysis.
 
 Four forms can be written: Psych-DS, BIDS behaviour, MATLAB (.mat) and tidy CSV, each with protocol, seeds and versions;
-Psych-DS and tidy CSV can be read back, and give the same results as the sessions.
+Psych-DS and tidy CSV can be read back.
 """
 
 from collections import Counter
@@ -48,7 +47,7 @@ WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
     "mat": write_trials_mat,
     "csv": tidy_csv.write_tidy_csv,
 }
-"""Function that writes each form of dataset and returns the written files."""
+"""Functions that write a dataset, by form, and return the written files."""
 
 
 @dataclass(frozen=True, slots=True)

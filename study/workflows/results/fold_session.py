@@ -1,9 +1,7 @@
 """Read a session: compute its state from the events of its log, applied in order (a fold, as in event sourcing).
 
-Every line is checked against its checksum, every presentation against the rules of the protocol, and the log against
-its seals and, for an open session, the stored results. Nothing on disk is changed. The workflows that use the answers
-of a session call `fold_session`, so that damage is detected before; `watch_session`, which follows a log that is being
-written, calls only `load_logged_protocol`.
+Lines are checked against their checksums (older logs have none), presentations against the rules of the protocol, and
+the log against its seals and, for an open session, the stored results. Nothing on disk is changed.
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,7 @@
 
 A probe is a short periodic excitation between trials with the hand on the handle; a reference is a longer one with the
 handle free. Changes of friction, gain, delay, and of the hand's mass, damping and stiffness are estimated by
-`analysis.device_change.probe_drift`; this module reads the recordings and decides which are compared. `watch_session`
-shows the drifts while a session runs; `session_references` reports them with a diagnosis.
+`analysis.device_change.probe_drift`; `DriftReader` reads the recordings and decides which are compared.
 """
 
 from collections.abc import Iterator
@@ -53,7 +52,6 @@ class DriftReader:
     """Estimates the drifts of one session. Results are cached: each update reads and compares new probes only."""
 
     def __init__(self, folder: SessionFolder) -> None:
-        """folder: the session, whose recordings of probes are read."""
         self._folder = folder
         self._usable_probes: list[tuple[PlayedProbe, _ProbeLines]] = []
         self._read_probe_count = 0
@@ -156,7 +154,7 @@ def exceeds_limit(drift: Drift) -> bool:
 
 
 def _split_reference(recording: Recording) -> tuple[Recording, Recording]:
-    """Split a reference into two recordings: with its first segment (fit) and its second (test), both at full level."""
+    """Split a reference into two recordings: with its first segment (fit) and with its second (test)."""
     return replace(recording, segments=recording.segments[:1]), replace(recording, segments=recording.segments[1:2])
 
 

@@ -1,8 +1,7 @@
 """Results that are derived from a session's log: seal, tables of trials and thresholds, and summary.
 
 The log is the only source: each result can be computed from it again, and `find_result_problems` compares the files
-with what the log gives. Called by the workflows that end, resume, rehearse, simulate, view, validate or collect
-sessions.
+with what the log gives.
 """
 
 from collections.abc import Callable

@@ -2,8 +2,6 @@
 
 Order: open trigger line, masking noise and device, make or reload the equalizer, open or resume the session
 (`open_session`, `resume_session`), then run it (`run_session`); everything is closed at the end, also after an error.
-Called by the engine process (`engine_commands`), line mode (`study.cli.conduct`), `simulate_session` and
-`rehearse_study`.
 """
 
 import contextlib

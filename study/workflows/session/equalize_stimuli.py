@@ -2,8 +2,7 @@
 
 With the protocol's quantity "delivered_acceleration", forces are computed from required accelerations by a periodic
 inverse of the identified model (`ModelEqualizer`). Levels are still stated as forces in N: `compute_level_scales`
-returns for each frequency the level that corresponds to 1 m/s² (see `study.session.facts.level_scale`). Called by
-`conduct_session` and `open_session`, and before a device is opened by `plan_sitting` and `study.cli.rehearse`.
+returns for each frequency the level that corresponds to 1 m/s² (see `study.session.facts.level_scale`).
 """
 
 import math
@@ -62,8 +61,7 @@ NO_EQUALIZER = SessionEqualizer(IdentityEqualizer(), None)
 
 
 def check_model_for_protocol(protocol: StudyProtocol, model_path: Path | None) -> None:
-    """Raise StudyError where a model is missing, not needed, or unusable for the protocol (`_check_model`). Called
-    before a device is opened."""
+    """Raise StudyError where a model is missing, not needed, or unusable for the protocol (`_check_model`)."""
     needs_model = protocol.stimulus.quantity == "delivered_acceleration"
     if needs_model and model_path is None:
         raise StudyError(
@@ -83,8 +81,7 @@ def check_model_for_protocol(protocol: StudyProtocol, model_path: Path | None) -
 
 
 def load_equalizer() -> None:
-    """Import the equalizer module, which is slow, before a device is opened, so that its control loop is not delayed.
-    Called only where stimuli are equalized."""
+    """Import the equalizer module, which is slow, before a device is opened: its control loop must not be delayed."""
     import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 

@@ -1,9 +1,8 @@
 """Find and assign the participant number within a protocol (logged as "place"): it selects the row of the balanced
 order, and which direction is labelled 1.
 
-The number is assigned after the preparation, so that persons who refuse or are excluded take no row. Logs are searched
-as raw bytes where possible, because a data folder may hold many long logs, some of them damaged. Called by
-`open_session`, `run_session`, `plan_sitting`, `withdraw_participant` and `views.plan_study`.
+A person's number is assigned after the preparation: persons who refuse or are excluded take no row. Logs are
+searched as raw bytes where possible, because a data folder may hold many long logs, some of them damaged.
 """
 
 import re

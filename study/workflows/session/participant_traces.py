@@ -101,7 +101,7 @@ def _is_emptied_session(path: Path) -> bool:
 
 def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
     """Whether the analysis in this folder contains this subject, by its tables, its statistics, or the names of its
-    figures; None where no file of it can be read."""
+    figures; None where neither tables nor statistics can be read and no figure names the subject."""
     table_results = [_is_subject_in_table(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
     table_results.append(_is_subject_in_statistics(folder / STATISTICS_NAME, subject))
     if any(table_results):
@@ -200,8 +200,8 @@ def _is_subject_in_statistics(path: Path, subject: str) -> bool | None:
 
 
 def _is_unmanaged_file(path: Path, subject: str) -> bool:
-    """Whether the program does not itself keep this file in the data folder: False for the record of the subject's
-    withdrawal, the list of analyses written elsewhere, and unfinished files."""
+    """Whether a file of the data folder is none of these: the record of the subject's withdrawal, the list of analyses
+    written elsewhere, an unfinished file."""
     return (
         path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE_NAME)
         and UNFINISHED_PATTERN.fullmatch(path.name) is None

@@ -1,9 +1,7 @@
 """Rehearsal of a whole study with simulated participants in parallel processes (`hapteq rehearse`).
 
 Sessions run on the simulated device in virtual time. The same call continues an interrupted rehearsal: unfinished
-sessions are resumed, finished ones are kept. Called by `study.cli.rehearse`, by
-`study.evaluation.reproduction.reproduce_paper`, and as `study.rehearse_study` from Python. `number` is that of a
-participant, from 0.
+sessions are resumed, finished ones are kept. `number` is that of a participant, from 0.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,8 @@
 """Resumption of a session after a crash or a pause: its state is rebuilt from the log, and an open trial is closed.
 
-`conduct_session` calls it for `hapteq resume` and for the screen. An incomplete last line of the log is removed. A
-trial without an answer is void; a trial with an answer is judged from its recording or from the device's counters in
-the log, because dropping answers after they are known would bias the result.
+An incomplete last line of the log is removed. A trial without an answer is void; a trial with an answer is judged from
+its recording or from the device's counters in the log, because dropping answers after they are known would bias the
+result.
 """
 
 from collections.abc import Iterator

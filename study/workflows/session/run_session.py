@@ -1,7 +1,7 @@
 """Main loop of a session: get the next action from the state machine, perform and log it, until the session is finished
 or the sitting ends. A sitting is the time from the start or resumption of a session to its end or interruption.
 
-`conduct_session` calls it for new and resumed sessions. The state machine is `study.session.state.machine`.
+The state machine is `study.session.state.machine`.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ from study.workflows.trial.take_pause import take_pause
 
 MAX_VOIDS_IN_A_ROW = 3
 """Number of consecutive void presentations, not requested by the participant, after which the sitting ends: the
-participant has left, or the device is faulty. A stimulus must not play on an unattended handle. Chosen."""
+participant may have left, and a stimulus must not play on an unattended handle. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +58,8 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run one sitting: until the session is finished, or the sitting ends early.
 
     KeyboardInterrupt (Ctrl-C, a closed terminal) stops the device at once and is raised as UserInterruptError, or as
-    DeviceError where the force may still be on; a session that is finished in the log ends normally instead. A
-    StudyError is extended by the number of saved answers and the command that continues.
+    DeviceError where the force may still be on; a session that is closed in the log, or whose participant is
+    ineligible, ends normally instead. A StudyError is extended by the number of saved answers and the resume command.
     """
     try:
         session_end = _run_sitting(state, sitting)

@@ -1,7 +1,7 @@
 """Simulated participant of a session: implements the protocols `Display` and `Hand` of `workflows.trial.display`.
 
 Questions are answered by an `Observer` after its response time; all waiting is done on the given clock, so that a
-session can run in virtual time. Methods that only return None continue at once. Made by `simulated_participant`.
+session can run in virtual time. Methods that only return None continue at once.
 """
 
 from collections.abc import Callable
@@ -45,8 +45,7 @@ ENDED_EARLY = Unanswered("the stimulus ended early", ends_sitting=False)
 
 
 class SimulatedDisplay:
-    """Display and hand of a simulated participant: answers are those of the observer, and waiting is done on the
-    clock."""
+    """Display and hand of a simulated participant."""
 
     def __init__(
         self,

@@ -1,9 +1,9 @@
-"""Withdraw a participant: erase all data permanently, and replace each session by a tombstone.
+"""Withdraw a participant: erase the data that are proved to be the participant's, and replace each session by a
+tombstone (`hapteq withdraw`).
 
-Called by `hapteq withdraw`, by the screen, and by `end_sitting` after a participant withdrew in a pause. A tombstone is
-a file with the names of session and protocol and the participant number, but without measured data. The list of what
-will be erased is written to the disk first, and the log of each session is erased last, so that the same command
-continues an interrupted withdrawal.
+A tombstone is a file with the names of session and protocol and the participant number, but without measured data. The
+list of what will be erased is written to the disk first, and the log of each session is erased last, so that the same
+command continues an interrupted withdrawal.
 """
 
 import errno

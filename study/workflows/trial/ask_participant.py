@@ -1,7 +1,7 @@
 """Play one stimulus and get the participant's answer.
 
 In a direction trial the stimulus is held until the answer, the number of a direction. In a detection trial it is played
-in one of two intervals (two-interval forced choice, 2IFC), and the question follows. Called by `present_trial`.
+in one of two intervals (two-interval forced choice, 2IFC), and the question follows.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Play and log a probe between two trials, and the reference recorded without a hand.
 
-`run_session` calls it where the protocol has probes: short excitations from which drifts of device and hand are
-estimated. A failed probe or reference never makes a trial void.
+Probes are short excitations from which drifts of device and hand are estimated. A failed probe or reference never makes
+a trial void.
 """
 
 import math

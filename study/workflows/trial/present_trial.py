@@ -1,10 +1,9 @@
-"""Conduct one trial of a session, from the wait for the handle to the logged result. Called by `run_session`;
-`play_probe` uses the wait for the handle.
+"""Conduct one trial of a session, from the wait for the handle to the logged result.
 
-Order: wait until the handle rests at the centre; log the presentation; play the stimulus and ask; log the answer;
-release the force; measure the delivered acceleration and log it. A detection trial releases the force before the
-question. Each event is written to the disk before the next step, so that a crash loses no trial and no answer; only an
-onset pulse is logged after the reply, so that writing does not delay the question.
+Order: wait until the handle rests at its start position; log the presentation; play the stimulus and ask; log the
+answer; release the force; measure the delivered acceleration and log it. A detection trial releases the force before
+the question. Each event is on the disk before the next step; only an onset pulse is logged after the reply, so that
+writing does not delay the question.
 """
 
 import math
@@ -92,7 +91,6 @@ def _make_handle_reader(gate: GateSettings, plane: Plane, sitting: Sitting) -> C
     inside_since_s: list[float] = []
 
     def read_handle() -> HandleView:
-        """Read the handle once."""
         offset_m = sitting.supervisor.compute_offset_m(sitting.device.look())
         now_s = sitting.clock.now_s()
         if offset_m is None:
@@ -150,7 +148,7 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
 
 
 def _log_pulse(state: SessionState, due_trial: PresentTrial, pulse: Pulse, sitting: Sitting) -> SessionState:
-    """Log the onset pulse. Called after the answer, because a write to the disk would delay the question."""
+    """Log the onset pulse, and report to the experimenter if it was lost."""
     pulse_event = OnsetPulsed(
         utc=sitting.clock.utc(),
         run=due_trial.run,

@@ -1,7 +1,4 @@
-"""Periodic tasks of a session while it waits: keep-alive calls, requests, buttons of the device, live state.
-
-`conduct_session` makes one `SessionSupervisor` for each sitting.
-"""
+"""Periodic tasks of a session while it waits: keep-alive calls, requests, buttons of the device, live state."""
 
 import math
 from collections.abc import Callable

@@ -1,7 +1,6 @@
 """Ports of one sitting (device, display, log, ...), and the functions that change the state of its session.
 
-`conduct_session` makes the `Sitting`; `run_session`, `prepare_sitting` and the modules of this package receive it. The
-state of a session changes only by events that are logged (`log_and_apply`), so that it can be rebuilt from the log.
+The state of a session changes only by events that are logged (`log_and_apply`), so that it can be rebuilt from the log.
 """
 
 import contextlib
@@ -86,12 +85,12 @@ class Sitting:
     pulse: Callable[[], Pulse | None] = send_no_pulse
     """Sends a pulse on the lab's trigger line, right after the device has begun a trial's force. Never raises."""
     masking_noise: SoundOutput | None = None
-    """None where the protocol or the lab has no masking noise."""
+    """None where none is played."""
 
 
 def log_and_apply(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
-    """Apply the event to the state, which rejects contradictions, and append it to the log. Returns the new state, from
-    which the caller continues; its events are on disk. Raises LogContradictionError."""
+    """Apply the event to the state, and append it to the log. Returns the new state, whose events are on disk. Raises
+    LogContradictionError, and StudyError where it cannot be written."""
     event = replace(event, monotonic_s=sitting.clock.now_s())
     updated_state = apply_event(state, event)
     sitting.log.append(event)

@@ -1,7 +1,6 @@
 """Make the events of a trial for the session log (presented, measured, void), and save its recording.
 
-Called by `present_trial`; `resume_session` restores the counters of an answered trial with `restore_health`. Units:
-levels in N, accelerations in m/s², times in s; displacement and offset in mm.
+Units: levels in N, accelerations in m/s², times in s; displacement and offset in mm.
 """
 
 from dataclasses import asdict, dataclass

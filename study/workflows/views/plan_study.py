@@ -1,5 +1,5 @@
 """Plan of each study in a data folder (`hapteq study-plan`): planned, finished and excluded participants, and the
-order of frequencies that the next participant receives. Only reads files; called by `study.cli.study_plan`.
+order of frequencies that the next participant receives. Only reads files.
 
 A participant may have several sessions; the session with the most progress counts. The balanced design is computed by
 `protocols.procedure.study_plan`; a cell of the design is an order of frequencies and a labelling of the answers.

@@ -65,8 +65,7 @@ def _describe_quality(session_opened: SessionOpened) -> str:
 
 
 def _format_reachable_levels(session_opened: SessionOpened) -> str:
-    """Format the acceleration (m/s²) that both directions reach at the force cap, by frequency; empty without an
-    equalizer."""
+    """Format the acceleration (m/s²) that both directions reach at the cap, by frequency; "" without an equalizer."""
     if session_opened.equalized is None:
         return ""
     return ", ".join(

@@ -1,8 +1,7 @@
-"""Summary line of a session for lists of sessions; called by `view_home`, `view_session` and `plan_study`. Only reads
-files.
+"""Summary line of a session for lists of sessions. Only reads files.
 
 A list must be fast: the log of a finished session whose checksums and seal are valid is trusted, and its events are
-counted without parsing them. Every other log is folded: its events are applied one by one to the session's state.
+counted without parsing them. Other logs are folded: their events are applied one by one to the session's state.
 """
 
 from dataclasses import replace
@@ -47,8 +46,7 @@ def make_session_line(folder: SessionFolder) -> SessionLine:
 
 
 def mark_running(line: SessionLine, folder: SessionFolder) -> SessionLine:
-    """Mark the line of an unfinished session as `running` if a process has its log open for writing. The test holds the
-    log's lock for some microseconds."""
+    """Mark the line of an unfinished session as `running` if a process has its log open for writing."""
     if line.standing == "unfinished" and is_log_locked(folder.log):
         return replace(line, standing="running")
     return line

@@ -1,5 +1,5 @@
-"""Stream a session's events as markers of the lab streaming layer (LSL), with the time at which they happened. Called
-by `study.cli.stream` (`hapteq stream`).
+"""Stream a session's events as markers of the lab streaming layer (LSL), with the time at which they happened
+(`hapteq stream`).
 
 A separate process follows the log, so that streaming cannot delay or end the session. An event in the log states its
 time t by the session's monotonic clock (older logs do not); its marker gets the time t + offset on LSL's clock. The
@@ -19,7 +19,7 @@ from study.regular_file import MAX_TABLE_BYTES, open_regular
 from study.workflows.views.lsl_outlets import make_unreadable_log_error
 
 POLL_INTERVAL_S = 0.02
-"""Interval (s) between two readings of the log: the largest delay of a marker, whose time is correct. Chosen."""
+"""Interval (s) between two readings of the log, about the largest delay of a marker; its time is correct. Chosen."""
 OFFSET_INTERVAL_S = 10.0
 """Interval (s) at which the offset of the two clocks is measured. Chosen."""
 OFFSET_READINGS = 10

@@ -1,7 +1,4 @@
-"""View of a diagnosis as sentences and tables, from its document `diagnosis.json`. Only reads files.
-
-Called by `hapteq show` and the engine of the screens (`engine_commands`).
-"""
+"""View of a diagnosis as sentences and tables, from its document `diagnosis.json`. Only reads files."""
 
 from pathlib import Path
 

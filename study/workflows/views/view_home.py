@@ -1,7 +1,6 @@
 """Lists for the start screen: the sessions of a data folder, and the protocols, models and devices to choose from.
 
-Called by the screen (`study.tui.engine.engine_commands`) and `hapteq sessions` (`study.cli.sessions`). Nothing is
-changed. Damaged files are listed with a remark or left out; they never raise an error.
+Nothing is changed. Damaged files are listed with a remark or left out.
 """
 
 import tomllib
@@ -103,7 +102,7 @@ def _is_identified_model(path: Path) -> bool:
 
 def make_home_view(data: Path) -> HomeView:
     """Make the content of the start screen. A missing data folder is shown as empty. Control characters are replaced,
-    except in the paths of models, by which the files are opened: the screen replaces them where it shows the names."""
+    except in the paths of models, by which the files are opened."""
     model_paths = list_model_files(data)
     qualities = tuple((model_path, describe_model_quality(model_path)) for model_path in model_paths)
     return HomeView(

@@ -1,7 +1,6 @@
 """View of one session for screen and command line: facts, thresholds, staircases, and the log as sentences.
 
-Called by `hapteq show` and the engine of the screens (`study.tui.engine.engine_commands`). Nothing is changed. A
-damaged session is shown as far as it can be read, with warnings; it never raises a StudyError.
+Nothing is changed. A damaged session is shown as far as it can be read, with warnings, not raised as a StudyError.
 """
 
 from pathlib import Path

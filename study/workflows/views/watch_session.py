@@ -1,7 +1,7 @@
 """Follow a running session from a second process, and send requests to it (stop, pause, note).
 
 The log is only read: new lines are checked against the hash chain and applied to the state one by one. A request is a
-file in the session's inbox. Called by `hapteq watch` (`study.cli.watch`) and by the engine's `watch_feed`.
+file in the session's inbox.
 """
 
 import io
@@ -49,7 +49,6 @@ class Follower:
     """Follower of one session: `look` reads the new part of its log and returns the view. Never writes."""
 
     def __init__(self, folder: SessionFolder) -> None:
-        """folder: the session, of which nothing is read yet."""
         self._folder = folder
         self._watched: FollowedSession | None = None
         self._read_byte_count = 0

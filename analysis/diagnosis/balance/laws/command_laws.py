@@ -1,10 +1,9 @@
 """Laws of an actuator, static nonlinearities and slew limits, on grids of parameters that span the command's range.
 
 Laws of the motion, such as friction, are further columns of the regression of the commanded force. The laws in this
-file map the command u to the force, f = g(u) (a magnet's also depends on the position), so that they are tested in the
-force balance solved for the acceleration (`inverse_balance`). All grids below are chosen by hand: a grid need only be
-so fine that the search from its best law (`vary_parameters`) reaches the true parameters. Called by `actuator`;
-`inverse_balance` fits them.
+file map the command u to the force, f = g(u) (a magnet's also depends on the position), and are tested in the force
+balance solved for the acceleration (`inverse_balance`). All grids below are chosen by hand: a grid need only be so fine
+that the search from its best law (`vary_parameters`) reaches the true parameters. Called by `actuator`.
 
 Reference: Slotine and Li, Applied Nonlinear Control (1991), chapter 5 (dead zone, saturation, relay).
 """
@@ -36,7 +35,7 @@ GAP_SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 than half over the travel. Against a linear spring, a magnet is stable over a third of its gap only (pull-in), where the
 smallest distance is twice the travel."""
 REFINING_FACTORS = (0.95, 0.98, 1.02, 1.05)
-"""Factors by which a coordinate search multiplies a parameter, in turn."""
+"""Factors by which a coordinate search multiplies a parameter."""
 REFINED_PARAMETERS = ("width", "limit", "square", "gap", "power", "rate")
 """Names of the parameters that the search varies; others are switches or scales."""
 SLEW_LIMIT_COUNT = 20
@@ -61,7 +60,7 @@ class CommandLaw:
     position_factor: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
     """Maps positions (n,) and the values to the factor of the force (n,); None = it does not depend on the position."""
     flexible: bool = False
-    """Whether it has more free parameters than the other laws, and is chosen only with a clearly smaller error."""
+    """Whether it fits more shapes than the other laws, and is chosen only with a clearly smaller error."""
     scale: float = 1.0
     """Scale that converts a single column to a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
@@ -70,7 +69,7 @@ class CommandLaw:
 
     @property
     def lag_column_count(self) -> int:
-        """Number of leading columns whose time derivative is a further regressor (a short lag): the first only."""
+        """Number of leading columns whose time derivative is a further regressor: a short lag, to first order."""
         return 1
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
@@ -149,8 +148,8 @@ def _compute_slewed_force(step_s: float, command: FloatArray, parameters: dict[s
 
 
 def make_electromagnet_laws(position: FloatArray) -> Iterator[CommandLaw]:
-    """Make the laws of an electromagnet: force proportional to the square of the current over that of the distance;
-    with a permanent magnet, to the current. position: (n,); the magnet may be beyond either end."""
+    """Make the laws of an electromagnet: force proportional to the square of the current (with a permanent magnet, to
+    the current) over that of the distance. position: (n,); the magnet may be beyond either end."""
     low, high = float(position.min()), float(position.max())
     for direction, nearest_position in ((1.0, low), (-1.0, high)):
         for gap in GAP_SHARES:
@@ -215,13 +214,13 @@ def _compute_deadband_force(command: FloatArray, parameters: dict[str, float]) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewiseCommandLaw:
-    """A sum of piecewise linear functions that approximates every law of a kind: where this sum fits no better than the
-    command itself, no law of that kind does, and none need be tried."""
+    """A sum of functions that approximates the laws of a kind: where this sum fits no better than the command itself,
+    none of these laws need be tried."""
 
     columns: Callable[[FloatArray, FloatArray], FloatArray]
     """(n, k) of command and position (n,) each; the command itself first."""
     lag_column_count: int
-    """Number of leading columns whose time derivative is a further regressor: a short lag, to first order."""
+    """Number of leading columns whose time derivative is a further regressor."""
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """Compute the columns (n, k) at command and position (n,) each."""

@@ -1,8 +1,7 @@
 """Laws without a name in the catalogue as terms of the force balance: powers, saturation, products and attraction.
 
-`compare_free_laws` compares them with the sum of catalogue laws that was chosen before. With position q and velocity v
-of the driven axis, weight w, and nonlinear parameters p (exponent), s (scale) and a (position), the force that resists
-the motion is
+Called by `compare_free_laws`. With position q and velocity v of the driven axis, weight w, and nonlinear parameters p
+(exponent), s (scale) and a (position), the force that resists the motion is
 
     power_of_speed           w sgn(v) |v|^p         power_of_position        w sgn(q) |q|^p
     even_power_of_speed      w |v|^p                even_power_of_position   w |q|^p
@@ -12,10 +11,10 @@ the motion is
     product_of_position_and_speed   w g(q, v), for each g in `PRODUCTS`
     inverse_distance         w / (q - a)^n, n = 1 or 2, with a outside the travel
 
-Each depends on one axis alone, which is what the formula of a `judged_law` can express. Nonlinear parameters are tried
-on grids over the motion and refined like those of the catalogue's laws (`structures`), within wide bounds, chosen by
-hand, that exclude columns that are nearly zero or linear. In the code, c is the index of the driven channel in the
-motion m, n are the nonlinear parameters and w the weights, as in `law`.
+Each depends on one axis alone, so that a formula can express it. Nonlinear parameters are tried on grids over the
+motion and refined like those of the catalogue's laws (`structures`), within wide bounds, chosen by hand, that exclude
+columns that are nearly zero or linear. In the code, c is the index of the driven channel in the motion m, n are the
+nonlinear parameters and w the weights, as in `law`.
 """
 
 from collections.abc import Callable, Iterable, Iterator

@@ -14,8 +14,7 @@ weights w, the force that resists the motion is (sources: the file of the name i
     viscoelastic_relaxation      w T / (1 + T s) v                                      (Maxwell: spring and damper)
 
 Letters as in `law`: n are nonlinear parameters of a law (width, v_s, z_max or T), w its weights. The grids and bounds
-of n are chosen by hand. Called by `laws`; `condition_laws` uses `compute_friction_widths`, and `free_laws` and modules
-of `contrast` and `first_model` use `LEAST_WIDTH_SHARE`."""
+of n are chosen by hand. Called by `motion_laws`."""
 
 from collections.abc import Iterator
 
@@ -39,7 +38,7 @@ from equalizer.signals.signal import FloatArray
 
 LEAST_WIDTH_SHARE = REST_SPEED_SHARE
 """Least tried width of tanh(v / width), relative to the rms speed: the speed below which an axis may count as resting
-in a simulation. Where the width is fitted, larger ones are tried, and the refinement may also make it smaller."""
+in a simulation. A refinement may make a fitted width smaller."""
 
 
 def compute_friction_widths(scales: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:

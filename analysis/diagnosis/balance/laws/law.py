@@ -1,6 +1,5 @@
-"""A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights.
-The laws are made by `laws`, `friction_laws`, `condition_laws` and `free_laws`, and fitted by `regression`;
-`command_laws` uses `Formula`.
+"""A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights. The
+other files of this folder make the laws; `regression` fits them.
 
 The balance of one axis is linear in its weights w,
 

@@ -7,7 +7,7 @@ The force of a law is phi(q, v, a; n)' w: linear in the weights w, with columns 
 nonlinear parameters n. The grids of n span the travel and the band of the recording, so that the search needs no
 starting values; grids and bounds are chosen by hand. Columns are in SI units and have the sign of a force that resists
 the motion, as the balance's terms of mass, damping and stiffness do. Letters in the code: weights w and nonlinear
-parameters n, as here; s = i omega is Laplace's variable. Called by `structures` and `contrast.force_base`."""
+parameters n, as here; s = i omega is Laplace's variable. Begin at `make_laws`."""
 
 from collections.abc import Iterator, Sequence
 
@@ -29,25 +29,24 @@ from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
 from equalizer.signals.signal import FloatArray
 
-# Settings of the search for the pitch of a force that is periodic in the position, all chosen by hand. A wavenumber is
-# a spatial frequency, 1 / pitch.
+# Settings of the search for the pitch of a force that is periodic in the position. A wavenumber is a spatial frequency,
+# 1 / pitch.
 WAVENUMBER_SPACING = 0.35
 """Spacing of the wavenumbers, relative to 1 / travel: the spectral peak of a force that is periodic over the whole
 travel is about 1 / travel wide."""
 MOST_WAVENUMBERS = 600
-"""Number of wavenumbers that are searched, from the longest pitch down: pitches below 1 / 211 of the travel, or below 1
+"""Number of wavenumbers that are searched, from the longest pitch down: pitches below about 1 / 211 of the travel, or 1
 / 601 of a turn for a shaft that turns, are not found."""
 MOST_SPECTRUM_SAMPLES = 6000
 """The spectrum over the position is computed from evenly spaced samples, fewer than twice this number."""
 MOST_PITCHES = 4
 """Largest number of pitches that are kept: those of the strongest spectral lines."""
 STOP_DISTANCES = (0.02, 0.05, 0.1, 0.2)
-"""Tried positions of an end stop: distances from either end of the travel, relative to the travel. Chosen by hand."""
+"""Tried positions of an end stop: distances from either end of the travel, relative to the travel."""
 HALF_GAPS = tuple(np.geomspace(0.01, 0.3, 6).tolist())
-"""Tried half gaps of a backlash, relative to the travel. Chosen by hand."""
+"""Tried half gaps of a backlash, relative to the travel."""
 MODE_DAMPING_RATIOS, MODE_FREQUENCIES = (0.02, 0.1, 0.4), tuple(np.geomspace(0.02, 1.2, 12).tolist())
-"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band. Chosen by
-hand."""
+"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band."""
 
 
 def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
@@ -161,7 +160,7 @@ def make_stiffness_laws(channel: int, scales: Scales) -> Iterator[Law]:
                 _make_stop_columns(channel, side), _make_stop_converter(side), bounds=((scales.low, scales.high),),
             )  # fmt: skip
     for half_gap in scales.travel * np.array(HALF_GAPS):
-        # Added to the balance's own spring term k x, it gives k (x - clip(x)): a spring that acts beyond the gap only.
+        # With an equal weight of the balance's spring term k x, it gives k (x - clip(x)): a spring beyond the gap only.
         yield Law(
             "backlash", channel, (float(half_gap),),
             lambda motion, n: -np.clip(motion.position[:, [channel]], -n[0], n[0]),

@@ -2,7 +2,7 @@
 
 The variable is that of the largest correlation ratio (variance of bin means over variance). Where none reaches
 `_MAIN_CORRELATION_RATIO`, the missing force is drawn against the law's own value, so that a correct law is a straight
-line. Called by `signature_curves`.
+line.
 """
 
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ class _Variable:
     """A signal that a law may depend on."""
 
     name: str
-    """Label of the abscissa with unit: "velocity of x (m/s)"."""
+    """Label of the abscissa with unit, such as "velocity of x (m/s)"."""
     values: FloatArray
     """(n,)"""
 

@@ -1,8 +1,7 @@
 """Signature curve of a named effect: the residual of the model without it, against the variable that it depends on.
 
 For forces of the mechanism and the actuator the residual is the missing force, for sensors the error of a channel. The
-fitted law is part of the curve: simulated, and averaged over bins of the same kind. An effect without such a variable
-has the spectrum of the residual. Called by `examine_fits`; the `figures.diagnosis.signature` module draws the curves.
+fitted law is part of the curve. An effect without such a variable has the spectrum of the residual.
 """
 
 from collections.abc import Mapping

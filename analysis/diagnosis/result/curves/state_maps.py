@@ -2,8 +2,7 @@
 
 With force balances, the missing force is the residual of mass, damping and stiffness, or, where a model was given, of
 the re-tuned model; without balances, that of the re-tuned model, from its evidence. Its sign is that of a force on the
-device. Where laws complete the model, the residual with them is computed, too. Called by `diagnose`;
-`analysis.figures.diagnosis.state_maps` draws the maps.
+device. Where laws complete the model, the residual with them is computed, too.
 """
 
 from collections.abc import Sequence
@@ -33,7 +32,7 @@ SCATTER_SAMPLES = 600
 LOOP_SAMPLES = 2000
 """Largest number of samples of a loop. Chosen."""
 LOOP_PERIODS = 1.1
-"""Length of a loop in periods of the motion's strongest line. Chosen above 1, so that the loop closes."""
+"""Length of a loop in periods of the motion's strongest line. Chosen above 1, for a closed loop."""
 WITH_NAMED, WITH_CANDIDATES = "with the named effects", "with the best candidates, not confirmed"
 """Texts for the laws that complete the model."""
 
@@ -43,7 +42,7 @@ class StateView:
     """The missing force against a state variable: single samples, and means per bin."""
 
     abscissa_name: str
-    """Name of the abscissa: "position"."""
+    """Name of the abscissa, such as "position"."""
     unit: str
     """Unit of the abscissa."""
     sample_abscissa: FloatArray

@@ -3,7 +3,7 @@
 `write_law_proof` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
 `write_law_table` writes figures and misses as small CSV tables that can be kept under version control.
 `format_law_lines` and `format_law_summary` return the result as text for the terminal and as JSON. A miss is a case
-with a wrong answer (`LawOutcome.is_wrong`). Called by `hapteq prove`.
+with a wrong answer (`LawOutcome.is_wrong`).
 """
 
 import json
@@ -68,7 +68,7 @@ class LawRow:
     seconds: float | None
     """Processor time of the diagnosis (s)."""
     miss: bool
-    """Whether the answer is wrong (`LawOutcome.is_wrong`)."""
+    """Whether the answer is wrong."""
 
 
 def write_law_proof(result: LawBlindTest) -> None:

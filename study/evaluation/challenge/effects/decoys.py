@@ -12,7 +12,7 @@ effect.
 
 For each decoy, `_draw_…` draws the parameters: the main one is interpolated geometrically by the strength, 0 to 1,
 between the two values given to `interpolate_log`, others are random; these ranges were chosen by hand. `_build_…`
-returns the device with the effect. Called by `study.evaluation.challenge.draw_case`.
+returns the device with the effect.
 """
 
 from dataclasses import replace

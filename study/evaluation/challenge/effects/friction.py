@@ -7,8 +7,8 @@
     position-dependent          |F| = level (1 + slope x + bend x^2)                   N, 1/m, 1/m^2
 
 All are a bristle with elastic presliding (Dahl; `friction_kernel`). Where the law has no presliding, the bristle has
-3e6 N/m and slides within 0.1 um. The ranges of the levels go from 0.003 or 0.01 N (strength 0) to 0.2 or 0.25 N (1).
-All ranges were chosen by hand. `EFFECTS` is part of the table from which `draw_case` chooses.
+3e6 N/m and slides within 0.2 um. The ranges of the levels go from 0.003 or 0.01 N (strength 0) to 0.2 or 0.25 N (1).
+All ranges were chosen by hand.
 """
 
 from dataclasses import replace
@@ -136,4 +136,3 @@ EFFECTS = (
         "position_dependent_friction", "mechanism", True, _draw_position_dependent, _build_position_dependent
     ),
 )
-"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

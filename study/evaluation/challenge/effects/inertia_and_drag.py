@@ -10,8 +10,7 @@
   in contact a stiff spring (N/m) with little damping (N s/m) couples them.
 
 Ranges were set by hand for a device of the size of the omega.3. Strengths 0 and 1 are the ends of the main parameter's
-range (`EffectContext.interpolate_log`); other parameters are drawn independently of the strength. `EFFECTS` is part of
-the table from which `draw_case` chooses.
+range (`EffectContext.interpolate_log`); other parameters are drawn independently of the strength.
 """
 
 from dataclasses import replace
@@ -136,4 +135,3 @@ EFFECTS = (
     ConcealedEffect("extra_mode", "mechanism", True, _draw_extra_mode, _build_extra_mode),
     ConcealedEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
 )
-"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

@@ -6,9 +6,9 @@ drift, linear from 0 to `total` at the end; mains hum; quantization to `step`; c
 that repeats the sample before); logger offset (s; positive: the acceleration is delayed, but not the position).
 
 Accelerations are in m/s^2. Drift and hum have a random share in each channel; the largest of those read is 1. The
-strength interpolates each range geometrically. `challenge.sensor` applies the effects; `EFFECTS` is part of the table
-from which `draw_case` chooses. A `_draw_...` function draws parameters, a `_build_...` function builds them into a
-device; all ranges were chosen by hand. `axis` is not used where an effect acts on all channels.
+strength interpolates the range of the main parameter geometrically. `challenge.sensor` applies the effects. A
+`_draw_...` function draws parameters, a `_build_...` function builds them into a device; all ranges were chosen by
+hand. `axis` is not used where an effect acts on all channels.
 """
 
 from dataclasses import replace
@@ -222,4 +222,3 @@ EFFECTS = (
     ConcealedEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
     ConcealedEffect("logger_offset", "sensor", False, _draw_logger_offset, _build_logger_offset),
 )
-"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

@@ -1,8 +1,7 @@
 """Motion along one axis of a recording: position, velocity and acceleration by differentiation of a measured signal.
 
-Faults of mechanism and drive that are injected into real recordings are computed from it. Called by `injections`;
-`force_injections` and `drive_injections` get its motions. Units are those of the recorded
-signal: m or rad, in V where voltages were recorded, and their time derivatives.
+Faults of mechanism and drive that are injected into real recordings are computed from it. Units are those of the
+recorded signal: m or rad, in V where voltages were recorded, and their time derivatives.
 """
 
 from dataclasses import dataclass
@@ -54,7 +53,7 @@ class AxisMotion:
 def _find_bandwidth_hz(samples: FloatArray, rate_hz: float) -> float:
     """Find the highest frequency (Hz) at which the power density (Welch, segments of up to 2048 samples) exceeds
     `MIN_SIGNAL_TO_NOISE` times the noise floor, the median of the last quarter of the spectrum; at least 20 cycles per
-    take, at most `MAX_CUTOFF_SHARE` of the rate. samples: (n,), without missing samples."""
+    take, but at most `MAX_CUTOFF_SHARE` of the rate. samples: (n,), without missing samples."""
     frequency, power = welch(samples, rate_hz, nperseg=min(len(samples), 2048))
     above_noise = np.flatnonzero(power > MIN_SIGNAL_TO_NOISE * np.median(power[3 * len(power) // 4 :]))
     highest_hz = float(frequency[above_noise[-1]]) if len(above_noise) else 0.0
@@ -63,8 +62,8 @@ def _find_bandwidth_hz(samples: FloatArray, rate_hz: float) -> float:
 
 def find_takes(recording: Recording) -> tuple[tuple[int, int], ...]:
     """Find the takes of a recording (stretches recorded without interruption), as (start, stop) in samples, in order. A
-    boundary is where an entry of `meta["parts"]` begins or ends; ignored within `MIN_TAKE_SAMPLES` of another boundary
-    or of the end. The takes cover the recording."""
+    boundary is where an entry of `meta["parts"]` begins or ends; ignored where a take would be shorter than
+    `MIN_TAKE_SAMPLES`. The takes cover the recording."""
     parts = [part for part in recording.meta.get("parts", ()) if isinstance(part, dict)]
     boundaries = sorted(
         {int(part[bound_key]) for part in parts for bound_key in ("start", "stop") if bound_key in part}

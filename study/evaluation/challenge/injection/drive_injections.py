@@ -1,11 +1,10 @@
 """Faults of the drive (amplifier, motor), injected by altering the recorded command (inverse injection).
 
 The measured motion is unchanged. A drive with the characteristic g would have needed the command u' with g(u') = u for
-the recorded command u, and u' replaces u. `force_injections` joins these faults with those of the mechanism, and
-`injections` injects them.
-Saturation, slew limit and quantization have no unique inverse: their commands are approximations. The size of a fault
-grows exponentially with its strength, 0 to 1: a factor r**strength spans the ratio r. All ranges were chosen by hand.
-A constant command gives a quantization step of 0, which changes nothing; a largest command of 0 counts as 1.
+the recorded command u, and u' replaces u. Saturation, slew limit and quantization have no unique inverse: their
+commands are approximations. The size of a fault grows exponentially with its strength, 0 to 1: a factor r**strength
+spans the ratio r. All ranges were chosen by hand. A constant command gives a quantization step of 0, which changes
+nothing; a largest command of 0 counts as 1.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,7 +35,7 @@ class ForceInjection:
     command: Callable[[AxisMotion, Values], FloatArray]
     """(n,): the command that would have been needed with the fault."""
     actuator: bool = False
-    """Whether the fault is in the drive; it is not injected into recordings with imposed motion."""
+    """Whether the fault is in the drive; it is not applicable to recordings with imposed motion."""
     memory: bool = False
     """Whether the fault depends on earlier samples; each take is then altered separately."""
 

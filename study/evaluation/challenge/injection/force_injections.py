@@ -1,14 +1,13 @@
 """Faults of the mechanism, injected by altering the recorded command (inverse injection).
 
 The measured motion is left unchanged. A mechanism with an additional resisting force F(x, v, a) would have needed the
-command u + F for the same motion; a drive with the static characteristic g would have needed u' with g(u') = u. Both
-are exact for any other dynamics of the device, because a controller that imposes the motion would command just these
-forces.
+command u + F for the same motion. This is exact for any other dynamics of the device, because a controller that imposes
+the motion would command just these forces.
 
 Written for the challenge only: no code is shared with the effects that a diagnosis compares, so that an error in those
-effects is not injected as well. Ranges of the drawn parameters are set by hand. Called by `injections`; positions,
-velocities and forces have the units of the recording. The rms values that scale a force are at least 1e-300, so that
-they can be divided by; the travel of an axis at rest counts as 1 for cogging and presliding friction.
+effects is not injected as well. Ranges of the drawn parameters are set by hand. Positions, velocities and forces have
+the units of the recording. The rms values that scale a force are at least 1e-300, so that they can be divided by; the
+travel of an axis at rest counts as 1 for cogging and presliding friction.
 """
 
 from collections.abc import Callable

@@ -3,7 +3,7 @@ mechanism and actuator are in `force_injections`.
 
 The size of a fault is a ratio, an angle, or relative to the response (rms, peak, median frequency), because nothing
 else is known of the device; a strength of 0 to 1 interpolates geometrically. No code is shared with the effects that a
-diagnosis compares. Called by `study.evaluation.real.inject_real`.
+diagnosis compares. Begin at `inject`.
 """
 
 from collections.abc import Callable, Mapping

@@ -4,8 +4,8 @@ Every function takes the readings (n, p), the sample rate (Hz), the parameters b
 returns new readings (n, p), n >= 1. Amplitudes are in the unit of the readings. A missing reading (NaN) stays missing
 where a fault changes each reading by itself. `apply_lag` makes all later readings of the channel NaN, too;
 `rotate_readings` and `mix_channels` pass a NaN on to other channels, `shift_clock` and `delay_readings` to the readings
-that are interpolated with it; `lose_samples` may repeat or replace it. Called by `injections`, which draws the
-parameters. Arguments that a fault does not need are ignored.
+that are interpolated with it; `lose_samples` may repeat or replace it. Arguments that a fault does not need are
+ignored.
 """
 
 from collections.abc import Mapping

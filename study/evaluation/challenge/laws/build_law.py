@@ -2,7 +2,7 @@
 
 For a law that is a force, the ratio of the rms of the force, along the motion without the law, to the rms of the
 command is given by the strength; for a law of commands or readings, the ratio of the rms of the change to that of the
-changed signal, except for a saturating law. Called by `draw_law`.
+changed signal, except for a saturating law.
 """
 
 from dataclasses import dataclass, replace
@@ -46,9 +46,9 @@ def build_law(
     device: Device, kind: LawKind, baseline: tuple[Motion, FloatArray], axis_pair: tuple[int, int], strength: float,
     random: Random,
 ) -> tuple[Device, LawTruth]:  # fmt: skip
-    """Draw the parameters of a law and add it to a device; returns the device and the label. baseline: motion and
-    commands (samples, 3), N, without the law. axis_pair: the axis of the law, and another axis, which may be the same
-    for a law of one axis. strength: 0 to 1, between the two rms ratios above, geometrically."""
+    """Draw the parameters of a law and add it to a device without laws; returns the new device and the label. baseline:
+    motion and commands (samples, 3), N, without the law. axis_pair: the axis of the law, and another axis, which may be
+    the same for a law of one axis. strength: 0 to 1, between the two rms ratios above, geometrically."""
     baseline_motion, command = baseline
     axis, other_axis = axis_pair
     peaks = PeakValues(

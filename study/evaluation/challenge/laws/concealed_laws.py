@@ -2,8 +2,7 @@
 
 They test whether the diagnosis discovers a law outside its catalogue. They share no code with its grammar of laws, and
 some have shapes that the grammar cannot express. The label of a law states on what it acts, which variables it needs,
-and whether it has a memory, so that an answer can be judged without comparing formulas. `draw_law` chooses a law for
-each simulated device, and `build_law` draws its parameters and adds it to the device. All ranges were chosen by hand.
+and whether it has a memory, so that an answer can be judged without comparing formulas. All ranges were chosen by hand.
 """
 
 from collections.abc import Callable
@@ -177,4 +176,3 @@ LAW_KINDS: tuple[LawKind, ...] = (
 )  # fmt: skip
 """All laws. A bank of devices uses each once, in random order, before any is used again."""
 LAWS_BY_NAME = {kind.name: kind for kind in LAW_KINDS}
-"""All laws by name."""

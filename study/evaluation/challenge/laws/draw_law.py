@@ -2,7 +2,7 @@
 
 A turn of twenty cases has twelve with a law, four with nothing missing, three with an effect of the catalogue and one
 with an additional linear mode, in random order. All laws, and all of `DECOY_EFFECTS`, are used before any is used
-again. Called by `study.evaluation.bank.laws.seal_laws`. All numbers were chosen.
+again. All numbers were chosen.
 """
 
 from dataclasses import dataclass
@@ -134,8 +134,8 @@ def draw_law(seed: int, case_number: int, brief: bool = False) -> LawDraw:
 
 
 def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
-    """Generate the drawn case. name: device name in recording and model. Raises ValueError where the motion with the
-    law diverges or is too large at each strength that `_build_stable_law` tries."""
+    """Generate the drawn case. name: device name in recording and model. Raises ValueError where the motion diverges,
+    or with a law is too large at each strength that `_build_stable_law` tries."""
     if law_draw.kind != "law":
         effects = (law_draw.concealed,) if law_draw.concealed else ()
         strength = law_draw.strength if effects else None

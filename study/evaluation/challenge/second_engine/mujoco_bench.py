@@ -1,9 +1,8 @@
 """The bench of the blind test as a MuJoCo model: a handle on three slides, attached oscillators, concealed effects.
 
-Called by `mujoco_case`: with a second physics engine, cases do not depend on hapteq's own simulation alone.
-Dry friction is MuJoCo's friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
-dead band; backlash is a motor body behind a tendon with limits; a hand and added masses are armature, damping and
-stiffness of the slides; saturation, gain and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
+Dry friction is MuJoCo's friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a dead band;
+backlash is a motor body behind a tendon with limits; a hand and added masses are armature, damping and stiffness of the
+slides; saturation, gain and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,6 @@
 """Cases with concealed effects whose motion is simulated by MuJoCo instead of hapteq's own integrator.
 
 Parameters are drawn as in `challenge.draw_case`; `mujoco_bench` simulates the motion, `challenge.sensor` the readings.
-Called by `mujoco_access`.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,7 @@
 """Export of a real-time controller as C source: its sizes and tables of numbers are inserted into templates.
 
-`export_controller` writes the text to files. Each number is the shortest decimal that a compiler reads back to the same
-double (`repr`), so that the C program computes with exactly the numbers of the Python controller.
+Each number of a table is the shortest decimal that a compiler reads back to the same double (`repr`), so that the C
+program computes with exactly the numbers of the Python controller.
 """
 
 from importlib.resources import files
@@ -19,7 +19,7 @@ HEADER_NAME, EXAMPLE_NAME, CHECK_NAME = "hapteq_controller.h", "example_loop.c",
 NUMBERS_PER_LINE = 6
 """Numbers per line of a table (chosen, for readable lines)."""
 BLOCK_SIZE = 4
-"""Number of rows or columns that a loop of the C code processes together; matrices are padded to multiples of it. The
+"""Number of rows that a loop of the C code processes together; the step matrix is padded to multiples of it. The
 template `controller.h` uses the same number."""
 
 
@@ -73,7 +73,7 @@ def _format_c_initializer(numbers: FloatArray) -> str:
 
 
 def _format_macros(controller: RealtimeController) -> str:
-    """Format the preprocessor definitions of the sample rate (Hz), the force cap (N) and the array sizes."""
+    """Format the preprocessor definitions: sample rate (Hz), force cap (N), sizes, and edges that split the band."""
     problem, split, tracker = controller.problem, controller.split, controller.tracker
     has_low, has_high = split.edges.low_hz is not None, split.edges.high_hz is not None
     macros: dict[str, str] = {

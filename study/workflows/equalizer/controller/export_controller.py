@@ -1,5 +1,4 @@
-"""Export the real-time controller of an identified model as C sources. Called by `study.cli.export_controller` (`hapteq
-export-controller`).
+"""Export the real-time controller of an identified model as C sources (`hapteq export-controller`).
 
 The controller (`equalizer.tracking.realtime`) plays a stored transient in any direction, and tracks a stream of
 reference accelerations with a preview. Header, example loop and check program are written into a new folder.
