@@ -1,5 +1,4 @@
-"""Data analysis. Pure functions: trials and recordings in, results, figures and pages out; no files, no screens. Used
-by `study`.
+"""Data analysis. Pure functions: trials and recordings in, results, figures and pages out; no files, no screens.
 
 Folders: `psychophysics` (trials -> thresholds and statistics), `look` (checks of recordings before any model),
 `device_change` (changes of a device between recordings), `diagnosis` (recordings and a model -> the physics that the

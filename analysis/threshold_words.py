@@ -1,9 +1,7 @@
 """Wording of figures, tables and warnings for the two kinds of thresholds of a run.
 
 A staircase's threshold is the mean of its last reversal levels; that of the Bayesian Psi method is the mean of the
-posterior distribution. `select_threshold_words` selects the wording by the protocol's rule, so that no other module has
-to distinguish the two. Called by the figures, tables and warnings of thresholds. These are computed in
-`analysis.psychophysics.thresholds`.
+posterior distribution (`analysis.psychophysics.thresholds`). Begin at `select_threshold_words`.
 """
 
 from dataclasses import dataclass
@@ -16,7 +14,7 @@ class ThresholdWords:
     """Sentences and nouns about a run's threshold, for one kind of rule."""
 
     noun: str
-    """Name of the thresholds, in the plural; begins with a lower-case letter."""
+    """Name of the thresholds, in the plural, as within a sentence."""
     cut_clause: str
     """Relative clause: effect of the cap (largest level) on a threshold that is marked as cut (limited by the cap)."""
     cut_note: str

@@ -1,7 +1,6 @@
 """Formatting of numbers, p-values, lists and sentences for reports, tables and messages.
 
-Used by all reports and messages, so that their text is uniform: a true minus sign (U+2212), a fixed number of
-decimals, and an en dash for a missing number.
+Numbers have a true minus sign (U+2212) and a fixed number of decimals; an en dash stands for a missing number.
 """
 
 import re
@@ -77,7 +76,7 @@ def conjoin(items: Sequence[str]) -> str:
 
 
 def capitalise(sentence: str) -> str:
-    """Convert the first character to upper case; all others stay unchanged, unlike by `str.capitalize`."""
+    """Convert the first character to upper case; the others stay unchanged, unlike by `str.capitalize`."""
     return sentence[:1].upper() + sentence[1:]
 
 

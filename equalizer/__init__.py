@@ -1,6 +1,6 @@
 """Models of a haptic device, their identification, and the control that equalizes its response.
 
-Functions are pure: values in, values out, independent of protocols and sessions. Used by `analysis` and `study`.
+Functions are pure: values in, values out, independent of protocols and sessions.
 
 Folders, each using only those before it: `signals` (recordings), `laws` (formulas of forces), `plant` (models of the
 device) and `linkage` (its kinematics), `effects` (physics that a model may lack, and simulation), `identification`

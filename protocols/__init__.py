@@ -11,7 +11,8 @@ were recorded).
 Decisions:
 
 2026-11-21. Random draws are keyed by (run, trial, attempt), never sequential: a repeated trial changes no later draw.
-2026-11-21. Defaults are filled in before a protocol is hashed: a new field changes every hash and needs a new version.
+2026-11-21. Defaults are filled in before a protocol is hashed. A field added later enters the hash only where it
+differs from its default (`document.hashing`), so that old hashes stay valid.
 """
 
 from importlib import import_module

@@ -1,7 +1,4 @@
-"""Exception classes whose texts are shown to the user (cause, saved data, remedy), and the exit codes of `hapteq`.
-
-Raised throughout `study`; shown by `study.cli.main` and by the screens of `study.tui`.
-"""
+"""Exception classes whose texts are shown to the user (cause, saved data, remedy), and the exit codes of `hapteq`."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,9 +11,9 @@ class ExitCode(IntEnum):
 
     DONE = 0
     ERROR = 1
-    """A `StudyError` of any other kind."""
+    """An error of any other kind."""
     WRONG_USE = 2
-    """An invalid command line, file or setting."""
+    """A command line or setting that is not valid, or does not fit the files it names."""
     DEVICE = 3
     """The device: missing, failed, lost during a session, or found not in order by `hapteq doctor`."""
     INTERRUPTED = 130
@@ -48,7 +45,7 @@ class StudyError(Exception):
 
 
 class WrongUseError(StudyError):
-    """A command line, file or setting is invalid."""
+    """A command line or setting is invalid, or does not fit the files it names."""
 
     exit_code = ExitCode.WRONG_USE
 

@@ -1,5 +1,4 @@
-"""Local time of this computer, for texts that people read; logs and data keep UTC. Called by the app (`study.tui`), the
-commands (`study.cli`) and the modules that write reports."""
+"""Local time of this computer, for texts that people read; logs and data keep UTC."""
 
 from datetime import UTC, datetime
 
@@ -7,8 +6,8 @@ from study.session.views.local_time import format_time_in_zone
 
 
 def convert_to_machine_zone(time: datetime) -> datetime:
-    """Convert a moment to the local time of this computer, summer time included. This is a time zone as
-    `study.session.views.local_time.Zone` defines it. A moment without UTC offset is taken as local time.
+    """Convert a moment to the local time of this computer, summer time included; a `local_time.Zone`. A moment without
+    UTC offset is taken as local time.
 
     Raises ValueError, OverflowError or OSError for a moment that cannot be converted.
     """

@@ -1,7 +1,4 @@
-"""Open and read regular files only; for a pipe, a device or a folder an error is raised at once, without blocking.
-
-Called by the modules that read files which a user may name: tables, documents, logs, HDF5 files.
-"""
+"""Open and read regular files only; for a pipe, a device or a folder an error is raised at once, without blocking."""
 
 import errno
 import io

@@ -49,9 +49,9 @@ class DeviceMeasures:
 
 def measure_device(recording: Recording) -> DeviceMeasures:
     """Measure friction, frequency response and noise of a free device. recording: strokes and a broadband excitation
-    along every axis, with rests. Raises NotMeasurableError without a position or a rest, for too many missing samples,
-    with fewer than two strokes along an axis, and where the frequency response cannot be estimated or has no reliable
-    line."""
+    along every axis, with rests. Raises NotMeasurableError without a position along every axis or a rest, for too many
+    missing samples, with fewer than two strokes along an axis, and where the frequency response cannot be estimated or
+    has no reliable line."""
     recording = _interpolate_gaps(recording)
     response = _estimate_response(recording)
     friction_and_error_n = np.array(
@@ -66,9 +66,16 @@ def measure_device(recording: Recording) -> DeviceMeasures:
 
 def _interpolate_gaps(recording: Recording) -> Recording:
     """Interpolate missing samples of all signals, because the estimate of the frequency response leaves out periods
-    with missing samples. Raises NotMeasurableError without a position, or for too many missing samples."""
+    with missing samples. Raises NotMeasurableError without a position along every axis, or for too many missing
+    samples."""
     if recording.position is None:
         raise NotMeasurableError("the recording contains no position signal")
+    channel_count, axis_count = len(recording.position.channels), len(recording.command.channels)
+    if channel_count != axis_count:
+        raise NotMeasurableError(
+            f"the number of channels of the position is {channel_count}, that of the command {axis_count}, and "
+            "friction is computed from a position along every axis"
+        )
     command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
     position = _fill_missing(recording.position, "position")
     excitation = None if recording.excitation is None else _fill_missing(recording.excitation, "excitation")

@@ -274,15 +274,14 @@ def _find_rivals(cause: str, best_causes: tuple[str, ...], misfits: dict[tuple[s
 
 
 def _fit_causes(comparison: _Comparison, causes: tuple[str, ...]) -> tuple[float, FloatArray, FloatArray]:
-    """Compute the squared misfit over the noise, the fitted parameters, and their standard errors."""
+    """Compute the squared misfit over the noise, the fitted parameters, and their standard errors; both 0 for a
+    parameter without effect, such as the gain of an axis that no line drives."""
     y = _stack_real_imaginary(comparison.difference) * np.sqrt(2)  # each part has half of the noise's power
     parameters = _list_parameters(causes)
     if not parameters:
         return float(y @ y), np.empty(0), np.empty(0)
-    x = np.stack([_stack_real_imaginary(comparison.columns[parameter]) for parameter in parameters], axis=1) * np.sqrt(
-        2
-    )
-    column_norms = np.linalg.norm(x, axis=0)
+    x = np.sqrt(2) * np.stack([_stack_real_imaginary(comparison.columns[name]) for name in parameters], axis=1)
+    column_norms = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny ** 0.25)
     inverse = np.linalg.pinv((x / column_norms).T @ (x / column_norms)) / np.outer(column_norms, column_norms)
     values = inverse @ x.T @ y
     return float(np.sum((y - x @ values) ** 2)), values, np.sqrt(np.diag(inverse))

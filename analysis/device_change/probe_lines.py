@@ -56,8 +56,8 @@ class ProbeLines:
 
 def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
     """Compute the spectra of the mean period of a probe; of its first segment where the recording has segments.
-    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples of command or
-    response are missing."""
+    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples of command,
+    excitation or response are missing."""
     period_samples = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
     excitation_signal = recording.command if recording.excitation is None else recording.excitation
@@ -70,7 +70,7 @@ def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
         _compute_mean_spectrum(signal.samples[start:stop], period_samples)
         for signal in (excitation_signal, recording.command, recording.response)
     )
-    if not np.isfinite(force_n).all() or not np.isfinite(acceleration_mps2).all():
+    if not all(np.isfinite(spectrum).all() for spectrum in (excitation, force_n, acceleration_mps2)):
         raise ValueError("the recording has missing samples")
     position_m = np.full(force_n.shape, np.nan, dtype=complex)
     if recording.position is not None and recording.position.samples.shape[1] == force_n.shape[1]:

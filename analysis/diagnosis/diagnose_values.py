@@ -1,7 +1,6 @@
 """Diagnose recordings in one function of values: recordings in, findings out, with or without a model.
 
-Checks and prepares the recordings, fits a linear first model where none is given, and calls `diagnose`. This is
-`analysis.diagnose` of the Python interface.
+This is `analysis.diagnose` of the Python interface.
 """
 
 from collections.abc import Sequence
@@ -34,10 +33,10 @@ def diagnose_values(
     """Find the physics that a model of the device lacks.
 
     recordings: of one device, alike in channels, units and rate. model: None = a linear model is fitted to them, or to
-    the clean recordings where there are any. settings: effects left out of the search, clean recordings of the device,
-    compared signals. map_: as `map`, may run in parallel. progress: receives a description of the current step and the
-    share of it that is done, 0 to 1. Raises NothingToDiagnoseError with the errors in the recordings or the model,
-    IncomparableRecordingsError where clean recordings cannot be compared with them."""
+    the clean recordings where there are any. settings: None = the defaults. map_: as `map`, may run in parallel.
+    progress: receives a description of the current step and the share of it that is done, 0 to 1. Raises
+    NothingToDiagnoseError with the errors in the recordings or the model, IncomparableRecordingsError where clean
+    recordings cannot be compared with them."""
     recording_list = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or DiagnosisSettings()
     names = settings.names or tuple(f"recording {number}" for number in range(1, len(recording_list) + 1))

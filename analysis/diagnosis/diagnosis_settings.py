@@ -1,5 +1,5 @@
-"""Settings of a diagnosis: effects to consider, signals to compare, time limit. Made by `diagnose_values` and
-`study.workflows.diagnosis.diagnose_recordings`, read by `diagnose`. The limits that decide are in `settings.py`."""
+"""Settings of a diagnosis: effects to consider, signals to compare, time limit. The limits that decide are in
+`settings.py`."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING

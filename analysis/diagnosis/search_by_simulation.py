@@ -144,9 +144,9 @@ class _ImpactSearch:
         return self._search_for_play(result) or result
 
     def _search_for_play(self, result: SearchResult) -> SearchResult | None:
-        """Return the result with play, or None where play does not explain the recordings; the result with the remark
-        `OUT_OF_TIME` where the time ended before this was known. The return value is cached: None for good, a result
-        until `result` has more effects."""
+        """Return the result with play, or None where play does not explain the recordings, or its search crashed
+        (`Guard`); the result with the remark `OUT_OF_TIME` where the time ended before this was known. The return value
+        is cached: None for good, a result until `result` has more effects."""
         if self._searched_step_count < 0 or (
             self._play_result is not None and len(result.found.steps) > self._searched_step_count
         ):
@@ -156,7 +156,12 @@ class _ImpactSearch:
 
             self._progress("looking for rattling play", 0.9)
             floors, time_left = self._fitting.chosen.floors, self._settings.time_left
-            explanation = explain_impacts(result.context, result.found, floors, self._catalogue, time_left)
+            explanation = result.context.guard.run(
+                "rattling play",
+                "its search",
+                lambda: explain_impacts(result.context, result.found, floors, self._catalogue, time_left),
+                None,
+            )
             self._play_result, self._searched_step_count = None, len(result.found.steps)
             if explanation is None and not time_left():
                 self._play_result = replace(result, remarks=tuple(dict.fromkeys((*result.remarks, OUT_OF_TIME))))

@@ -1,5 +1,4 @@
-"""Type aliases that the packages of the diagnosis, and the commands that call it, share: masks of samples, parallel
-maps, progress callbacks and time limits."""
+"""Type aliases of the diagnosis and the commands that call it: masks, parallel maps, progress and time limits."""
 
 from collections.abc import Callable, Iterable
 

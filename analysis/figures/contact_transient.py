@@ -1,8 +1,7 @@
 """Figure of an acceleration transient that is played at a contact, along the surface normal.
 
 Three rows over time, a column per way of playing it: acceleration along the normal, target and measured; magnitude of
-the measured acceleration across the normal, which should be 0; and the forces. Called by
-`study.workflows.equalizer.play_contact`.
+the measured acceleration across the normal, which should be 0; and the forces.
 """
 
 import numpy as np

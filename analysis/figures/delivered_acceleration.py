@@ -1,7 +1,7 @@
 """Figure of measured acceleration against the commanded force level, one panel per frequency, on log-log axes.
 
 It shows whether the device is linear (points along the grey line of proportionality) and how much of its motion is
-perpendicular to the commanded direction. Called by `analysis.figures.study_pictures`.
+perpendicular to the commanded direction.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """Figure for the choice of a model order: singular values, error on held-out lines, multiplications per tick.
 
 The values are those of `OrderReport`: each order is fitted to every second spectral line and tested on the others. A
-tick is one step of the device loop. Called by `identification_report`.
+tick is one step of the device loop.
 """
 
 import numpy as np

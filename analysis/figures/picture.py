@@ -1,7 +1,6 @@
 """A Matplotlib figure with its name, title, caption and alternative text, and its rendering as inline SVG.
 
-Reports embed the SVG in their HTML page (`analysis.reports.page`), and `study.workflows.picture_files` writes the same
-SVG as a file. The SVG is reproducible: it contains no date, and its ids are derived from the picture's name.
+The SVG is reproducible: it contains no date, and its ids are derived from the picture's name.
 """
 
 import io
@@ -70,12 +69,11 @@ class Picture:
     folded: bool = False
     """Whether a report shows only the title, and the picture after a click."""
     bitmap: bool = True
-    """Whether the picture is also written as PNG. Diagnoses omit the PNG of their many folded pictures."""
+    """Whether the picture is also written as PNG."""
     alternative: str = ""
     """Description for screen readers; empty: they read the title alone."""
     rendered_svg: list[str] = field(default_factory=list)
-    """Cached result of `render_inline_svg`, empty before the first call of `render_picture_svg`: page and file use the
-    same SVG."""
+    """Cached result of `render_inline_svg`; empty before the first call of `render_picture_svg`."""
 
 
 def render_picture_svg(picture: Picture) -> str:

@@ -3,7 +3,7 @@ figure 5).
 
 Each row of panels is one condition (centre or edge of the workspace, equalizer, friction), each column the axis of the
 target acceleration. A perfect equalizer gives 0 dB along that axis and no response along the others. `played_response`
-defines the response; `reproduction_pictures` calls this module.
+defines the response.
 """
 
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ def make_friction_picture(playbacks: Sequence[PlayedResponse]) -> Picture:
 
 def draw_played_responses(playbacks: Sequence[PlayedResponse]) -> Figure:
     """Draw a row of panels per response and three columns, one per axis of the target acceleration; a note where there
-    are no responses. Sizes in inches."""
+    are no responses."""
     if not playbacks:
         return draw_no_data_note(create_figure(8.6, 2.0), "Nothing was played.")
     figure = create_figure(8.6, 0.8 + 1.75 * len(playbacks))

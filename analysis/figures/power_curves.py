@@ -2,7 +2,7 @@
 
 The upper panel shows the share of simulated studies in which each analysis finds the difference: the power, or without
 a true difference the type-1 error. The lower panel shows the coverage of the primary analysis's 95 % interval. Both
-come from `analysis.psychophysics.power.power_curve`. Called by `study.workflows.planning.simulate_power`.
+come from `analysis.psychophysics.power.power_curve`.
 """
 
 from collections.abc import Sequence
@@ -61,8 +61,7 @@ def _choose_reference_percent(effect_db: float) -> float:
 
 
 def _draw_power(points: Sequence[PowerPoint], effect_db: float, threshold_noun: str) -> Figure:
-    """Draw two panels: power (above) and coverage (below) over the number of participants. Sizes: in inches, font sizes
-    in points."""
+    """Draw two panels: power (above) and coverage (below) over the number of participants."""
     figure = create_figure(PAGE_WIDTH_IN, 5.6)
     power_axes, coverage_axes = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = (

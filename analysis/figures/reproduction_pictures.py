@@ -1,8 +1,7 @@
 """Make the five figures of the reproduction report, by the number of the published figure that each reproduces.
 
 1: frequency bands and onset of coupling. 2: direction thresholds by frequency. 3: acceleration ellipses. 4: transfer
-functions. 5: response from target to delivered acceleration, with a second picture for the effect of friction. Called
-by `study.evaluation.reproduction.write_reproduction`.
+functions. 5: response from target to delivered acceleration, with a second picture for the effect of friction.
 """
 
 from collections.abc import Mapping, Sequence

@@ -152,10 +152,11 @@ def _make_medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
         name="medians",
         title="Thresholds by the model of all answers",
         caption=f"Black: the median participant with its {100 * primary.confidence:g} % interval. Above the cap no "
-        "size is known: an arrow from the one-sided bound, and people, hollow, on one line. An interval without an "
-        "upper mark continues above the axis. Lines join the thresholds of one person as estimated by the model: "
-        "shrunk towards the others where their own answers carry little information. Diamond and thick line on the "
-        "cap: the direction limit and its interval, between the frequencies played alone.",
+        "size is known: an arrow from the one-sided bound, or from the lower end of the axis where there is none, and "
+        "people, hollow, on one line. An interval without an upper mark continues above the axis. Lines join the "
+        "thresholds of one person as estimated by the model: shrunk towards the others where their own answers carry "
+        "little information. Diamond and thick line on the cap: the direction limit and its interval, between the "
+        "frequencies played alone.",
         figure=draw_medians(primary, cap_n),
     )
 

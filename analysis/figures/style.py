@@ -1,6 +1,6 @@
-"""Common style of all figures: a palette for colour-blind readers, markers, ticks, panel grids and sizes.
+"""Common style of the figures: a palette for colour-blind readers, markers, ticks, panel grids and sizes.
 
-Called by the drawing modules of `analysis.figures`. Palette: M. Okabe, K. Ito, Color Universal Design (2008).
+Palette: M. Okabe, K. Ito, Color Universal Design (2008).
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ PAGE_WIDTH_IN = 7.2
 
 
 def create_figure(width_in: float, height_in: float) -> Figure:
-    """Create an empty white figure with constrained layout; sizes in inches."""
+    """Create an empty white figure with constrained layout."""
     return Figure(figsize=(width_in, height_in), facecolor="white", layout="constrained")
 
 

@@ -22,6 +22,7 @@ from analysis.figures.style import (
 )
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
+from equalizer.signals.signal import FloatArray
 
 _MARKER_SPREAD_TICKS = 0.5
 """Width over which the participants' markers are spread at each frequency, in distances between ticks. Chosen."""
@@ -47,8 +48,11 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
         f"cap {cap_n:g} N", (0, cap_n), xycoords=("axes fraction", "data"), xytext=(4, 4), textcoords="offset points",
         ha="left", fontsize=9, color=GREY,
     )  # fmt: skip
-    _draw_participants(axes, table)
-    _draw_stopped_runs(axes, table, cap_n)
+    # A fixed offset from the tick instead of random jitter: a participant has the same offset at every frequency.
+    spread = _MARKER_SPREAD_TICKS / 2 if len(table.subjects) > 1 else 0.0
+    offsets = np.linspace(-spread, spread, len(table.subjects))
+    _draw_participants(axes, table, offsets)
+    _draw_stopped_runs(axes, table, offsets, cap_n)
     _draw_means(axes, table, comparisons)
     axes.set_xticks(range(len(table.frequencies_hz)), [f"{frequency_hz:g}" for frequency_hz in table.frequencies_hz])
     axes.set_xlim(-0.6, len(table.frequencies_hz) - 0.4)
@@ -61,15 +65,9 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     return figure
 
 
-def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
-    """Draw each participant's thresholds in a colour and marker, joined by a thin line that is broken at a gap."""
-    participant_count = len(table.subjects)
-    # A fixed offset from the tick instead of random jitter: a participant has the same offset at every frequency.
-    offsets = (
-        np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, participant_count)
-        if participant_count > 1
-        else np.zeros(1)
-    )
+def _draw_participants(axes: Axes, table: ThresholdTable, offsets: FloatArray) -> None:
+    """Draw each participant's thresholds in a colour and marker, joined by a thin line that is broken at a gap.
+    offsets: of the participants from the tick, in distances between ticks."""
     for participant, row in enumerate(table.values):
         positions = np.arange(len(row)) + offsets[participant]
         threshold_values = np.array([np.nan if threshold is None else threshold for threshold in row], dtype=float)
@@ -94,9 +92,9 @@ def draw_threshold(axes: Axes, position: float, threshold: float, participant: i
                                   "shrinkA": 0})  # fmt: skip
 
 
-def _draw_stopped_runs(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
-    """Draw a hollow marker above the cap where a stopped run left no threshold."""
-    offsets = np.linspace(-_MARKER_SPREAD_TICKS / 2, _MARKER_SPREAD_TICKS / 2, max(2, len(table.subjects)))
+def _draw_stopped_runs(axes: Axes, table: ThresholdTable, offsets: FloatArray, cap_n: float) -> None:
+    """Draw a hollow marker above the cap where a stopped run left no threshold. offsets: as in
+    `_draw_participants`."""
     for person, row in enumerate(table.stopped):
         for position, is_stopped in enumerate(row):
             if is_stopped:

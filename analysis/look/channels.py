@@ -1,7 +1,7 @@
 """The channels of a recording as a flat list, for checks of each channel; format and rms about the mean of its values.
 
 A recording groups its channels by signal (command, response, position and so on); here each channel is one item with
-its role, name, quantity and unit. Called by the checks of `analysis.look` and the drawings of recordings.
+its role, name, quantity and unit.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class Channel:
 
 
 def list_channels(recording: Recording) -> tuple[Channel, ...]:
-    """List all channels of all signals of a recording."""
+    """List the channels of all signals of a recording."""
     return tuple(
         Channel(role, name, quantity, unit, np.ascontiguousarray(samples))
         for role, signal in collect_signals(recording).items()

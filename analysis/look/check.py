@@ -1,7 +1,4 @@
-"""Result type of the plausibility checks of a recording: severity, finding and advice, in sentences for the user.
-
-The functions `check_…` of this package return it; `overview` collects and sorts the results, `look_report` prints them.
-"""
+"""Result type of the plausibility checks of a recording: severity, finding and advice, in sentences for the user."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -18,7 +15,6 @@ class Check:
     name: str
     """Name of the check, such as "clipping"."""
     level: Level
-    """Severity of the finding."""
     finding: str
     """Sentence with numbers and units."""
     advice: str = ""

@@ -4,7 +4,6 @@ A signal that is not clipped has a low slope near its extreme. A clipped signal 
 keeps that value for a time T, and leaves it with a high slope. A parabola that crosses the limit with the slopes s and
 -s, a time T apart, peaks s T / 4 above it: a run of equal readings counts as clipped where this extrapolated rise
 exceeds a few rounding steps. Several different runs, or a long one, are needed. All limits below were chosen by hand.
-Called by `overview`.
 """
 
 from collections.abc import Sequence
@@ -17,7 +16,6 @@ from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, find_runs
 
 CLIPPING = "clipping"
-"""Name of this check."""
 LEAST_FLAT_SAMPLES = 5
 """Fewest samples at an extreme that count as clipping; also the least length of a run that suffices alone."""
 LEAST_FLAT_RUNS = 2

@@ -1,8 +1,7 @@
 """One-sided power and cross spectral densities of all channels by Welch's method: averages over Hann windows.
 
 Windows overlap by half; a straight line is subtracted from each. No window spans two stretches of a recording or
-contains a missing sample, so gaps do not leak into the spectra. Called by `overview`; used by `driven_band`,
-`gain_and_lag`, `kinematics` and the figures of `overview`.
+contains a missing sample, so gaps do not leak into the spectra.
 
 Reference: Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 """
@@ -103,7 +102,6 @@ def estimate_cross_spectra(
 
 
 def _make_line_basis(length: int) -> npt.NDArray[np.float64]:
-    """Make an orthonormal basis (length, 2) of the straight lines; length in samples. Its projection is subtracted from
-    each window."""
+    """Make an orthonormal basis (length, 2) of the straight lines; length in samples."""
     ramp = np.arange(length) - (length - 1) / 2
     return np.column_stack([np.full(length, length**-0.5), ramp / np.sqrt(ramp @ ramp)])

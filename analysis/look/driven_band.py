@@ -107,7 +107,7 @@ def estimate_coherences(
             multiple = _estimate_multiple_coherence(spectra, inputs, index)
             power = spectra.get_power_density(index)[in_band]
             worst_hz, worst = _find_worst_octave(spectra.frequency_hz[in_band], multiple[in_band], power)
-            share = float(np.sum(multiple[in_band] * power) / np.sum(power))
+            share = _average_coherence(multiple[in_band], power)
             coherences.append(ResponseCoherence(channel.name, multiple, share, worst_hz, worst))
     return tuple(coherences)
 
@@ -137,11 +137,15 @@ def _find_worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: F
     for octave in np.unique(octaves):
         octave_power = power[octaves == octave]
         if octave_power.sum() >= _NOTABLE_SHARE * power.sum():
-            coherence_by_octave[float(octave)] = float(
-                np.sum(coherence[octaves == octave] * octave_power) / octave_power.sum()
-            )
+            coherence_by_octave[float(octave)] = _average_coherence(coherence[octaves == octave], octave_power)
     worst = min(coherence_by_octave, key=lambda octave: coherence_by_octave[octave])
     return float(2.0 ** (worst + 0.5)), coherence_by_octave[worst]
+
+
+def _average_coherence(coherence: FloatArray, power: FloatArray) -> float:
+    """Average the coherence with the power as weight; 0 without any power. Both arguments: (lines,)."""
+    total_power = power.sum()
+    return float(np.sum(coherence * power) / total_power) if total_power > 0 else 0.0
 
 
 def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:

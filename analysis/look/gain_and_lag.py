@@ -4,7 +4,7 @@ Two channels that show the same quantity differ by a gain g, negative where a si
 samples: Y(f) = g X(f) exp(-2j pi f L / f_s). Each spectral line gives |g| as the square root of the ratio of the
 powers; the result is the weighted median. L follows from the slope of the cross spectrum's phase over frequency. Only
 coherent lines count, each weighted with its share of the second channel's power. A wrong unit shows as a wrong gain, a
-reversed sign as a negative gain, and a clock error or a filter as a lag. Called by `kinematics`. All limits are chosen.
+reversed sign as a negative gain, and a clock error or a filter as a lag. All limits are chosen.
 
 Reference: Bendat and Piersol, Random Data (4th ed., 2010), chapters 5 and 6 (cross spectra, coherence, time delays).
 """

@@ -4,7 +4,7 @@ Testing machines, shakers and drives impose ramps and sines. For both, the speed
 v^2 = p + q x + r x^2, with q = r = 0 for ramps of constant speed and r = -w^2 for a sine of angular frequency w. The
 quadratic is fitted by trimmed least squares in stretches of a few half cycles, so that amplitude and rate may change
 between stretches. A random command, and the response of a device with mass, friction or a nonlinear force, do not obey
-it. `study.importing.imposed_roles` decides with it which imported channel is the command.
+it.
 """
 
 import numpy as np

@@ -73,12 +73,12 @@ def check_proportionality(levels: Sequence[SegmentLevel], channels: Sequence[Cha
     excited_kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
     if not excited_kinds or len({channels[index].unit for index in command_indices}) > 1:
         return ()
-    main_kind = max(set(excited_kinds), key=excited_kinds.count)
+    main_kind = max(dict.fromkeys(excited_kinds), key=excited_kinds.count)  # the first of equally frequent ones
     command_levels = [
         (_compute_command_rms(level, command_indices), level) for level in levels if level.kind == main_kind
     ]
     # Different axes may have different gains: only segments that drive the same axes are compared.
-    active_sets = {_find_active_commands(level, command_indices) for _, level in command_levels}
+    active_sets = dict.fromkeys(_find_active_commands(level, command_indices) for _, level in command_levels)
     checks = []
     for active_set in active_sets:
         comparable_levels = [

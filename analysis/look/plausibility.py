@@ -2,8 +2,7 @@
 offsets.
 
 A wrong unit in an import map scales all identified masses, dampings and stiffnesses; an offset violates the linear
-model. All limits were chosen by hand, those of magnitudes far beyond haptic devices and common test rigs. Called by
-`analysis.look.overview`.
+model. All limits were chosen by hand, those of magnitudes far beyond haptic devices and common test rigs.
 """
 
 from collections.abc import Sequence
@@ -15,7 +14,6 @@ from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.units import NO_UNIT
 
 UNITS_CHECK, OFFSETS_CHECK = "units", "static offset"
-"""Names of the checks of this module."""
 _LARGEST_PEAKS = {
     "N": 1e7, "N m": 1e7, "m": 1e3, "m/s": 1e3, "m/s^2": 1e5, "rad/s": 1e5, "rad/s^2": 1e8, "V": 1e4, "A": 1e4,
     "K": 2e3, "Pa": 1e10,
@@ -75,7 +73,7 @@ def _check_channel_unit(channel: Channel) -> Check | None:
 
 
 def _report_wrong_unit(channel: Channel, finding: str) -> Check:
-    """Make a check of level "wrong" on the unit. finding: the sentence with the reason."""
+    """Make a check of level "wrong" on the unit."""
     return Check(UNITS_CHECK, "wrong", finding, f"Check the unit of {channel.label} in the map.")
 
 

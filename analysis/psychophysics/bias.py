@@ -8,10 +8,9 @@ and one of 1.0 leaves 69.7 %.
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1, 2 and 6;
 the log-linear correction is that of M. J. Hautus, Behav. Res. Methods Instrum. Comput. 27 (1995), 46-51.
 
-Sign of the criterion, everywhere in hapteq: c = -(z(H) + z(F)) / 2 (Macmillan and Creelman, equation 2.1), where a hit
-is the answer 1 to a 1 and a false alarm the answer 1 to a 2. So c > 0 is a tendency to answer 2 (in a detection run,
-the second interval), c < 0 a tendency to answer 1. Criteria of simulated participants have the same sign. Called by
-`thresholds`, `criterion_drift` and `cues.cue_findings`.
+Sign of the criterion: c = -(z(H) + z(F)) / 2 (Macmillan and Creelman, equation 2.1), where a hit is the answer 1 to a
+1 and a false alarm the answer 1 to a 2. So c > 0 is a tendency to answer 2 (in a detection run, the second interval),
+c < 0 a tendency to answer 1.
 """
 
 from collections.abc import Sequence
@@ -29,7 +28,7 @@ class ResponseBias:
     d_prime: float
     """d' over all levels of the run: it describes the run and is not a threshold."""
     criterion: float
-    """c, in units of d'. 0: no tendency; positive: a tendency to answer 2; negative: to answer 1."""
+    """c, in units of d'; positive: a tendency to answer 2."""
 
 
 def estimate_response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> ResponseBias | None:

@@ -2,8 +2,6 @@
 
 A wrong answer is no proof of inattention: at high frequencies a person may not perceive a direction even at full level.
 The rate per participant and frequency is wrong over answered trials, with Wilson's 95 % interval.
-Called by `study_analysis`; `observed_shares`, `coverage_words`, `power_curve` and `study_warnings` call
-`compute_wilson_interval` alone.
 """
 
 from collections.abc import Iterable
@@ -57,7 +55,7 @@ def compute_wilson_interval(event_count: int, trial_count: int) -> tuple[float, 
 
 
 def _make_tally(subject: str, frequency_hz: float, wrong_count: int, answered_count: int) -> CatchTally:
-    """Make the tally from the numbers of wrong and of all answers."""
+    """Make the tally; answered_count: at least 1."""
     return CatchTally(
         subject,
         frequency_hz,

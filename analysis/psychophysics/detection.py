@@ -5,8 +5,7 @@ Sensitivity is d' = (z(H) - z(F)) / sqrt(2). Direction thresholds are then expre
 is censored ("cut") where the force cap limited its staircase (`thresholds.Threshold.censored`).
 
 Source of the two-interval sensitivity: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed.
-(2005), chapter 7. Called by `study_analysis` for protocols with a detection phase, by `study_warnings`, by
-`analysis.figures.study_pictures` and by `study.workflows.results.session_results`.
+(2005), chapter 7.
 """
 
 import math

@@ -1,10 +1,9 @@
 """Ratio of delivered to requested (target) acceleration by frequency and direction, in a study whose stimuli are
 equalized.
 
-The ratio is computed per direction of the device (its angle), not per number on the screen. The numbers may be swapped
-between people; a device that delivers too much along one direction and too little along the other would then seem
-correct on average. Called by `analysis.psychophysics.study_analysis` (the warning) and
-`analysis.reports.supplementary_tables` (the table).
+Where two angles are known, the ratio is computed per direction of the device (its angle), not per number on the screen.
+The numbers may be swapped between people; a device that delivers too much along one direction and too little along the
+other would then seem correct on average.
 """
 
 from collections.abc import Sequence

@@ -2,7 +2,7 @@
 
 An analysis never mixes these populations: answers of simulated participants, or of people who felt nothing, say nothing
 about human thresholds. The column `felt` of a trial decides: empty (simulated participant), true (a person) or false (a
-person at a device that did not move). Called by `study_analysis` and `collect_sessions`.
+person at a device that did not move).
 """
 
 from collections.abc import Iterable
@@ -26,7 +26,7 @@ def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial
     """Split the trials by population, in the order of `Population`; trials are ordered by session, and sessions by
     their first trial. A population without trials has no key.
 
-    Raises ValueError, with the name of the session, where the answers of one session belong to different populations.
+    Raises ValueError, with the name of the session, where its answers belong to different populations.
     """
     sessions: dict[tuple[str, str], list[Trial]] = {}
     for trial in trials:

@@ -3,8 +3,7 @@ allowed time.
 
 A void presentation is played again. A participant who makes presentations void when unsure therefore gains evidence
 from several presentations, which biases the threshold downwards: in simulations with unlimited repeats by 1.9 to
-4.8 dB. A session limits the use of the repeat key, but not pauses and leaving. Called by `thresholds` and
-`study_analysis`; `analysis.reports.study_tables` prints the limits.
+4.8 dB.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,8 +44,7 @@ def format_repeat_warning(trials: Sequence[Trial]) -> str:
 
 
 def _list_frequent_repeats(trials: Sequence[Trial], get_group_name: Callable[[Trial], str]) -> list[str]:
-    """List a text for each group of trials in which void presentations are frequent. get_group_name: gives the name of
-    a trial's group."""
+    """List a text for each group of trials in which void presentations are frequent."""
     voids_by_group: dict[str, list[bool]] = {}
     for trial in trials:
         voids_by_group.setdefault(get_group_name(trial), []).append(trial.void_cause in PARTICIPANT_CAUSES)

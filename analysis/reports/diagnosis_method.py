@@ -1,6 +1,5 @@
 """Paragraphs of a diagnosis report on the method: error measure, split of the samples, noise estimate, re-tuning and
-choice of effects, tests in the map of the mismatch. Durations and limits are those of the diagnosis. Called by
-`analysis.reports.diagnosis_report`."""
+choice of effects, tests in the map of the mismatch."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
@@ -82,8 +81,8 @@ def _describe_noise_source(findings: Findings) -> tuple[str, ...]:
 
 
 def _describe_effect_choice(findings: Findings) -> tuple[str, ...]:
-    """Describe the re-tuning within the calibration's tolerance, and the search for effects; none where nothing is
-    missing."""
+    """Describe the re-tuning within the calibration's tolerance, and the search for effects; none without a
+    mismatch."""
     if not findings.diagnosis.mismatch:
         return ()
     bound_sd = RETUNING_BOUND if findings.tuning is None else findings.tuning.bound

@@ -1,9 +1,7 @@
 """Report section on faults injected into real recordings: how often the diagnosis named them.
 
-A known fault of mechanism, actuator or sensor is added to one of two stretches of a real recording; the diagnosis gets
-both stretches and the model. The section has the rates of right answers with 95 % intervals, tallies by kind of fault
-and by recording, and every miss. `analysis.evaluation.blind_test.injected_faults` judges the answers. Called by
-`real_report`; `study.evaluation.real.real_summary` formats rates by `format_rate`.
+A known fault of mechanism, actuator or sensor, or none, is added to one of two stretches of a real recording; the
+diagnosis gets both stretches and the model. `analysis.evaluation.blind_test.injected_faults` judges the answers.
 """
 
 from collections.abc import Sequence

@@ -57,12 +57,14 @@ def summarise_overview(overview: Overview) -> str:
     """Summarise a recording in a sentence: duration, sample rate, number of channels and segments, and the checks
     counted by level. Times are in samples where the recording has no time axis."""
     recording = overview.recording
+    channel_count, segment_count = len(overview.channels), len(recording.segments)
     count_by_level = {
         level: sum(check.level == level for check in overview.checks) for level in ("wrong", "notice", "fine")
     }
     sentence = (
         f"{overview.name}: {recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, "
-        f"{len(overview.channels)} channels, {len(recording.segments)} segments; checks: "
+        f"{channel_count} channel{'s' if channel_count != 1 else ''}, "
+        f"{segment_count} segment{'s' if segment_count != 1 else ''}; checks: "
         f"{count_by_level['wrong']} wrong, {count_by_level['notice']} to notice, {count_by_level['fine']} fine."
     )
     return sentence if recording.is_timed else replace_time_units(sentence)

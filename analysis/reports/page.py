@@ -1,7 +1,6 @@
 """Data classes of a report, and its rendering as a single self-contained HTML page (template `page.html.j2`).
 
-Figures are inline SVG, so that a page can be archived or sent as one file. All text is escaped. The modules
-`analysis.reports.*_report` call `render_page`; those named `*_section` and `*_tables` make the parts of pages.
+Figures are inline SVG, so that a page can be archived or sent as one file. All text is escaped.
 """
 
 from collections.abc import Mapping
@@ -42,7 +41,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A complete report; `render_page` renders it."""
+    """A complete report."""
 
     title: str
     summary: str

@@ -66,8 +66,9 @@ def render_real_report(
     return render_page(
         Page(
             title="Diagnosis of real recordings",
-            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named_count} of "
-            "them physics was named. The remaining error and the objections to each answer are given with it.",
+            summary=f"Recordings of real devices that were compared with simple models: {len(answers)}. Recordings in "
+            f"which physics was named: {named_count}. The remaining error and the objections to each answer are given "
+            "with it.",
             banner=_describe_unusable_inputs(unusable_inputs),
             sections=tuple(sections),
             generated=generated,
@@ -128,7 +129,7 @@ def _describe_unusable_inputs(unusable_inputs: Sequence[UnusableInput]) -> str:
     """Describe in a sentence how many inputs could not be used, for the banner; empty where there are none."""
     if not unusable_inputs:
         return ""
-    return f"{len(unusable_inputs)} folders or files could not be used; they are named below."
+    return f"Folders or files that could not be used: {len(unusable_inputs)}. The reasons are below."
 
 
 def _make_recording_section(real_answer: RealAnswer, picture: Picture | None) -> Section:

@@ -3,7 +3,7 @@
     F = -m dv/dt        m > 0 in kg (a rotation: kg m²)
 
 It is added to the mass matrix along the driven axis: M + m a aᵀ, a the axis's unit vector. The limits of m, 1e-9 and
-1e6, only keep a fit positive and finite. An entry of `catalogue`, which simulation and diagnosis look up by name.
+1e6, only keep a fit positive and finite.
 """
 
 from dataclasses import replace
@@ -17,8 +17,8 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _INITIAL_MASS_SHARE = 0.1
-"""Second starting value, as a share of the model's own mass: re-tuning the model may have absorbed the missing mass.
-Chosen."""
+"""Second starting value, as a share of the model's own mass (over all axes: the smallest), because re-tuning may have
+absorbed the missing mass. Chosen."""
 
 
 def _add_mass(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:

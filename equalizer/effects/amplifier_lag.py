@@ -3,7 +3,7 @@
     T dF/dt + F = u        T in s, command u and actuator force F in N (a rotation: N m)
 
 The solution for a command that is held over a step is exact (`simulation.command_path`). The limits of T, 1e-6 and 1 s,
-only keep a fit positive and finite. An entry of `catalogue`, which simulation and diagnosis look up by name.
+only keep a fit positive and finite.
 """
 
 import numpy as np

@@ -2,8 +2,7 @@
 
     F = -level_positive where v > 0, +level_negative where v < 0        levels in N (a rotation: N m)
 
-The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
-An entry of `equalizer.effects.catalogue`.
+The force jumps at v = 0; the simulation replaces the jump by a bristle that slips after 50 nm (`dry_friction_kernel`).
 """
 
 import numpy as np

@@ -3,7 +3,6 @@
     F = -k2 x^2        k2 in N/m^2 (a rotation: N m/rad^2)
 
 adds to the linear spring force -k x: with k2 > 0 the spring stiffens for x > 0 and softens for x < 0.
-`equalizer.effects.catalogue` lists the effect.
 """
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values

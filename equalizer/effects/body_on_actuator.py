@@ -2,7 +2,6 @@
 
 A body of mass m and position q is coupled to the axis (position x, velocity v) by a damper c and a spring k:
 F = -(c (v - q') + k (x - q)), m q'' = -F. It adds a coordinate to the model. `extra_mode` is the lightly damped case.
-An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -28,7 +27,7 @@ def _add_body(model: MechanicalModel, axis: int, values: Values) -> MechanicalMo
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find starting values from the two oscillators that explain most of the missing force, tried at 50 natural
+    """Find starting values from at most two oscillators that explain most of the missing force, tried at 50 natural
     frequencies from 2 Hz to 0.4 of the sample rate (chosen): k = m w², c = 2 ratio m w, w = 2 pi natural_hz."""
     missing_spectra = estimate_missing_force_spectra(evidence, axis)
     natural_hz = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()

@@ -1,9 +1,8 @@
 """Catalogue of the effects that a diagnosis can name and a simulation can include by their name.
 
 A diagnosis can also name laws that are not listed here; a simulation includes them as formulas, if at all
-(`analysis.diagnosis.effect_words`). Each module that is imported here defines one `EFFECT`. A new effect needs its own
-module, an entry here and its name in `equalizer.plant.effect_vocabulary`, in the same order. Read by the search for
-effects (`analysis.diagnosis`) and by `equalizer.effects.placing`; exported by `equalizer`.
+(`analysis.diagnosis.effect_words`). Each effect module that is imported here defines one `EFFECT`. A new effect needs
+its own module, an entry here and its name in `equalizer.plant.effect_vocabulary`, in the same order.
 """
 
 from equalizer.effects import (

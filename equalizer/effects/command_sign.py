@@ -3,8 +3,7 @@
 The positive direction of a driven axis is that in which a positive command pushes. Where the sign of the command is
 reversed, the coordinate x of the axis and all forces along it reverse too: F(x, v) becomes -F(-x, -v). Odd laws, such
 as friction or springs, stay the same; `SIGN_REVERSED`, `DIRECTION_PAIRS` and `CROSS_AXIS_TILTS` list the parameters of
-other effects that change. Called by `analysis.diagnosis.data.recorded_conditions`, for recordings that state reversed
-channels.
+other effects that change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +35,7 @@ def reverse_commands(
     model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> MechanicalModel:
     """Convert a model such that its response to the command times `signs` (1 or -1 per input) equals that of `model` to
-    the command. inputs, outputs: channel names. Raises PlacingError for an effect on an unknown axis."""
+    the command. inputs, outputs: channel names. Raises PlacingError for a sign-dependent effect on an unknown axis."""
     axis_signs = np.asarray(signs, dtype=np.float64)
     effects = [
         reversed_effect

@@ -2,8 +2,7 @@
 
     F = force        in N (a rotation: N m), of either sign
 
-It shifts the equilibrium position; a linear model keeps its resonances. An entry of `catalogue`, which simulation and
-diagnosis look up by name.
+It shifts the equilibrium position; a linear model keeps its resonances.
 """
 
 import numpy as np

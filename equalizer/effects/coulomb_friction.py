@@ -3,8 +3,7 @@
     F = -level sgn(v) in sliding, any force from -level to level at rest; level in N (a rotation: N m)
 
 The simulation replaces the jump at v = 0 by the bristle of the LuGre model, which slips after 50 nm
-(`equalizer.effects.simulation.dry_friction_kernel`). An entry of `catalogue`, which simulation and diagnosis look up by
-name.
+(`equalizer.effects.simulation.dry_friction_kernel`).
 """
 
 import numpy as np

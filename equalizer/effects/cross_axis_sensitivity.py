@@ -3,7 +3,7 @@ orthogonal.
 
     y_i = x_i + from_next x_(i+1) + from_after_next x_(i+2)        channels counted cyclically, shares without unit
 
-`EFFECT` is an entry of `equalizer.effects.catalogue`, whose effects are simulated and fitted by name.
+An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ SHARE_NAMES = ("from_next", "from_after_next")
 MAX_SHARE = 1.0
 """Largest share of another channel. Chosen: a larger one indicates exchanged channels, a wiring error."""
 MIN_SHARE = 1e-4
-"""Share at or below which no starting values are returned. Chosen: a hundredth of the 1 % that accelerometer data
-sheets allow."""
+"""Largest share at or below which no starting values are returned. Chosen: a hundredth of the 1 % that accelerometer
+data sheets allow."""
 
 
 def _list_following_channels(channel: int, channel_count: int) -> list[int]:
@@ -28,8 +28,8 @@ def _list_following_channels(channel: int, channel_count: int) -> list[int]:
 
 
 def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    """Add the shares of the following channels to each of `channels`: response (n, p) of the sensor. Shares of channels
-    that the response does not have are ignored; sample_rate_hz is not used."""
+    """Add the shares of the following channels to each of `channels` of the response (n, p); shares of channels that it
+    does not have are ignored."""
     sensed_response = response.copy()
     for channel in channels:
         for name, source_channel in zip(

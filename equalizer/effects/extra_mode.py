@@ -1,10 +1,10 @@
-"""Extra mode: a lightly damped oscillator on the axis, where the model assumes a rigid part.
+"""Extra mode: an oscillator (mass, spring, damper) on the axis, where the model assumes a rigid part.
 
     q'' + 2 z w (q' - s') + w² (q - s) = 0,   F = -m q''        w = 2 pi f
 
 s is the motion of the axis, q that of the attached mass m, f its natural frequency, z its damping ratio. The direction
-of the oscillator may be tilted towards the other axes (`tilt_next`, `tilt_after_next`). An entry of `catalogue`, which
-simulation and diagnosis look up by name.
+of the oscillator may be tilted towards the other axes (`tilt_next`, `tilt_after_next`). An entry of
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -48,7 +48,7 @@ def _attach_oscillator(model: MechanicalModel, axis: int, values: Values) -> Mec
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Find up to `MAX_MODES` oscillators that explain most of the missing force, each by a coarse and a fine grid
-    search over natural frequency (first 90 values up to 0.4 of the sample rate, chosen) and damping ratio."""
+    search over natural frequency (coarse: 90 values up to 0.4 of the sample rate, chosen) and damping ratio."""
     missing_force, starting_values = estimate_missing_force_spectra(evidence, axis), []
     natural_hz = np.geomspace(LOWEST_NATURAL_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(MAX_MODES):

@@ -3,7 +3,7 @@
     F = 0 where |u| <= width,  else F = u - (1 - jump) width sgn(u)        u, F, width in N; jump from 0 to 1
 
 With jump = 1 the force equals the command beyond the band; with jump = 0 it grows from zero there. An entry of
-`catalogue`, which simulation and diagnosis look up by name.
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -15,8 +15,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def _apply_deadband(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Compute the force (n,) for commands (n,), both in N; `step_s` is not used, because the dead band has no memory. A
-    missing jump is 0."""
+    """Compute the force (n,) for commands (n,), both in N. A missing jump is 0."""
     width = values["width"]
     jump = values.get("jump", 0.0) * width * np.sign(commands) * (np.abs(commands) > width)
     return np.asarray(commands - np.clip(commands, -width, width) + jump)
@@ -42,7 +41,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 def _remove_jump(values: Values) -> tuple[Values, ...]:
     """Convert to the dead band without a jump that gives the same force beyond the band: the two differ only for
-    commands between both widths, where a recording has few samples. Empty for a jump of 0 or 1."""
+    commands between both widths. Empty for a jump of 0 or 1."""
     jump = values.get("jump", 0.0)
     return ({"width": values["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
 

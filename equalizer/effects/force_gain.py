@@ -16,14 +16,13 @@ _MIN_DEVIATION = 1e-4
 
 
 def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Multiply the commands (n,), N, by the gain. step_s is not used."""
+    """Multiply the commands (n,), N, by the gain."""
     return np.asarray(values["gain"] * commands)
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Estimate gain = 1 + sum(u f) / sum(u²) by least squares of the missing force f over the command u, and over u one
-    sample earlier; the gain farther from 1 is returned. Empty where it is not positive or within `_MIN_DEVIATION` of
-    1."""
+    sample earlier; the one farther from 1. Empty where it is not positive or within `_MIN_DEVIATION` of 1."""
     columns, is_used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
     commanded, missing_force = evidence.command[is_used, columns], evidence.axis_force[is_used, columns]
     # The estimated force may lag by a sample.

@@ -3,7 +3,7 @@
     F = u (1 - square + square |u| / reference)        u, F, reference in N; square without unit
 
 square = 1 is the pure square law of a propeller or of a coil without bias current; square < 0 is a gain that falls as
-the command grows. An entry of `catalogue`, which simulation and diagnosis look up by name.
+the command grows. An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ def apply_square_law(commands: FloatArray, square: float, reference: float) -> F
 
 
 def _compute_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Compute the force (n,): `OnCommand.change` of this effect; `step_s` is not used."""
+    """Compute the force (n,): `OnCommand.change` of this effect."""
     return apply_square_law(commands, values["square"], values["reference"])
 
 

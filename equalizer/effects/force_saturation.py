@@ -2,7 +2,7 @@
 
     F = max(-limit, min(u, limit))        command u, force F and limit in N
 
-The effect vanishes for an infinite limit. An entry of `catalogue`, which simulation and diagnosis look up by name.
+An entry of `equalizer.effects.catalogue`.
 """
 
 import math
@@ -16,7 +16,7 @@ from equalizer.signals.signal import FloatArray
 
 
 def _clip_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Limit the commands (n,): `OnCommand.change` of this effect; `step_s` is not used."""
+    """Limit the commands (n,): `OnCommand.change` of this effect."""
     return np.clip(commands, -values["limit"], values["limit"])
 
 

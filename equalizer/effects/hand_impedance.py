@@ -2,8 +2,8 @@
 
     F = -(m dv/dt + c v + k x)        in kg, N s/m, N/m (a rotation: kg m², N m s/rad, N m/rad)
 
-The values are added to the model's mass, damping and stiffness matrices along the axis. An entry of `catalogue`, which
-simulation and diagnosis look up by name.
+The values are added to the model's mass, damping and stiffness matrices along the axis. An entry of
+`equalizer.effects.catalogue`.
 """
 
 from dataclasses import replace

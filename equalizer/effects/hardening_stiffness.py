@@ -2,7 +2,7 @@
 
     F = -k3 x³        k3 > 0: hardening, k3 < 0: softening; N/m³ (a rotation: N m/rad³)
 
-An entry of `catalogue`, which simulation and diagnosis look up by name.
+An entry of `equalizer.effects.catalogue`.
 """
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
@@ -18,8 +18,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
     """Compute the force (N) over one step: the mean of those at its start and end (trapezoidal rule).
 
     The end position depends on this force (implicit step), x_end = x_free + x_per_n F, so that
-    g(F) = F + k3/2 (x³ + x_end³) = 0 is solved by Newton's method, dg/dF = 1 + 3 k3/2 x_per_n x_end². Started at the
-    force without feedback, four iterations are enough, because one step moves the axis little.
+    g(F) = F + k3/2 (x³ + x_end³) = 0 is solved by Newton's method, dg/dF = 1 + 3 k3/2 x_per_n x_end²: four iterations
+    (chosen) from the force for x_end = x_free.
     """
     half_stiffness, start_cubed = 0.5 * parameters[0], step_motion[X] ** 3
     force = -half_stiffness * (start_cubed + step_motion[X_FREE] ** 3)

@@ -1,7 +1,7 @@
 """Constant time offset between two data loggers: the response is recorded late or early, the position is not.
 
 y(t) = x(t - offset). The offset may be a fraction of a sample; the logger may have interpolated linearly between
-samples, which attenuates high frequencies. An entry of `catalogue`, which simulation and diagnosis look up by name.
+samples, which attenuates high frequencies. An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ def _shift_response(
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find starting values: the lag of the measured response behind the predicted one, by cross-correlation weighted
-    with the noise, with linear and with band-limited interpolation, that of the smaller misfit first. Empty for an
+    with the noise, with linear and with band-limited interpolation, the one of the smaller misfit first. Empty for an
     offset of at most `SMALLEST_OFFSET_SAMPLES`, and for channels after the first, because all channels have the same
     offset."""
     if channel > 0:
@@ -38,7 +38,6 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
     lag_samples = estimate_lag(evidence.response * weight, evidence.predicted * weight, largest_lag_samples)
     if abs(lag_samples) <= SMALLEST_OFFSET_SAMPLES:
         return ()
-    # Linear interpolation between samples attenuates high frequencies, band-limited interpolation does not.
     starts = [
         {"offset": lag_samples / evidence.sample_rate_hz, "interpolated": linear_share} for linear_share in (0.0, 1.0)
     ]

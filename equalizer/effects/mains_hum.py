@@ -104,9 +104,9 @@ def _find_strongest_channel(residual: FloatArray, evidence: Evidence, line: int)
 
 def _compute_steadiness(samples: FloatArray, evidence: Evidence, frequency_hz: float) -> float:
     """Compute the constancy of a tone's amplitude and phase over the blocks, 0 to 1: magnitude of the mean phasor over
-    the rms of the blocks' phasors. samples: (n,), of one channel."""
+    the rms of the blocks' phasors, of samples with `evidence.used` = 1. samples: (n,), of one channel."""
     demodulated = np.exp(-2j * np.pi * frequency_hz * np.arange(len(samples)) / evidence.sample_rate_hz) * samples
-    block_sums = np.array([block.sum() for block in np.array_split(demodulated, BLOCK_COUNT)])
+    block_sums = np.array([block.sum() for block in np.array_split(demodulated * evidence.used, BLOCK_COUNT)])
     block_counts = np.array([block.sum() for block in np.array_split(evidence.used, BLOCK_COUNT)])
     block_phasors = block_sums[block_counts > 0] / block_counts[block_counts > 0]
     rms_phasor = float(np.sqrt(np.mean(np.abs(block_phasors) ** 2)))

@@ -53,7 +53,7 @@ def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> Float
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find starting values of per_m by regression of the missing force: first with a separate strength of either term,
+    """Find starting values of per_m by regression of the missing force: first with a separate strength of each term,
     if their ratio is within the upper limit 1.5 of speed_share in magnitude (a negative ratio becomes 0), then with the
     ratio of Lagrange's equation. Values with per_m = 0 are left out."""
     motion = select_axis_motion(evidence, axis)

@@ -3,7 +3,7 @@
     F = -k z,   dz/dt = v - k |v| z / level        level in N, k in N/m (a rotation: N m, N m/rad)
 
 The bristle deflection z saturates at level / k, where F = -level sgn(v) as in Coulomb friction. An entry of
-`catalogue`, which simulation and diagnosis look up by name.
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -17,8 +17,7 @@ from equalizer.effects.starts.starting_values import find_best_trial, regress_ou
 from equalizer.signals.signal import FloatArray
 
 RELATIVE_DEFLECTIONS = np.geomspace(3e-4, 1.0, 15)
-"""Deflections level / k that are tried for starting values, relative to the rms position.
-Chosen."""
+"""Deflections level / k that are tried for starting values, relative to the rms position. Chosen."""
 
 
 @compile_law

@@ -2,8 +2,7 @@
 
     F = -c v |v|        c in N s²/m² (a rotation: N m s²/rad²)
 
-A simulation solves for the velocity at the end of each step (implicit trapezoidal rule). Loaded by
-`equalizer.effects.catalogue`.
+An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np

@@ -20,15 +20,13 @@ from equalizer.effects.starts.response_starts import list_site_channels
 from equalizer.signals.signal import FloatArray
 
 MIN_TAIL_PROBABILITY = 1e-12
-"""Smallest tail probability for which a quantile is computed; below it too few significant digits remain.
-Chosen."""
+"""Smallest tail probability for which a quantile is computed; below it too few significant digits remain. Chosen."""
 
 
 def _round_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """Round these channels of a response (n, p) to multiples of the step; unchanged for a step of 0. sample_rate_hz is
-    not used."""
+    """Round these channels of a response (n, p) to multiples of the step; unchanged for a step that is not above 0."""
     rounded = response.copy()
     if values["step"] > 0:
         rounded[:, channels] = values["step"] * np.round(response[:, channels] / values["step"])

@@ -2,8 +2,7 @@
 
     y = max(-limit, min(x, limit))        x: true signal, y: reading, limit: in the unit of the response
 
-The mechanism is not affected: the response is clipped after the simulation. An entry of `catalogue`, which simulation
-and diagnosis look up by name.
+The mechanism is not affected: the response is clipped after the simulation. An entry of `equalizer.effects.catalogue`.
 """
 
 import math
@@ -19,8 +18,7 @@ from equalizer.signals.signal import FloatArray
 def _clip_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """Clip these channels of the response (n, p) at +-limit: `OnResponse.change` of this effect; the sample rate is not
-    used."""
+    """Clip these channels of the response (n, p) at +-limit: `OnResponse.change` of this effect."""
     readings = response.copy()
     readings[:, channels] = np.clip(response[:, channels], -values["limit"], values["limit"])
     return readings
@@ -28,7 +26,7 @@ def _clip_response(
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find the limit, from 5 % to 99 % of the predicted peak, that brings the predicted response closest to the
-    measured one; empty where no limit does better than none."""
+    measured one; empty where no limit is clearly better than none."""
     peak = float(np.abs(evidence.predicted[:, list(list_site_channels(evidence, channel))]).max())
     if peak == 0:
         return ()

@@ -5,8 +5,8 @@ The drift is a parabola over the recording's length, added to the response x:
     y = x + total (start + s + 4 bend s (1 - s)),    s from 0 at the first sample to 1 at the last.
 
 `total` is the change of the offset from beginning to end, in the response's unit; `bend` the deviation from a straight
-line in the middle, and `start` the offset at the beginning, both relative to `total`. An entry of `catalogue`, which
-simulation and diagnosis look up by name.
+line in the middle, and `start` the offset at the beginning, both relative to `total`. An entry of
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 
     y = gain x        x: true response, y: reading, both in the unit of the response
 
-The measured position is not affected, in contrast to a gain error of the actuator. An entry of `catalogue`, which
-simulation and diagnosis look up by name.
+The measured position is not affected, in contrast to a gain error of the actuator. An entry of
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ from equalizer.effects.starts.response_starts import list_site_channels
 from equalizer.signals.signal import FloatArray
 
 LEAST_DEVIATION = 1e-4
-"""Least deviation of a gain from 1 that is tried. Chosen."""
+"""Deviation of a gain from 1 that must be exceeded for it to be tried. Chosen."""
 
 
 def _scale_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """Scale these channels of the response (n, p): `OnResponse.change` of this effect; the sample rate is not used."""
+    """Scale these channels of the response (n, p): `OnResponse.change` of this effect."""
     readings = response.copy()
     readings[:, channels] *= values["gain"]
     return readings

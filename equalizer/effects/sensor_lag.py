@@ -2,8 +2,8 @@
 
     dy/dt = 2 pi f (x - y)        f: bandwidth (-3 dB) in Hz, used instead of the model's
 
-with x the motion and y the reading. The sensor model applies the low pass (`simulation.sensor_path.apply_low_pass`,
-discrete at the sample rate). `equalizer.effects.catalogue` lists the effect.
+with x the true response and y the reading. The sensor model applies the low pass (`simulation.sensor_path`, discrete at
+the sample rate). `equalizer.effects.catalogue` lists the effect.
 """
 
 import math
@@ -36,7 +36,7 @@ def _replace_bandwidth_hz(model_bandwidth_hz: float, values: Values) -> float:
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Find the bandwidth that fits a channel's measured response best in place of the model's, by search over a
-    geometric grid of ten (chosen), refined by golden section; empty where none improves the fit."""
+    geometric grid of ten (chosen), refined by golden section; empty where none clearly improves the fit."""
     sample_rate_hz, model_bandwidth_hz = evidence.sample_rate_hz, evidence.model.sensor.bandwidth_hz
     bandwidth = find_response_parameter(
         evidence,

@@ -3,8 +3,7 @@
     y = R x,    R the rotation of a rotation vector (degrees about x, y, z)
 
 Three channels are rotated; of two channels, the readings are the first two components of the rotated vector whose third
-component is 0: a rotation where R is about the axis perpendicular to both. An entry of `catalogue`, which simulation
-and diagnosis look up by name.
+component is 0: a rotation where R is about the axis perpendicular to both. An entry of `equalizer.effects.catalogue`.
 """
 
 import math
@@ -18,9 +17,10 @@ from equalizer.signals.signal import FloatArray
 ANGLE_NAMES = ("about_x", "about_y", "about_z")
 """Parameters: components of the rotation vector, in degrees."""
 LARGEST_ANGLE_DEG = 120.0
-"""Largest angle (degrees). Chosen below half a turn, because the rotation vector is unique only there."""
+"""Largest angle of starting values, and largest component in a fit (degrees). Chosen: below half a turn, where the
+rotation vector is unique."""
 LEAST_ANGLE_DEG = 0.01
-"""Least angle (degrees) that is tried. Chosen."""
+"""Angle (degrees) that must be exceeded for the effect to be tried. Chosen."""
 
 
 def _rotate_response(

@@ -2,8 +2,8 @@
 
     y = x + cubic x³        cubic in 1 / (unit of the response)²
 
-The reading has odd harmonics that grow with the level; the measured position is not affected. An entry of `catalogue`,
-which simulation and diagnosis look up by name.
+The reading has odd harmonics that grow with the level; the measured position is not affected. An entry of
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np

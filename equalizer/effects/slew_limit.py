@@ -75,9 +75,9 @@ def _compute_mean_and_end_force(commands: FloatArray, step_s: float, rate: float
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find starting values of the rate: the likeliest of twelve (chosen) from 1 to 100 % of the command's largest rate
-    of change, geometrically spaced; where the residual of the response exceeds its noise, also `RATE_SHARES` of that
-    largest rate. Empty for a constant command."""
+    """Find starting values of the rate: the likeliest from 1 to 100 % of the command's largest rate of change, by grid
+    search (twelve values, chosen) and golden section; where the residual of the response exceeds its noise, also
+    `RATE_SHARES` of that largest rate. Empty for a constant command."""
     commands = evidence.command if axis == ALL_SITES else evidence.command[:, axis]
     largest_rate = float(np.abs(np.diff(commands, axis=0)).max()) * evidence.sample_rate_hz
     if largest_rate == 0:

@@ -3,7 +3,7 @@
     F = -(coulomb + (static - coulomb) exp(-(v / speed)²)) sgn(v)        levels in N, speed in m/s
 
 The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`). An
-entry of `catalogue`, which simulation and diagnosis look up by name.
+entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ _INITIAL_STATIC_RATIO = 1.2
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Compute the mean friction force (N) over the step, at its mean velocity, which depends on the force: at most
-    three fixed-point iterations, each from the same bristle deflection, until the level changes by at most 1e-6.
+    three fixed-point iterations, each from the same bristle deflection, until the level changes by at most a millionth.
     parameters: as `_pack_parameters` returns them. memory: deflection of the bristle, relative to that at which it
     slips."""
     mean_velocity, force, start_deflection, previous_level = step_motion[V], 0.0, memory[0], -1.0

@@ -136,7 +136,8 @@ def _find_likely_frequencies(
     missing_force: FloatArray, damping_force: FloatArray, sample_rate_hz: float
 ) -> list[float]:
     """Find the likeliest modulation frequencies (Hz), by the power that a regression of the missing force on the
-    damping force (times 1, sine, cosine) explains at each frequency. missing_force, damping_force: (n, sites), N."""
+    damping force (times 1, sine, cosine) explains at each frequency; fewer than `START_COUNT`, or none, in a short
+    recording. missing_force, damping_force: (n, sites), N."""
     sample_count = len(missing_force)
     padded_size = _POINTS_PER_LINE * sample_count
     # The products of sine and cosine contain twice the frequency, which must stay below half of the sample rate.
@@ -166,6 +167,8 @@ def _find_likely_frequencies(
     modulation_frequencies_hz = []
     for _ in range(START_COUNT):
         line = int(np.argmax(explained_power))
+        if explained_power[line] == -np.inf:  # a short recording has no further line
+            break
         modulation_frequencies_hz.append(line * sample_rate_hz / padded_size)
         explained_power[max(line - 2 * _POINTS_PER_LINE, 0) : line + 2 * _POINTS_PER_LINE + 1] = -np.inf
     return modulation_frequencies_hz

@@ -1,8 +1,7 @@
 """Transport delay of the command, as of a bus or a controller's tick: F(t) = u(t - delay).
 
 A command u that is held over a sample period and delayed by (k + r) periods, 0 <= r < 1, has over each period the mean
-(1 - r) u[n - k] + r u[n - k - 1] (`compute_delayed_mean`). An entry of `catalogue`, which simulation and diagnosis look
-up by name.
+(1 - r) u[n - k] + r u[n - k - 1] (`compute_delayed_mean`). An entry of `equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -33,8 +32,8 @@ def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> 
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find delays (s) from the response's time shift and from the missing force, and the first of these across the jump
-    of the misfit (see `JUMP_MARGIN_PERIODS`). Empty where the measured response is early."""
+    """Find delays (s) from the response's time shift and from the missing force, and the first of these moved across
+    the jump of the misfit (`JUMP_MARGIN_PERIODS`). Empty where the measured response is early (`list_lag_starts`)."""
     force_delay_s = find_command_parameter(
         evidence, axis, compute_delayed_mean, list(np.geomspace(SHORTEST_DELAY_S, LONGEST_DELAY_S, 24)), False
     )

@@ -18,11 +18,10 @@ from equalizer.signals.signal import FloatArray
 
 def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
     """Evaluate the law at each sample; returns values (n,). columns: (n,) each, by the signals' names, in SI units;
-    where the time `t` is not among them, it is counted in seconds from the first sample. Between samples signals are
-    interpolated linearly. Operators with memory start in the steady state of the signals' first values, integrals at
-    zero. Outside its domain a function returns NaN or inf.
-
-    Raises LawError where a signal is missing, there are no columns, or their lengths differ.
+    where the time `t` is not among them, it is counted in seconds from the first sample. Operators with memory start in
+    the steady state of the signals' first values, integrals at zero. Outside its domain a function returns NaN or inf.
+    Raises LawError where a signal is missing, there are no columns, their lengths differ, or the law is nested too
+    deeply.
     """
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty(len(signals)), np.zeros(program.memory_size)
@@ -31,8 +30,8 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
 
 
 def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
-    """Evaluate the law at the start and at the end of each step; returns values (2, n). Over a step the signals (n,)
-    are held, as commands are. Before the first sample all signals are zero. Raises LawError as `evaluate` does."""
+    """Evaluate the law at the start and at the end of each step, over which the signals (n,) are held; returns values
+    (2, n). Before the first sample all signals are zero. Raises LawError as `evaluate` does."""
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty((2, len(signals))), np.zeros(program.memory_size)
     memory[0] = FROM_ZERO

@@ -1,8 +1,7 @@
 """Compiler of a formula's expression tree to postfix code for the stack machine in `equalizer.laws.kernel`.
 
 Each row of the code is an operation and an operand; arguments precede their operator. Operators with memory get a
-region of a memory array, whose first number is its state. Called by `evaluate` and by the simulation of laws
-(`effects.discovered_law`).
+region of a memory array. Called by `evaluate` and by the simulation of laws (`effects.discovered_law`).
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,9 +1,8 @@
 """Symmetric grid of positions for the calibration of a delta linkage, and a test of its Jacobian by finite differences.
 
 The azimuths of the arms, estimated from the Jacobian, give the planes of mirror symmetry; the grid is made so that
-reflection about each of them maps it onto itself. Called by `study.workflows.recording.calibrate_linkage` and the
-simulated linkage (`study.devices.simulated`). Axes as in the whole package: x from the base towards the operator, y to
-the right, z up. Azimuths are angles from y towards z.
+reflection about each of them maps it onto itself. Axes as in the whole package: x from the base towards the operator,
+y to the right, z up. Azimuths are angles from y towards z. Called by `study.workflows.recording.calibrate_linkage`.
 """
 
 import math
@@ -27,7 +26,7 @@ def estimate_arm_azimuths(jacobian: FloatArray) -> FloatArray:
 
     There each row of the inverse of J is parallel to its forearm, in the plane of its arm; forearms point inwards and
     towards the operator. The result is the nearest triple at exactly 120 degrees to each other. Raises CalibrationError
-    where an azimuth deviates from it by more than `LARGEST_AZIMUTH_ERROR_DEG`.
+    where an azimuth deviates from it by more than `LARGEST_AZIMUTH_ERROR_DEG`, or two arms share one.
     """
     inverse_rows = np.linalg.inv(jacobian)
     inverse_rows = inverse_rows * np.sign(inverse_rows[:, :1])

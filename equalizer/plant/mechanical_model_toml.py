@@ -199,7 +199,7 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
     effects = []
     for effect_number, entry in enumerate(entries, start=1):
         law = _read_law(entry, effect_number, problems) if entry.get("kind") == DISCOVERED_LAW else None
-        text_keys = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
+        text_keys = ("kind", "axis", *(_LAW_KEYS if entry.get("kind") == DISCOVERED_LAW else ()))
         parameters = {key: value for key, value in entry.items() if key not in text_keys}
         wrong_entries = [f"{key} = {_quote_value(value)}" for key, value in parameters.items() if not _is_number(value)]
         if wrong_entries:

@@ -1,8 +1,7 @@
 """Frequency response and simulation of a discrete state-space model, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k].
 
 The frequency response is C (zI - A)^-1 B + D at z = exp(2 pi j f / rate), by back substitution in the Schur form of A.
-Called by identification (misfit, bootstrap, held-out test), equalization (`equalizer.tracking`,
-`study.workflows.equalizer`) and the identification report. n: order, m: inputs, p: outputs.
+Called by identification, equalization and the identification report. n: order, m: inputs, p: outputs.
 """
 
 import numpy as np

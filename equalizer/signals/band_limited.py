@@ -37,7 +37,6 @@ def filter_by_gain(
     """
     extended_samples = extend_as_odd(samples - compute_end_to_end_line(samples))
     spectrum, lines_hz = rfft(extended_samples, axis=0), rfftfreq(len(extended_samples), 1 / sample_rate_hz)
-    # In blocks: the matrices of all lines at once would take a gigabyte for some minutes of samples at 1 kHz.
     line_blocks = [
         slice(first_line, first_line + LINES_PER_BLOCK) for first_line in range(0, len(lines_hz), LINES_PER_BLOCK)
     ]

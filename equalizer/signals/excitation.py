@@ -1,8 +1,7 @@
 """Deterministic excitation signals for system identification: sinusoids, logarithmic swept sines, and fades.
 
-Called by `study.session.stimulus` for recordings and stimuli, by the design of experiments
-(`analysis.diagnosis.next_experiment`), and by the evaluation of playback (`reproduction` in `study.evaluation` and
-`analysis.evaluation`). A signal has the unit of its amplitude.
+Called by `study.session.stimulus` for recordings and probes, by the design of experiments
+(`analysis.diagnosis.next_experiment`), and by the evaluation of playback. A signal has the unit of its amplitude.
 """
 
 import numpy as np

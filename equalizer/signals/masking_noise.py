@@ -29,8 +29,8 @@ def make_masking_noise(
     """Make one period of pink noise, mono, 16 bit, shape (seconds * sample_rate_hz,).
 
     Every line of the spectrum from low_hz to high_hz has an amplitude proportional to 1 / sqrt(f) and a random phase,
-    so that the slope is exact and the samples are nearly normally distributed. Raises ValueError for less than 1 s,
-    unless 0 < low_hz < high_hz <= half the sample rate, and for a band without a line.
+    so that the slope is exact and, with many lines, the samples are nearly normally distributed. Raises ValueError for
+    less than 1 s, unless 0 < low_hz < high_hz <= half the sample rate, and for a band without a line.
     """
     if seconds < 1:
         raise ValueError(f"seconds is {seconds}; noise lasts at least 1 s")

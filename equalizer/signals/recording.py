@@ -4,7 +4,7 @@ The input of identification and diagnosis. `recording_checks` checks it; `study.
 writes it.
 
 Time convention: `response[k]` and `position[k]` are sampled at t_k, just before `command[k]` is written, which is held
-until t_(k+1). The response of a plant with direct feedthrough to `command[k-1]` therefore appears in `response[k]`.
+until t_(k+1) (`Hold.ZERO_ORDER`). Direct feedthrough of `command[k-1]` therefore appears in `response[k]`.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ SEGMENT_ROLES = ("fit", "test", "")
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A range of samples with a single kind of excitation. Outside all segments the device is at rest."""
+    """A range of samples with a single kind of excitation; where segments are stated, the device rests outside them."""
 
     start: int
     """Index of the first sample."""

@@ -14,11 +14,9 @@ ComplexArray = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """Samples with quantity, unit and channel names; the array is read-only. Units inside the program are SI.
-
-    Raises ValueError for samples that are not (n, channels), numbers of names, units or quantities that do not match
-    the channels, and a sample rate that is not a positive number.
-    """
+    """Samples with quantity, unit and channel names; the array is read-only. Raises ValueError for samples that are not
+    (n, channels), numbers of names, units or quantities that do not match the channels, and a sample rate that is not a
+    positive number."""
 
     samples: FloatArray
     """(n, channels): time along the first dimension; NaN is a missing sample."""

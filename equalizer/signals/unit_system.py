@@ -3,8 +3,7 @@
 In M a + B v + K x = force, the unit of mass is force time² / length, that of damping force time / length, and that of
 stiffness force / length. In SI: N s^2/m = kg, N s/m, N/m; for a rotation N m s^2/rad and so on. Where a command is a
 current (A) or a plain number, the force constant of the motor is unknown and contained in every parameter: a "mass"
-then has the unit A s^2/m, not kg. Called by `plant.mechanical_model`, `effects.discovered_law`, `laws.units`, the
-modules of the diagnosis that print a parameter or a law, and `study.workflows.files.format_docs`.
+then has the unit A s^2/m, not kg. Used where a model, a parameter or a law is printed.
 """
 
 import re

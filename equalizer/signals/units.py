@@ -156,7 +156,8 @@ def parse_unit(text: str) -> Unit:
     exponents_by_symbol: dict[str, int] = {}
     factor = 1.0
     dimension: Dimension = (0,) * 6
-    for symbol, power in _parse_factors(text):
+    factors = [(symbol, power) for symbol, power in _parse_factors(text) if symbol != "1"]
+    for symbol, power in factors:
         unit = _parse_symbol(symbol, text)
         factor *= unit.factor**power
         dimension = tuple(
@@ -165,7 +166,9 @@ def parse_unit(text: str) -> Unit:
         )
         for base_symbol, exponent in _parse_factors(unit.si):
             exponents_by_symbol[base_symbol] = exponents_by_symbol.get(base_symbol, 0) + power * exponent
-    return Unit(_PREFERRED_SPELLINGS.get(dimension) or _format_symbols(exponents_by_symbol), factor, dimension)
+    is_energy = dimension == _TORQUE_DIMENSION and not exponents_by_symbol.keys().isdisjoint(("J", "W"))
+    si = "J" if is_energy else _PREFERRED_SPELLINGS.get(dimension) or _format_symbols(exponents_by_symbol)
+    return Unit(si, factor, dimension, unit.offset if [power for _, power in factors] == [1] else 0.0)
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:

@@ -99,8 +99,9 @@ class SafetySettings:
         Field(
             gt=0,
             le=6.0,
-            description="Upper limit of the norm of the spring's force, of the damper's, and of both together; never "
-            "above total_cap_n. Default 1.5, the difference between total and stimulus cap in the shipped protocols. "
+            description="Upper limit of the norm of the spring's force, of the damper's, and of both together; a value "
+            "above total_cap_n has the effect of total_cap_n. Default 1.5, the difference between total and stimulus "
+            "cap in the shipped protocols. "
             "Leaning on the spring then never reduces a stimulus, and the pull at a wrong position that is not "
             "detected is limited to it. Measured: 1.35 N.",
         ),

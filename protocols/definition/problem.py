@@ -1,8 +1,7 @@
 """Validation problem of one key of a protocol file, and the error that reports such problems.
 
 Raised by the validators of `protocols.definition`; `protocols.document.validation_messages` completes the keys. The
-reading of protocols and of translations (`protocols.document.loading`, `protocols.wording.translation`,
-`study.store.formats`) reports its own problems by the same class.
+reading of protocols and of translations reports its own problems by the same class.
 """
 
 from dataclasses import dataclass

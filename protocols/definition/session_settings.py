@@ -1,7 +1,6 @@
 """Session settings of a study protocol: detection runs, catch trials, start condition of a trial, limits of a sitting.
 
-Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`. Read by
-`protocols.procedure.schedule` (catch trials) and `study.workflows.trial.present_trial` (start condition), among others.
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`.
 """
 
 from typing import Annotated, Self
@@ -65,8 +64,7 @@ class CatchSettings:
 
     @model_validator(mode="after")
     def _require_rare_trials(self) -> Self:
-        """Raise InconsistentError for one_in of 1 to 3: at least three quarters of the trials are then no catch
-        trials."""
+        """Raise InconsistentError for one_in of 1 to 3: at most a quarter of the trials may be catch trials."""
         if self.one_in and self.one_in < 4:
             refuse([Problem("one_in", f"is {self.one_in}", "0 for none, or at least 4: catch trials must stay rare")])
         return self

@@ -1,7 +1,7 @@
 """Serialisation of a protocol to plain values and to TOML text; the inverse is `loading`.
 
-Every default is written out, so that the text states all settings. Called by `hashing` and `explain` (values), and by
-`study.store.formats.participant_texts` and `study.workflows.results.export_study` (text).
+Every default is written out, so that the text states all settings. Called by `hashing` and `explain` (values) and by
+`study` (text).
 """
 
 import json

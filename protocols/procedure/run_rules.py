@@ -14,7 +14,7 @@ from protocols.trial import Phase
 def make_staircase_rule(protocol: StudyProtocol, phase: Phase) -> StaircaseRule:
     """Make the rule of a staircase run. A limit of 0 in training or detection means that of the protocol's staircase.
 
-    Not for practice runs, whose phase is TRAINING too: they have a fixed level (`protocols.procedure.practice`).
+    Not for practice runs, whose phase is TRAINING too: they follow no staircase (`protocols.procedure.practice`).
     Raises ValueError for CATCH: catch trials lie within test runs and follow no staircase.
     """
     match phase:

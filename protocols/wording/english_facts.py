@@ -1,11 +1,9 @@
 """English sentences, by key, that a session composes and logs: requests, causes of void trials, notices.
 
-These sentences are called facts, to distinguish them from the fixed texts of the screens (`english_screens`).
-
-The event log contains these sentences in English. The participant reads them in the language of the protocol, whose
-table of texts (`de.toml`, `es.toml`) has the same keys: `words.Words.translate_fact` recognises a sentence and
-translates it; `english` merges them with all other texts. A name in braces, such as {seconds}, is replaced by a value.
-Sentences for the experimenter alone are not listed.
+They are called facts, to distinguish them from the fixed texts of the screens (`english_screens`). The event log
+contains them in English. The participant reads them in the language of the protocol, whose table of texts (`de.toml`,
+`es.toml`) has the same keys: `words.Words.translate_fact` recognises a sentence and translates it. A name in braces,
+such as {seconds}, is replaced by a value. Sentences for the experimenter alone are not listed.
 """
 
 FACTS: dict[str, str] = {

@@ -46,8 +46,7 @@ class Words:
 
     def fill(self, key: str, values: Mapping[str, object]) -> str:
         """Fill in the placeholders of a text. The English text is used where the placeholders of the protocol's text
-        differ: it was written for another version of hapteq. Raises KeyError for an unknown key or a missing
-        value."""
+        differ, as in one for another version of hapteq. Raises KeyError for an unknown key or a missing value."""
         has_same_placeholders = list_placeholders(self[key]) == list_placeholders(ENGLISH[key])
         return (self[key] if has_same_placeholders else ENGLISH[key]).format_map(values)
 

@@ -141,7 +141,8 @@ LONGEST_NAME = 15
 
 def make_simulated_code(observer: str) -> str:
     """Make the participant code of a simulated participant: the ASCII letters and digits of its name, then "1". Of more
-    than `LONGEST_NAME` the first 9 are used, and 6 digits of the SHA-256 of all, so that long names differ."""
+    than `LONGEST_NAME` the first 9 are used, and 6 digits of the SHA-256 of all, so that long names differ. Hyphens and
+    underscores do not count, as in `find_observer`."""
     letters = "".join(character for character in observer if character.isascii() and character.isalnum())
     is_short = len(letters) <= LONGEST_NAME
     return (letters if is_short else letters[:9] + hashlib.sha256(letters.encode()).hexdigest()[:6]) + "1"

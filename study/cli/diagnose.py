@@ -1,7 +1,6 @@
 """Command `hapteq diagnose`: locates the mismatch of model and recording, and names the physics that the model lacks.
 
-Parses the options, calls `study.workflows.diagnosis.diagnose_recordings` and prints its answer. Loaded by its name in
-`study.cli.command_table`; `study.cli.model` uses `ForceConstantOption`, too.
+Parses the options, calls `study.workflows.diagnosis.diagnose_recordings` and prints its answer.
 """
 
 import json

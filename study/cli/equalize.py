@@ -1,8 +1,7 @@
 """Command `hapteq equalize`: compute the feedforward forces for which the handle tracks an acceleration trajectory.
 
 Options and output only. The forces are computed by `study.workflows.equalizer.equalize_trajectory`, and improved by
-repeated plays on the device (iterative learning, `--repeat`) by `study.workflows.equalizer.repeat_trajectory`. Loaded
-by its name in `study.cli.command_table`.
+repeated plays on the device (iterative learning, `--repeat`) by `study.workflows.equalizer.repeat_trajectory`.
 """
 
 import json

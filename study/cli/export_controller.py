@@ -1,7 +1,6 @@
 """Command `hapteq export-controller`: write the feedforward controllers of an identified model as C sources.
 
-Options and output only; `study.workflows.equalizer.controller.export_controller` writes the files. Loaded by its name
-in `study.cli.command_table`.
+Options and output only; `study.workflows.equalizer.controller.export_controller` writes the files.
 """
 
 import json

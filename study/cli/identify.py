@@ -2,8 +2,7 @@
 
 The band is that of --band, or ends at the direction limit of a study (--limit-from). `study.workflows.equalizer` fits
 the model, tests it on held-out data and writes it; a summary is printed, and remarks go to standard error. Raises
-StudyError where the output exists or no model can be made from the recordings. Loaded by its name in
-`study.cli.command_table`.
+StudyError where the output exists or no model can be made from the recordings.
 """
 
 import json

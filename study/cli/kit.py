@@ -2,7 +2,7 @@
 
 Three steps: `draw` writes a table with the changes in random order, `seal` hashes the completed table before the
 diagnosis, `score` compares the diagnoses with it (docs/kit.md). Options and output only; `study.evaluation.kit` does
-the work. Loaded by its name in `study.cli.command_table`.
+the work.
 """
 
 from pathlib import Path

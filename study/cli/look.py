@@ -1,8 +1,7 @@
 """Command `hapteq look`: shows the signals of recordings and checks them, before any model is fitted.
 
 Prints, for each recording, a summary, time series, spectra, tables of channels and segments, and the findings of the
-checks. Calls `study.workflows.recording.look_at_recordings`. Loaded by `command_table`; `study.cli.show` uses the
-drawing functions.
+checks. Calls `study.workflows.recording.look_at_recordings`. `study.cli.show` uses the drawing functions.
 """
 
 import json

@@ -1,7 +1,6 @@
 """Command `hapteq model`: fit a mechanical model (masses, dampers, springs) to recordings of a device.
 
-Options and output only; `study.workflows.diagnosis.fit_first_model` fits the model and writes the file. Loaded by its
-name in `study.cli.command_table`.
+Options and output only; `study.workflows.diagnosis.fit_first_model` fits the model and writes the file.
 """
 
 import json

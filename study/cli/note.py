@@ -1,7 +1,6 @@
 """Command `hapteq note`: write a note into the log of a session, whether it runs or has ended.
 
-Options and output only; `study.workflows.views.take_note` writes the note. Loaded by its name in
-`study.cli.command_table`; `study.cli.watch` uses `write_note`, too.
+`study.workflows.views.take_note` writes the note. `study.cli.watch` uses `write_note`, too.
 """
 
 from pathlib import Path
@@ -31,8 +30,8 @@ def note(
 
 
 def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
-    """Write the note into the log, or leave it in the inbox of the running session, and print on stderr which of the
-    two happened. adverse: whether it is an adverse event."""
+    """Write the note, or leave it in the inbox of the running session, and print on stderr which of the two happened.
+    adverse: whether it is an adverse event."""
     from study.devices.clock import RealClock
     from study.session.watching.requests import NoteAsked
     from study.workflows.views.take_note import take_note

@@ -32,7 +32,6 @@ def show_run_and_trial(title: str) -> Iterator[Callable[[Question], None]]:
         task_id = progress.add_task(title, where="")
 
         def show_question(question: Question) -> None:
-            """Show run and trial of the question."""
             run_text = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
             progress.update(task_id, where=f"{run_text}, trial {question.trial_number}")
 
@@ -56,7 +55,6 @@ def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]
 
         @cache
         def start_bar() -> Callable[[float], None]:
-            """Show the bar at the first call; return the same callback at every call."""
             return stack.enter_context(show_bar(title, total))
 
         yield lambda completed: start_bar()(completed)
@@ -64,20 +62,18 @@ def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]
 
 @contextmanager
 def show_steps(title: str) -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar with the name of the current step. The yielded function takes this name and the share done, 0
-    to 1. Writes nothing without a terminal."""
+    """Show a progress bar with the name of the current step, from the first call of the yielded function on, which
+    takes this name and the share done, 0 to 1."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     is_silent = not sys.stderr.isatty()
     with ExitStack() as stack:
 
         @cache
         def start_bar() -> tuple[Progress, TaskID]:
-            """Show the bar at the first call; return the same bar at every call."""
             progress = stack.enter_context(Progress(*columns, console=Console(file=sys.stderr), disable=is_silent))
             return progress, progress.add_task(title, total=1.0)
 
         def show_step(step_name: str, share: float) -> None:
-            """Show the step, and the share done (0 to 1)."""
             progress, task_id = start_bar()
             progress.update(task_id, description=f"{title}: {step_name}", completed=share)
 

@@ -1,7 +1,7 @@
 """Command `hapteq protocol` with its subcommands `list`, `show`, `texts` and `lock`.
 
 They list the shipped protocols, explain every key of one, print the participant's texts for translation, and lock a
-protocol before data are collected. Calls `protocols.document` and `study.store.formats`. Loaded by `command_table`.
+protocol before data are collected.
 """
 
 import json

@@ -1,7 +1,6 @@
 """Command `hapteq prove`: blind test of the diagnosis on simulated devices with concealed effects or laws.
 
-Options and output only; `study.evaluation.bank` draws, seals and diagnoses the devices and writes the results. Loaded
-by its name in `study.cli.command_table`.
+Options and output only; `study.evaluation.bank` draws, seals and diagnoses the devices and writes the results.
 """
 
 import json
@@ -67,8 +66,8 @@ def prove(
 
 
 def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
-    """Run the blind test with laws that no catalogue names, write its results, and print them. table: small table of
-    the figures to write, CSV; None = none."""
+    """Run the blind test with laws that no catalogue names, write its results, and print them. table: CSV file of the
+    figures to write; None = none."""
     from study.evaluation.bank.laws.prove_laws import prove_laws
     from study.evaluation.bank.laws.write_law_proof import (
         format_law_lines,

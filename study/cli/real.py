@@ -1,6 +1,6 @@
 """Command `hapteq real`: diagnoses a folder of recordings of real devices, and writes one page of results.
 
-Parses the options and calls `study.evaluation.real.real_recordings`. Loaded by `command_table`.
+Options and output only; `study.evaluation.real.real_recordings` diagnoses the recordings.
 """
 
 from pathlib import Path

@@ -1,7 +1,6 @@
 """Command `hapteq record`: plays a recording protocol on the device and records the response.
 
-Parses the options, prints the notice before the device moves, and calls `study.workflows.recording.record_device`.
-Loaded by `command_table`.
+Options, notice before a real device moves, and output; `study.workflows.recording.record_device` records.
 """
 
 from pathlib import Path

@@ -1,9 +1,8 @@
 """Command `hapteq rehearse`: run the whole study with simulated participants.
 
-Protocol and model are checked first; then the sessions run on worker processes or a cluster
-(`study.workflows.session.rehearse_study`), and their data are analysed as those of a study. The command writes the
-sessions and the report into --out, and prints the results. Raises StudyError where protocol, model or observer cannot
-be used, or where the folder holds another rehearsal. Loaded by its name in `study.cli.command_table`.
+The sessions run on worker processes or a cluster (`study.workflows.session.rehearse_study`), and their data are
+analysed as those of a study. Raises StudyError where protocol, model or observer cannot be used, or where the folder
+holds another rehearsal.
 """
 
 from pathlib import Path

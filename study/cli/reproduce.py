@@ -1,6 +1,6 @@
 """Command `hapteq reproduce`: computes the published figures 1 to 5 again on the simulated omega.3.
 
-Parses the options and calls `study.evaluation.reproduction.reproduce_paper`. Loaded by `command_table`.
+Options and output only; `study.evaluation.reproduction.reproduce_paper` computes and writes the figures.
 """
 
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""Output of the commands' results: the option `--json`, and printing of a session's or a study's analysis.
-
-`JsonOption` is used by most commands, `print_results` by `analyze`, `rehearse` and `conduct`.
-"""
+"""Output of the commands' results: the option `--json`, and printing of a session's or a study's analysis."""
 
 import json
 from dataclasses import asdict

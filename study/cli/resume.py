@@ -1,7 +1,6 @@
 """Command `hapteq resume`: continue an unfinished session, for example after a crash or a pause.
 
-On full screens (`study.cli.screen`), or line by line (`study.cli.conduct`). Loaded by its name in
-`study.cli.command_table`.
+On full screens (`study.cli.screen`); line by line, or with a simulated participant, by `study.cli.conduct`.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Option `--scheduler` of a command: its work is done by the workers of a dask cluster instead of local processes.
 
-Used by the commands `power`, `prove`, `real` and `rehearse`; `study.workflows.cluster` opens the connection.
+`study.workflows.cluster` opens the connection.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
 """Starts the full-screen interface of `hapteq study` and `hapteq resume`, and prints the results when it ends.
 
-Other commands call `has_screen`, `has_keyboard` and `read_terminal_width`, which examine the terminal.
+`has_screen`, `has_keyboard` and `read_terminal_width` examine the terminal, some also for other commands.
 """
 
 import os
@@ -44,7 +44,7 @@ def read_terminal_width() -> int | None:
 
 def open_screen(options: "StartOptions", as_json: bool) -> None:
     """Run the interface until it is closed, then print the results. Raises the StudyError of a failed sitting (class by
-    `ERROR_TYPES`), and typer.Exit for any other exit code than 0."""
+    `ERROR_TYPES`), and typer.Exit for an exit code other than 0."""
     from study.tui.app.app import HapteqApp
 
     app = HapteqApp(options)

@@ -1,7 +1,6 @@
 """Command `hapteq serve`: shows the screen of `hapteq study` in a browser, by a web server on this machine.
 
-Checks the address to listen on and the options for `hapteq study`, then runs `study.tui.web_server`. Loaded by
-`command_table`.
+Checks the address to listen on and the options for `hapteq study`, then runs `study.tui.web_server`.
 """
 
 import sys
@@ -19,7 +18,7 @@ CONTEXT_SETTINGS = {"allow_extra_args": True, "ignore_unknown_options": True}
 """
 
 WILDCARD_ADDRESSES = ("0.0.0.0", "::", "")
-"""Wildcard addresses: a server can listen on them, but no browser can open them."""
+"""Addresses that mean every interface of this machine: a server can listen on them; a browser needs another."""
 
 
 def serve(

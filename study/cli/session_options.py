@@ -1,7 +1,4 @@
-"""Command-line options that several commands on sessions and devices share, so that name and help text are the same.
-
-Used as types of the parameters of typer commands, such as `study`, `resume`, `record` and `doctor`.
-"""
+"""Command-line options of several commands on sessions and devices, so that name and help text are the same."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,5 +1,4 @@
-"""Command `hapteq sessions`: list the sessions in a data folder as a table, or as JSON. Loaded by its name in
-`study.cli.command_table`."""
+"""Command `hapteq sessions`: list the sessions in a data folder as a table, or as JSON."""
 
 import json
 from collections.abc import Iterator

@@ -1,7 +1,6 @@
 """Command `hapteq stream`: send a running session's events, forces and motion to the lab streaming layer (LSL).
 
-Options and output only; `study.workflows.views.stream_session` follows the log. Loaded by its name in
-`study.cli.command_table`.
+Options and output only; `study.workflows.views.stream_session` follows the log.
 """
 
 import contextlib

@@ -1,8 +1,7 @@
 """Command `hapteq study`: run a new session of a study, with a person or a simulated participant.
 
-In a terminal, the session is shown on full screens; with `--plain`, without a terminal or with a simulated participant,
-line by line. Modules of the session are imported when the command runs, so that `hapteq --help` starts quickly. Loaded
-by its name in `study.cli.command_table`.
+In a terminal or browser, the session is shown on full screens (`study.cli.screen`); with `--plain`, without either, or
+with a simulated participant, `study.cli.conduct` runs it. Both are imported when the command runs, to start quickly.
 """
 
 from pathlib import Path

@@ -1,5 +1,5 @@
 """Command `hapteq study-plan`: print planned, finished and left-out participants, the orders of frequencies that are
-still needed, and the next participant code. Loaded by its name in `study.cli.command_table`."""
+still needed, and the next participant code."""
 
 import json
 from collections.abc import Iterator

@@ -1,7 +1,6 @@
 """Command `hapteq twin`: fits the nominal mechanical model of a device (its digital twin) to its responses.
 
-Parses the options, prints the notice before the device moves, and calls `study.workflows.diagnosis.write_twin`. Loaded
-by `command_table`.
+Options, notice before a real device moves, and output; `study.workflows.diagnosis.write_twin` records and fits.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Command `hapteq validate`: checks files of hapteq, and prints their problems in words.
 
-Parses the options and calls `study.workflows.files` (`validate_in_process`: each file; `check_model_channels`: models
-against recordings). Loaded by `command_table`.
+Options and output only; `study.workflows.files` validates: `validate_in_process` each file, `check_model_channels`
+models against recordings.
 """
 
 import json

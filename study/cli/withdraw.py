@@ -1,7 +1,6 @@
 """Command `hapteq withdraw`: erases the data of a participant who withdraws the consent.
 
-Lists what will be erased, asks for confirmation, and calls `study.workflows.session.withdraw_participant`. Loaded by
-`command_table`.
+Lists what will be erased and asks for confirmation; `study.workflows.session.withdraw_participant` erases.
 """
 
 from pathlib import Path

@@ -1,8 +1,7 @@
-"""Clock of a session: real time, or virtual time, in which a simulated session of half an hour runs in a second.
+"""Clock of a session: real time, or virtual time, which lets a simulated session run faster than real time.
 
 `Clock` is the interface. The code of a session takes the clock as an argument, so that the same code runs in real time
-and in virtual time. `study.devices.drive.virtual_drive` registers a listener at a virtual clock, and runs the device's
-ticks when the clock advances.
+and in virtual time.
 """
 
 import time
@@ -38,22 +37,19 @@ class RealClock:
     virtual = False
 
     def now_s(self) -> float:
-        """Time (s) of `time.monotonic`."""
         return time.monotonic()
 
     def sleep(self, seconds: float) -> None:
-        """Wait for this time (s); returns at once for zero or less."""
         if seconds > 0:
             time.sleep(seconds)
 
     def utc(self) -> str:
-        """Date and time of the system, UTC, ISO 8601, in milliseconds."""
         return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 class VirtualClock:
-    """Time that passes only when the program calls `sleep`. start: date and time at its origin; None = now. A simulated
-    device, whose ticks must run during a sleep, registers a listener."""
+    """Time that passes only when the program calls `sleep`. start: date and time at its origin; None = now. A device
+    whose ticks must run during a sleep registers a listener (`study.devices.drive.virtual_drive`)."""
 
     virtual = True
 

@@ -1,7 +1,7 @@
 """Masking noise from the computer's sound output, in a seamless loop, so that participants do not hear the device.
 
-The library sounddevice (PortAudio) is imported only where a protocol requires noise. It requests the samples through a
-callback, in its own thread. Called by `opening.make_masking_sound`.
+The library sounddevice (PortAudio) is imported only when an output is opened. It requests the samples through a
+callback, in its own thread.
 """
 
 import contextlib
@@ -16,8 +16,7 @@ from study.errors import DeviceError
 Samples = NDArray[np.int16]
 """Samples of the noise, (n,), 16-bit PCM, a single channel."""
 FillCallback = Callable[[Any, int, Any, Any], None]
-"""Callback of the output stream, fill(out, frames, time, status): writes the next samples into out (frames, 1). Called
-in the library's thread."""
+"""Callback of the output stream, fill(out, frames, time, status): writes the next samples into out (frames, 1)."""
 
 OUTPUT_ADVICE = (
     "Install the extra (pip install '.[audio]'; on Linux also the package libportaudio2), connect a sound output and "

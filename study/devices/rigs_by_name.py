@@ -1,4 +1,4 @@
-"""Drivers by device name: builds the bare rig for `study.devices.opening`, the only module that may request it.
+"""Drivers by device name: builds the bare rig for `study.devices.opening`, which adds the safety layer.
 
 Imports compiled code, which takes time: `opening` imports this module only when a device is opened.
 """
@@ -31,7 +31,7 @@ def make_frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
 
 def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> CompiledRig:
     """Make the simulated device with the linkage and the inertia of the calibration file `path`. Raises `StudyError`
-    for a file that cannot be used, `DeviceError` where no linkage of its kind fits."""
+    for a file that cannot be used, `DeviceError` where no linkage of its kind fits and as `make_simulated_rig`."""
     calibration = read_calibration(path)
     try:
         fitted_linkage = fit_linkage(calibration)

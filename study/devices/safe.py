@@ -268,7 +268,7 @@ class SafeDevice:
 
     def _make_runner(self, rig: Rig | CompiledRig) -> Runner:
         """Make the runner of the rig's ticks: in blocks for a compiled rig, tick by tick otherwise."""
-        is_virtual = self._clock.virtual
+        is_virtual = isinstance(self._clock, VirtualClock)
         if isinstance(rig, CompiledRig):
             block_ticks = round((VIRTUAL_BLOCK_S if is_virtual else REALTIME_BLOCK_S) * rig.info.sample_rate_hz)
             return CompiledRunner(rig, self._governor, block_ticks)

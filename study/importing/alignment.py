@@ -1,5 +1,5 @@
 """Align the clocks of several loggers to the first: by a stated offset, a trigger, or cross-correlation of one
-motion in both. Called by `build_recording`; `part_signals` uses `Logger`."""
+motion in both. Begin at `align_signals`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -45,8 +45,8 @@ class Logger:
 
 def align_signals(loggers: tuple[Logger, ...], report_sentence: Callable[[str], None]) -> tuple[Logger, ...]:
     """Align all clocks to that of the first logger: returns the loggers with the offsets (s) of their clocks.
-    report_sentence: called with a sentence for each offset. Raises ImportProblemError where a correlation or a
-    trigger gives none."""
+    report_sentence: called with a sentence for each logger but the first. Raises ImportProblemError where a
+    correlation or a trigger gives no offset, or its expression no signal."""
     first_logger, *other_loggers = loggers
     return (first_logger, *(_set_clock_offset(first_logger, logger, report_sentence) for logger in other_loggers))
 

@@ -156,7 +156,7 @@ def _make_ambiguity_error(cause: str, remedy: str) -> WrongUseError:
 def _make_natural_sort_key(path: Path) -> tuple[tuple[bool, int, str], ...]:
     """Make a sort key by which rec_2 precedes rec_10."""
     parts = re.split(r"(\d+)", path.name)
-    return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in parts)
+    return tuple((part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts)
 
 
 def _is_map_file(path: Path) -> bool:

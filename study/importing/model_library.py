@@ -1,5 +1,5 @@
 """Find the file of a mechanical model by name: a file next to an import map, or a model that comes with hapteq
-(`study/importing/models`). Called by `study.evaluation.real.real_folder`."""
+(`study/importing/models`)."""
 
 from importlib.resources import files as resources
 from pathlib import Path

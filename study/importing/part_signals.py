@@ -89,11 +89,7 @@ def resample_part(
 def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> Value:
     """Compute the samples (n,) of a channel on its clock; a single number is repeated. Raises ImportProblemError for
     an expression that cannot be computed, another shape or length, and infinite values."""
-    label = f"channel '{channel.name}'"
-    try:
-        values = logger.namespace.compute_value(channel.value, logger.base)
-    except ImportProblemError as error:
-        raise ImportProblemError(f"{label}: {error}") from error
+    label, values = f"channel '{channel.name}'", _compute_value(channel, logger)
     if values.ndim > 1:
         raise ImportProblemError(
             f"{label}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
@@ -109,6 +105,14 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
     return values
 
 
+def _compute_value(channel: ChannelMap, logger: Logger) -> Value:
+    """Evaluate the expression of a channel. Raises ImportProblemError, with the channel's name, where it fails."""
+    try:
+        return logger.namespace.compute_value(channel.value, logger.base)
+    except ImportProblemError as error:
+        raise ImportProblemError(f"channel '{channel.name}': {error}") from error
+
+
 def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     """Count the samples of a clock: those of its time stamps, otherwise those of its first channel that is not
     a single number; 0 without one."""
@@ -117,7 +121,7 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     first_clock = import_map.clock[0].name
     for channel in import_map.channel:
         if (channel.clock or first_clock) == logger.clock.name:
-            values = logger.namespace.compute_value(channel.value, logger.base)
+            values = _compute_value(channel, logger)
             if values.ndim == 1:
                 return len(values)
     return 0

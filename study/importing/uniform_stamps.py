@@ -2,7 +2,6 @@
 
 A logger writes each stamp rounded to a decimal place, and may skip a row now and then. `fit_uniform_rate` finds the
 rate f and the integers k_i with t_i - t_0 = k_i / f up to a tolerance; where there are none, stamps are not uniform.
-Called by `time_base`.
 """
 
 import numpy as np

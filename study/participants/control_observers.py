@@ -1,6 +1,5 @@
-"""Simulated participants whose answers do not depend on the felt stimulus: controls that an analysis must recognise as
-such, and a participant with scripted answers. `observer_catalogue` makes them, with the names that `--observer`
-takes."""
+"""Simulated participants without a threshold: controls that an analysis must recognise as such, whose answers do not
+depend on the stimulus, and a participant whose answers are right or wrong by a script."""
 
 from dataclasses import dataclass
 
@@ -41,7 +40,6 @@ class ConstantObserver:
     """The answer, 1 or 2."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """Give the same answer to every stimulus."""
         _, time_draw = draw_uniform(felt, seed, 2)
         return Reply(self.answer, draw_response_time_s(time_draw))
 

@@ -13,8 +13,7 @@ as a `direction_feeler` would to the amplitude
 The amplitude is converted to newtons by what the simulated omega.3 delivers per newton (`MPS2_PER_N`), because the
 thresholds of `direction_feeler` are forces. The model and its numbers m, A and tau are assumptions of the authors.
 Where nothing was measured (no device, less than a period, a detection trial), the commanded force counts as delivered
-without disturbance, and adaptation is left out. Made by `observer_catalogue` and `population`; `simulated_participant`
-measures the delivered acceleration for it.
+without disturbance, and adaptation is left out.
 """
 
 import math

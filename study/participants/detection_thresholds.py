@@ -2,7 +2,7 @@
 
 All numbers are assumptions of the authors. The threshold for detecting a vibration is much lower than that for
 identifying its direction, and rises less from 5 to 45 Hz: a participant who does not feel the direction still feels the
-vibration. Used by `direction_feeler`, `intensity_cue` and `population`.
+vibration.
 """
 
 TYPICAL_DETECTION_N = ((5.0, 0.08), (15.0, 0.08), (25.0, 0.1), (35.0, 0.12), (45.0, 0.14))

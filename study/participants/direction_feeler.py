@@ -6,7 +6,7 @@ criterion. Without bias the fraction of right answers is Phi(d'/2), so d' = 2 Ph
 With a criterion c it is Phi(d'/2 - c) for direction 1 and Phi(d'/2 + c) for direction 2, which is less on average.
 
 In a detection trial the alternatives are two intervals; the same model is used with the detection curve, whose levels
-are much lower. Made by `observer_catalogue` and `population`; part of `delivered_feeler` and `unsure_repeater`.
+are much lower.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
 """

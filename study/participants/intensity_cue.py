@@ -1,5 +1,4 @@
-"""Simulated participant without a sense of direction, who uses the difference in strength between the directions. Made
-by `observer_catalogue`.
+"""Simulated participant without a sense of direction, who uses the difference in strength between the directions.
 
 A device rarely delivers both directions equally strongly. A participant who remembers the average strength at this
 level can answer 1 for a stronger and 2 for a weaker vibration. The level changes rarely, so the memory is assumed

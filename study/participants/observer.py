@@ -1,7 +1,6 @@
 """Interface of simulated participants: the perceived stimulus, the reply to it, and the protocol `Observer`.
 
 The participants of this package implement `Observer`, and `observer_catalogue` makes them by name.
-`study.workflows.session.simulated_display` calls `reply`.
 """
 
 from dataclasses import dataclass

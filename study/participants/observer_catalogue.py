@@ -1,7 +1,4 @@
-"""Catalogue of the simulated participants by the names that `--observer` takes.
-
-Called by `simulated_participant` and `rehearse_study` of `study.workflows.session`.
-"""
+"""Catalogue of the simulated participants by the names that `--observer` takes."""
 
 import re
 from difflib import get_close_matches

@@ -1,10 +1,9 @@
-"""A population of simulated participants with individual thresholds that rise with frequency.
+"""A population of simulated participants with individual thresholds, whose median rises with frequency up to 35 Hz.
 
 In dB, the threshold of a participant at a frequency is the median of the population plus a normal deviation of the
 person plus a normal deviation of person and frequency. All numbers are assumptions of the authors, chosen such that a
 study of ten resembles the published figure 2: lowest threshold at 5 Hz, a significant rise at 35 Hz, some participants
-at the cap there, 45 Hz similar to 35 Hz. No published threshold is copied. Called by `observer_catalogue` and
-`study.workflows.session.rehearse_study`.
+at the cap there, 45 Hz similar to 35 Hz. No published threshold is copied.
 """
 
 from dataclasses import replace

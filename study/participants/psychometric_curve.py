@@ -1,7 +1,4 @@
-"""Psychometric function of a two-alternative forced-choice task (Weibull): proportion of correct answers by level.
-
-Used by the simulated participants (`direction_feeler`, `delivered_feeler`, `intensity_cue`) and by `study.cli.power`.
-"""
+"""Psychometric function of a two-alternative forced-choice task (Weibull): proportion of correct answers by level."""
 
 import math
 from dataclasses import dataclass

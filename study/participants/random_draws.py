@@ -1,8 +1,4 @@
-"""Random numbers of simulated participants, keyed by seed and trial: the same trial of a session gets the same draws.
-
-Called by all participants with random answers: `direction_feeler`, `unsure_repeater`, `intensity_cue`,
-`control_observers`.
-"""
+"""Random numbers of simulated participants, keyed by seed, run, trial and attempt, so that they can be drawn again."""
 
 import math
 from statistics import NormalDist
@@ -26,7 +22,7 @@ def draw_uniform(stimulus: PerceivedStimulus, seed: int, count: int) -> tuple[fl
     """Draw `count` independent numbers, uniform in (0, 1), for one presentation. seed: of the session."""
     key = (_OBSERVER_STREAM, stimulus.run, stimulus.trial, stimulus.attempt)
     random_words = np.random.SeedSequence(entropy=seed, spawn_key=key).generate_state(count, np.uint64)
-    # 53 random bits, the precision of a float; the half keeps 0 and 1 out, whose normal quantiles are infinite.
+    # 53 random bits, the precision of a float; the half keeps 0 out, whose normal quantile is infinite.
     return tuple(((int(word) >> 11) + 0.5) * 2.0**-53 for word in random_words)
 
 

@@ -4,7 +4,7 @@ Signal detection theory with multiple looks: each presentation (look) gives evid
 1 and -d'/2 for direction 2 with unit standard deviation. Looks are independent and averaged, so that n looks have the
 sensitivity d' sqrt(n). The participant asks again where the average lies within `unsure_distance` standard errors of
 the criterion. The evidence of earlier looks is drawn again from the numbers of their attempts, so that no state is
-kept. Made by `observer_catalogue` and `population`.
+kept.
 """
 
 import math
@@ -21,7 +21,7 @@ _NORMAL = NormalDist()
 
 @dataclass(frozen=True, slots=True)
 class UnsureRepeater:
-    """An `Observer` who asks for a repetition where the evidence is near the criterion."""
+    """An `Observer` who asks for a repetition where the evidence is near the criterion, up to `max_looks`."""
 
     name: str
     feeler: DirectionFeeler

@@ -1,5 +1,4 @@
-"""Dismiss a screen with its reply exactly once, even if two keys that dismiss it arrive together. The screens of
-`study.tui.screens` call this function instead of `Screen.dismiss`."""
+"""Dismiss a screen with its reply only once, even if two keys that dismiss it arrive together."""
 
 from __future__ import annotations
 
@@ -8,7 +7,6 @@ from typing import TypeVar
 from textual.screen import Screen
 
 Reply = TypeVar("Reply")
-"""Type of the value that a screen returns."""
 
 
 def dismiss_screen(screen: Screen[Reply], reply: Reply) -> None:

@@ -1,7 +1,6 @@
 """End the application on SIGTERM or SIGHUP, and when its terminal has been closed without a signal.
 
-Without a terminal, a participant can neither answer nor stop a stimulus, so that the device must not continue. Called
-by the applications `study.tui.app.app` and `study.tui.watch.watch_app`.
+Without a terminal, a participant can neither answer nor stop a stimulus, so that the device must not continue.
 """
 
 import asyncio
@@ -17,8 +16,7 @@ from textual.app import App
 from study.errors import ExitCode
 
 TERMINAL_POLL_INTERVAL_S = 0.5
-"""Interval (s) at which the application checks whether its terminal is still open. Chosen: the longest time for which a
-closed terminal stays unnoticed."""
+"""Interval (s) at which the application checks whether its terminal is still open. Chosen."""
 FORCED_EXIT_DELAY_S = 10.0
 """Time (s) after `on_exit` at which the process exits without cleaning up, because writing to a closed terminal may
 block for ever. Chosen longer than the engine process takes to end."""

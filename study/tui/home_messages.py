@@ -1,7 +1,7 @@
 """Textual messages that screens outside a sitting post: requests of the user to the application.
 
-`study.tui.app.app.HapteqApp` handles them (`on_begin_requested`, ...) and sends commands to the engine. They are not
-changed after they are posted, but cannot be frozen dataclasses, because Textual sets attributes of a message.
+`study.tui.app.app.HapteqApp` handles them (`on_begin_requested`, ...). They cannot be frozen dataclasses, because
+Textual sets attributes of a message.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,6 @@ class BeginRequested(Message):
     protocol: str
     """Name of a shipped protocol, or path of a protocol file."""
     device: str
-    """Name of the device."""
     model: str = ""
     """File of the identified model that equalizes the stimuli; empty if the protocol needs none."""
 
@@ -46,15 +45,13 @@ class DiagnoseRequested(Message):
     """Diagnose recordings against a model, and show the progress."""
 
     command: Diagnose
-    """Message to the engine: recordings, model and folder of the results."""
 
 
 @dataclass(eq=False)
 class CommandRequested(Message):
-    """Send a command to the engine: any request without a message class above."""
+    """Send a command to the engine unchanged, for a request without a message class of its own."""
 
     command: ToEngine
-    """Message that is sent unchanged."""
 
 
 @dataclass(eq=False)

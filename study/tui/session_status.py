@@ -1,7 +1,6 @@
 """Status of a session in the list of past sessions: a symbol with a word, and a sentence.
 
-Symbol and word differ between states, so that the status can be read without seeing colour. Called by the screens
-`home` and `session`, the table of sessions (`session_table`), `hapteq sessions` and `hapteq show`.
+The word differs between states, so that the status can be read without seeing colour.
 """
 
 from study.session.views.archive_views import INELIGIBILITY_REASONS, SessionLine, SessionStatus
@@ -15,7 +14,6 @@ SYMBOLS: dict[SessionStatus, str] = {
     "withdrawn": "✕",
     "unreadable": "!",
 }
-"""Symbol of each status, a single character."""
 
 STYLES: dict[SessionStatus, str] = {
     "finished": "$text-success",
@@ -26,7 +24,7 @@ STYLES: dict[SessionStatus, str] = {
     "withdrawn": "$foreground 65%",
     "unreadable": "$text-error",
 }
-"""Style of symbol and word for each status, as a Textual style with theme variables."""
+"""Textual style of symbol and word, with theme variables."""
 
 
 def format_status(status: SessionStatus) -> str:
@@ -35,8 +33,7 @@ def format_status(status: SessionStatus) -> str:
 
 
 def describe_session(session: SessionLine) -> str:
-    """Describe the status of a session of the list in one or two sentences; for an unfinished or running session, also
-    what can be done with it."""
+    """Describe the status of a session in words; for an unfinished or running one, also what can be done with it."""
     match session.standing:
         case "finished":
             return (
@@ -64,10 +61,8 @@ def _format_session_name(session: SessionLine) -> str:
 
 
 def _format_answer_count(session: SessionLine) -> str:
-    """Format the number of answers with its noun."""
     return f"{session.answers} answer{'' if session.answers == 1 else 's'}"
 
 
 def _format_run_count(run_count: int) -> str:
-    """Format a number of runs with its noun."""
     return f"{run_count} run{'' if run_count == 1 else 's'}"

@@ -1,7 +1,6 @@
 """Lay out plain-text tables for terminal output: rows of cells as lines with aligned columns.
 
 If the table is wider than the terminal, the widest text columns are narrowed and their cells wrapped; no text is cut.
-Called by commands of `study.cli` (`sessions`, `show`, `look`, ...) and by `study.tui.widgets.text_table`.
 """
 
 from textwrap import wrap
@@ -35,8 +34,7 @@ def align_row_lines(rows: Rows, terminal_width: int | None = None) -> Rows:
 
 
 def wrap_hanging(line: str, indent: int, terminal_width: int | None) -> tuple[str, ...]:
-    """Wrap a line to `terminal_width` characters (None: no limit) between words, with a hanging indent of `indent`
-    blanks."""
+    """Wrap a line to `terminal_width` characters (None: no limit), with a hanging indent of `indent` blanks."""
     if terminal_width is None or len(line) <= terminal_width:
         return (line,)
     return tuple(wrap(line, terminal_width, subsequent_indent=" " * indent, break_on_hyphens=False))
@@ -85,6 +83,6 @@ def _pad_cell(text: str, width: int, is_numeric: bool) -> str:
 
 
 def _is_numeric_column(cells: list[str]) -> bool:
-    """Whether at least one cell is neither empty nor a dash, and all such cells begin with a digit after any signs."""
+    """Whether there are cells that are neither empty nor a dash, and they begin with a digit after any signs."""
     values = [cell for cell in cells if cell not in ("", "–")]
     return bool(values) and all(cell.lstrip("≥<−+ ")[:1].isdigit() for cell in values)

@@ -2,7 +2,6 @@
 
 The hues are those of the palette of Okabe and Ito, which can be distinguished with colour vision deficiencies; some are
 made darker or lighter to be legible on the background. Source: M. Okabe, K. Ito, Color Universal Design (2008).
-Registered by `app` (`hapteq study`) and `watch_app` (`hapteq watch`).
 """
 
 from typing import Any
@@ -59,13 +58,12 @@ HIGH_CONTRAST = Theme(
 """High contrast: white text and bright colours on black."""
 
 THEMES = (DARK, LIGHT, HIGH_CONTRAST)
-"""All themes, in the order in which a key cycles through them."""
 NEXT_THEME = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
 """Name of the theme that follows each theme, for a key that cycles through them."""
 
 
 def register_themes(app: App[Any], theme_name: str = DARK.name) -> None:
-    """Register all themes with the application and select one. theme_name: name of a theme, such as `DARK.name`."""
+    """Register the themes with the application and select one. theme_name: name of a theme, such as `DARK.name`."""
     for theme in THEMES:
         app.register_theme(theme)
     app.theme = theme_name

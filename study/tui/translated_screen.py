@@ -1,5 +1,4 @@
-"""Base class of the participant's screens (`study.tui.screens`): texts, footer and help in the language of the
-protocol."""
+"""Base class of screens for the participant: texts, footer and help in the language of the protocol."""
 
 from dataclasses import replace
 from typing import ClassVar, TypeVar
@@ -10,7 +9,6 @@ from textual.screen import Screen
 from protocols.wording.words import ENGLISH_WORDS, Words
 
 Reply = TypeVar("Reply")
-"""Type of the result that a screen returns when it is dismissed."""
 
 
 class TranslatedScreen(Screen[Reply]):
@@ -26,7 +24,7 @@ class TranslatedScreen(Screen[Reply]):
 
     @property
     def HELP(self) -> str:  # type: ignore[override]  # noqa: N802  a class attribute elsewhere
-        """Text of the help (Markdown): the entry `PAGE` of the words."""
+        """Text of the help, in Markdown."""
         return self.words[self.PAGE]
 
     @property
@@ -35,8 +33,7 @@ class TranslatedScreen(Screen[Reply]):
         return {key: self._translate_binding(active_binding) for key, active_binding in super().active_bindings.items()}
 
     def _translate_binding(self, active_binding: ActiveBinding) -> ActiveBinding:
-        """Translate the description and the displayed name of the key of a binding; without such a name, it stays
-        empty."""
+        """Translate the description of a binding and, if there is one, the displayed name of its key."""
         binding, key_display = active_binding.binding, active_binding.binding.key_display
         translated_binding = replace(
             binding,

@@ -1,6 +1,6 @@
 """Replies of a participant to a trial other than an answer: pause, leave, repeat, no answer in time.
 
-Each makes the trial void. Shared by the screens (`study.tui.screens`) and the line mode (`study.tui.line_mode`).
+Each makes the trial void.
 """
 
 from protocols.trial import VoidCause
@@ -15,12 +15,11 @@ choice."""
 REPEAT = Unanswered("asked to repeat", ends_sitting=False, repeat_requested=True)
 """Request to feel the stimulus again: the trial is presented again."""
 TIME_OVER = Unanswered("no answer within the time limit", ends_sitting=False, cause=VoidCause.LATE)
-"""No answer within the protocol's time limit."""
 
 
 def format_repeat_text(repeats_left: int | None, words: Words = ENGLISH_WORDS) -> str:
     """Format the confirmation of a request to repeat a trial, with the number of further requests. repeats_left: number
-    of allowed requests, this one included, at least 1 (the callers refuse a request at 0); None: no limit."""
+    of allowed requests, this one included, at least 1; None: no limit."""
     if repeats_left is None:
         return words["repeat_new"]
     return words["repeat_last"] if repeats_left == 1 else words.fill_count("repeat", repeats_left - 1)

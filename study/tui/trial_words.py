@@ -1,9 +1,5 @@
-"""Texts for the participant in the language of the protocol (`Words`). Called by the line mode (`study.tui.line_mode`),
-the screens (`study.tui.screens`) and the widget `form_question`.
-
-Heading and progress of a trial, outline of a sitting, void trials, exclusion, forms. The progress is stated in runs and
-counts, which do not reveal levels.
-"""
+"""Texts for the participant in the language of the protocol (`Words`): heading and progress of a trial, outline of a
+sitting, demonstration, void trials, exclusion, forms."""
 
 from typing import Literal
 
@@ -64,8 +60,8 @@ def describe_felt_directions(menu: DemoMenu, vibration: int, words: Words = ENGL
 
 
 def describe_void_trial(reason: str, words: Words = ENGLISH_WORDS) -> str:
-    """Describe to the participant why a trial was void. reason: as in the session log; a reason without a text for the
-    participant is stated itself, translated where `words` has a translation."""
+    """Describe why a trial was void. reason: as in the session log; a reason without a text for the participant is
+    stated itself, translated where `words` has a translation."""
     if is_computer_busy(reason):
         return words["void_busy"]
     if reason == SCREEN_UNRESPONSIVE:

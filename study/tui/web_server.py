@@ -103,7 +103,7 @@ class ScreenServer(Server):
         """Middleware that refuses every request without the token in the same way (HTTPNotFound), so that existing and
         unknown addresses cannot be distinguished. Exempt are downloads that are offered. The comparison takes constant
         time."""
-        first_path_part = request.path.split("/")[1]
+        first_path_part = request.path.removeprefix("/").partition("/")[0]  # a path without a slash: OPTIONS *
         if first_path_part == "download" and await self._is_offered_download(request.path.rpartition("/")[2]):
             return await handler(request)
         if not hmac.compare_digest(first_path_part.encode("utf-8", "replace"), self._token.encode()):

@@ -198,14 +198,16 @@ def _request_worker_setup(client: "Client") -> _WorkerSetup:
     try:
         versions: dict[str, str] = client.run(read_hapteq_version)
     except ImportError:  # raised by a worker without hapteq, which cannot import `read_hapteq_version`
-        versions = dict.fromkeys(client.scheduler_info()["workers"], "")
+        versions = dict.fromkeys(client.scheduler_info(n_workers=-1)["workers"], "")
     workers = client.scheduler_info(n_workers=-1)["workers"].values()
     return _WorkerSetup(versions, tuple(worker["nthreads"] for worker in workers))
 
 
 def _request_setup_with_timeout(client: "Client", address: str) -> _WorkerSetup:
     """Call `_request_worker_setup` with the time limit `WORKER_TIMEOUT_S`: distributed waits without a limit for a
-    scheduler or a worker that does not answer. Raises StudyError for a TimeoutError; its other errors escape."""
+    scheduler or a worker that does not answer. Raises StudyError for it, and where the connection is lost meanwhile."""
+    from distributed.client import ClosedClientError
+
     setup_future = Future[_WorkerSetup]()
 
     def store_setup() -> None:
@@ -217,8 +219,8 @@ def _request_setup_with_timeout(client: "Client", address: str) -> _WorkerSetup:
     threading.Thread(target=store_setup, daemon=True).start()
     try:
         return setup_future.result(timeout=WORKER_TIMEOUT_S)
-    except TimeoutError as error:
-        if setup_future.done():  # the TimeoutError was raised by `_request_worker_setup` itself, before the time limit
+    except (OSError, ClosedClientError) as error:  # TimeoutError and CommClosedError are kinds of OSError
+        if setup_future.done():  # the error was raised by `_request_worker_setup` itself, before the time limit
             raise _make_unusable_cluster_error(
                 f"The scheduler at {address} was reached, and asking its workers failed: "
                 f"{str(error) or type(error).__name__}.",

@@ -1,7 +1,6 @@
 """Exception guard of a diagnosis: an effect or a figure that raises is left out and reported, and the run continues.
 
-Used by `workflows.diagnosis` and `evaluation.real`. The project's own tests turn the guard off by an environment
-variable, so that exceptions propagate.
+The project's own tests turn the guard off by an environment variable, so that exceptions propagate.
 """
 
 import os
@@ -13,5 +12,5 @@ STRICT_VARIABLE = "HAPTEQ_STRICT"
 
 
 def make_crash_guard() -> Guard:
-    """Make a guard for a single run; see `analysis.diagnosis.search.guard.Guard`."""
+    """Make a guard for a single run."""
     return Guard(enabled=not os.environ.get(STRICT_VARIABLE))

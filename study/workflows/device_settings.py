@@ -1,7 +1,4 @@
-"""Device settings that follow from a study protocol: force limits, centring spring, recorded part of each trial.
-
-Called by `conduct_session` and `examine_setup` before they open the device.
-"""
+"""Device settings that follow from a study protocol: force limits, centring spring, recorded part of each trial."""
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
@@ -9,8 +6,8 @@ from study.session.stimulus.limits import make_study_limits
 
 
 def make_device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
-    """Make the settings with which a device is opened for a study. hand_on_handle: whether a person holds the handle; a
-    simulated device then has a simulated hand."""
+    """Make the settings with which a device is opened. hand_on_handle: whether a hand holds the handle; a simulated
+    device then has a simulated hand."""
     return DeviceSettings(
         limits=make_study_limits(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,

@@ -1,7 +1,6 @@
 """Check the output paths of a command before its computation or recording: the files must not exist, their folder must.
 
-Results are never overwritten; a long computation must not fail only when it writes them. Called by workflows that write
-a recording, model, table of forces, controller or calibration.
+Such results are not overwritten, and a long computation must not fail only when it writes them.
 """
 
 from pathlib import Path

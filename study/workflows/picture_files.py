@@ -1,8 +1,7 @@
 """Write the figures of a report as files: SVG for editing, PNG for slides.
 
-Figures are drawn in parallel processes (`forked_map`). The same data give the same files: neither format contains a
-date or the version of Matplotlib. Called by the workflows and evaluations that write a report, such as
-`write_diagnosis` and `analyze_data`.
+Figures are drawn in parallel processes (`forked_map`). So that the same data give the same files, neither format
+contains a date or the version of Matplotlib.
 """
 
 import io
@@ -33,8 +32,7 @@ def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnPicture:
-    """A picture as drawn in a worker process, without its Matplotlib figure, so that it can be sent between
-    processes."""
+    """A drawn picture without its Matplotlib figure, so that it can be sent between processes."""
 
     picture: Picture
     """Picture with its SVG text and an empty figure."""
@@ -43,21 +41,20 @@ class DrawnPicture:
 
 
 def draw_picture(picture: Picture) -> DrawnPicture:
-    """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG. Meant for a worker process."""
+    """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG."""
     svg, png = _render_svg_and_png(picture)
     picture.rendered_svg[:] = [svg]
     return DrawnPicture(remove_figure(picture), png)
 
 
 def _render_svg_and_png(picture: Picture) -> tuple[str, bytes]:
-    """Render the text of the SVG file and the content of the PNG file, which is empty unless `Picture.bitmap` is
-    set."""
+    """Render the text of the SVG file and the content of the PNG file, which may be empty (`DrawnPicture`)."""
     return render_picture_svg(picture), _render_png(picture) if picture.bitmap else b""
 
 
 def write_drawn_pictures(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -> None:
-    """Write pictures that were drawn before into `folder`, as `write_pictures` does. Raises CannotWriteError where a
-    file cannot be written."""
+    """Write drawn pictures into `folder`, as `write_pictures` does. Raises CannotWriteError where a file cannot be
+    written."""
     try:
         make_folder(folder)
     except OSError as error:
@@ -73,6 +70,5 @@ def write_drawn_pictures(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -
 def _render_png(picture: Picture) -> bytes:
     """Render a figure as PNG at `FIGURE_DPI`."""
     buffer = io.BytesIO()
-    # Without the version of matplotlib in the file, the same data give the same file.
     picture.figure.savefig(buffer, format="png", dpi=FIGURE_DPI, metadata={"Software": None})
     return buffer.getvalue()

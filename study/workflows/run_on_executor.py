@@ -1,8 +1,7 @@
 """Run tasks on an executor (processes of this computer, or a cluster), and yield results in the order of completion.
 
 The number of tasks in flight (submitted, not finished) is bounded. Workers get the command line of the calling process,
-for the provenance of their results, and keep freed memory, which saves processor time. Called by simulations of power,
-rehearsals of studies and evaluations (`simulate_power`, `rehearse_study`, `ask_engine`, `real_recordings`).
+for the provenance of their results, and keep freed memory, which saves processor time.
 """
 
 import sys
@@ -15,9 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 Key = TypeVar("Key")
-"""Type of the key of a task."""
 Result = TypeVar("Result")
-"""Type of the result of a task."""
 MAX_IN_FLIGHT = 100
 """Largest number of tasks in flight by default. Chosen: bounds the memory for arguments and results."""
 _FREED_BYTES = 30 * 2**20

@@ -1,5 +1,4 @@
-"""Pool of worker processes for CPU-bound work, started by spawning. Called by `rehearse_study`, `seal_cases` and
-`hapteq power`; `cluster` is the alternative with the nodes of a cluster."""
+"""Pool of worker processes for CPU-bound work, started by spawning."""
 
 import signal
 from collections.abc import Iterator

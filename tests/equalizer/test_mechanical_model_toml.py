@@ -178,3 +178,4 @@ def test_a_discovered_law_that_cannot_be_read_is_said_so(old, new, problem):
     with pytest.raises(MechanicalModelError) as error:
         parse_mechanical_model(ONE_AXIS + LAW.replace(old, new))
     assert problem in str(error.value)
+    assert len(error.value.problems) == 1

@@ -53,6 +53,10 @@ from equalizer.signals.units import (
         ("mNm", "N m", 1e-3),
         ("Nm/rad", "N m/rad", 1.0),
         ("counts", "1", 1.0),
+        ("J", "J", 1.0),
+        ("mJ", "J", 1e-3),
+        ("W s", "J", 1.0),
+        ("J/m", "N", 1.0),
         ("N m/turn", "N m/rad", 1 / (2 * math.pi)),
     ],
 )
@@ -117,6 +121,11 @@ def test_a_quantity_in_the_unit_of_another_is_refused():
         check_quantity("force", parse_unit("mm"))
 
 
+def test_energy_is_no_torque():
+    with pytest.raises(UnknownUnitError, match="the quantity 'torque' cannot be in J; it is in N m"):
+        check_quantity("torque", parse_unit("kJ"))
+
+
 def test_a_mass_is_no_force_and_the_force_is_named():
     with pytest.raises(UnknownUnitError, match="cannot be in kg; it is in N or N m; as a force write lbf, ozf or kgf"):
         check_quantity("force", parse_unit("lb"))
@@ -127,7 +136,16 @@ def test_a_quantity_of_unknown_scale_may_be_any():
         check_quantity(quantity, parse_unit("1"))
 
 
-@pytest.mark.parametrize(("text", "value", "kelvin"), [("degC", 20.0, 293.15), ("degF", 68.0, 293.15), ("K", 5.0, 5.0)])
+@pytest.mark.parametrize(
+    ("text", "value", "kelvin"),
+    [
+        ("degC", 20.0, 293.15),
+        ("1 degC", 20.0, 293.15),
+        ("degC^1", 20.0, 293.15),
+        ("degF", 68.0, 293.15),
+        ("K", 5.0, 5.0),
+    ],
+)
 def test_a_temperature_alone_has_an_offset(text, value, kelvin):
     unit = parse_unit(text)
     assert value * unit.factor + unit.offset == pytest.approx(kelvin)

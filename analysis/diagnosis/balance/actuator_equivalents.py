@@ -1,4 +1,4 @@
-"""Withdraws the name of a law of motion where a law of the actuator explains the data equally well. Used by `balances`.
+"""Withdraws the name of a law of motion where a law of the actuator explains the data equally well.
 
 With the velocity v, acceleration a and command u of an axis, the force balance is m a + d v + F_c sgn v + c v |v| =
 g(u). It does not identify its laws uniquely in three cases:
@@ -27,7 +27,7 @@ EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND_EFFECT: 
 """For each law, the effect with the same motion where inertia is negligible; for the dead band, also where the axis
 rests in it."""
 NO_REVERSAL_REASON = "the motion never changes direction"
-"""Reason, in a message, why a law is not distinguished from its equivalent."""
+"""Reason, in a message, why a law cannot be distinguished from its equivalent."""
 
 
 def withdraw_ambiguous_names(balance: Balance) -> Balance:

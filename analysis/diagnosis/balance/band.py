@@ -4,7 +4,7 @@ With the power spectral density S(f) of the motion and the density N of its whit
 by f^(2k), k = number of derivatives to the acceleration; double integration of an acceleration multiplies them by f^-4.
 The band ends (begins) where the noise power summed over the band is at most `ACCELERATION_NOISE_SHARE` (a hundredth) of
 the signal power. On a noisier regressor, least squares would underestimate the mass (errors in variables; see
-`motion`). Called by `motion` and `first_model.free_motion`.
+`motion`).
 """
 
 from collections.abc import Sequence
@@ -59,8 +59,8 @@ def _compute_channel_band_end_hz(column: FloatArray, rate_hz: float, exponent: i
 
 
 def _estimate_signal_and_noise_density(column: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, float]:
-    """Estimate the spectral density of a channel (n,) from segments of 4096 samples (chosen: a compromise of resolution
-    and variance). Returns the frequencies (lines,) above 0 in Hz, the density (lines,) there in squared units per Hz,
-    and that of its white noise: the median over the upper quarter of the lines."""
+    """Estimate the spectral density of a channel (n,) from segments of at most 4096 samples (chosen). Returns the
+    frequencies (lines,) above 0 in Hz, the density (lines,) there in squared units per Hz, and that of its white noise:
+    the median over the upper quarter of the lines."""
     frequency_hz, density = estimate_spectral_density(column, rate_hz, 4096)
     return frequency_hz[1:], density[1:], float(np.median(density[1 + 3 * (len(density) - 1) // 4 :]))

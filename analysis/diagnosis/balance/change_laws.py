@@ -1,7 +1,6 @@
 """Replace, append and select the laws of a regression of the force balance (`regression.py`).
 
-The products of the blocks are updated for the changed columns alone. Called by `structures` (search and refinement of
-nonlinear parameters), `linear_part`, `compare_free_laws` and `contrast.force_base`.
+Where a law is replaced, the products of the blocks are updated for its columns alone.
 """
 
 from collections.abc import Sequence
@@ -32,7 +31,8 @@ def overwrite_law(regression: Regression, law_index: int, law: Law) -> Regressio
 
 
 def try_law(regression: Regression, law_index: int, law: Law) -> Regression | None:
-    """Replace the law of this index in all but `columns`, which is enough to fit and to cross-validate."""
+    """Replace the law of this index in all but `columns`, which is enough to fit and to cross-validate. None as in
+    `overwrite_law`."""
     return _replace_law_products(regression, law_index, law, make_law_columns(regression.motions, law))
 
 
@@ -57,7 +57,7 @@ def _replace_law_products(
 
 
 def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
-    """Append laws to a regression. Laws whose columns are zero or not finite are left out."""
+    """Append laws to a regression, except those whose columns are zero or not finite."""
     added_laws, rows = [], [[part] for part in regression.columns]
     ends = [regression.columns[0].shape[1]]
     for law in laws:

@@ -1,12 +1,12 @@
 """Compare laws outside the catalogue (`free_laws`) with the sum of laws that a force balance chose.
 
-A law outside the catalogue is tried alone, in place of each law of the chosen sum, and in addition to it. Its nonlinear
-parameters are refined in the most promising sums. If the best of them is significantly better than the chosen sum, and
-leaves at most 1 - `FREE_LAW_GAIN` of its cross-validated squared error (of the linear balance's where no law of the sum
-can be named), the sum with the fewest parameters at about the same error is completed by further laws
-(`add_further_laws`) and judged on held-out data, with the catalogue's laws as rivals. It replaces the chosen sum where
-a free law with a gain of at least `FREE_LAW_GAIN` is named, or where there is such a law, the chosen sum has no named
-law, and the rms error is at most half of the linear balance's. Called by `balances`.
+A law outside the catalogue is tried alone, in place of each law of the chosen sum, and in addition to it (at most
+`MOST_SUMMED_LAWS` laws). Its nonlinear parameters are refined in the most promising sums. If the best of them is
+significantly better than the chosen sum, and leaves at most 1 - `FREE_LAW_GAIN` of its cross-validated squared error
+(of the linear balance's where no law of the sum can be named), the sum with the fewest parameters at about the same
+error is completed by further laws (`add_further_laws`) and judged on held-out data, with the catalogue's laws as
+rivals. It replaces the chosen sum where a free law with a gain of at least `FREE_LAW_GAIN` is named, or where there is
+such a law, the chosen sum has no named law, and the rms error is at most half of the linear balance's.
 """
 
 from dataclasses import replace
@@ -100,5 +100,5 @@ def _omit_law(laws: tuple[int, ...], omitted: int) -> tuple[int, ...]:
 
 
 def _cross_validate_sum(regression: Regression, laws: tuple[int, ...]) -> Structure:
-    """Cross-validate the sum of these laws (indices in the regression)."""
+    """Cross-validate the sum of these laws (indices)."""
     return Structure(laws, regression.cross_validate(regression.select_columns(laws)))

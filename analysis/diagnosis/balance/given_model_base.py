@@ -4,8 +4,7 @@ Both are columns of a linear regression of the measured force. The column of the
 The other columns are the change of that force per standard deviation of each parameter's calibration, so that their
 weights have the prior N(0, 1). The precision of this prior in the normal equations is the variance of the residual: its
 sum of squares per degree of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom
-of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8). Called by `structures`; `confirm.balance_with_model`
-builds the columns."""
+of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8). `confirm.balance_with_model` builds the columns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +27,7 @@ class GivenModelBase:
 
     columns: tuple[FloatArray, ...]
     """Per motion, (n, 1 + parameters), N (N m): the force that the model requires along the measured motion, and its
-    change per standard deviation of each free parameter; at the recording's rate."""
+    change per standard deviation of each free parameter; at the motion's rate."""
     mass: float
     """Mass that moves along the axis, kg (kg m^2)."""
     least_share: float = 0.0

@@ -4,8 +4,7 @@
 
 No model of a real device reaches the sensors' noise, so an effect is judged by its prediction of held-out samples, not
 by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
-Stat. 17:1217, 1989). Called by `decide_with_model`, `require_gain`, `confirm_laws`, `discovery` and
-`result.unconfirmed_candidates`.
+Stat. 17:1217, 1989).
 """
 
 from dataclasses import dataclass
@@ -57,16 +56,16 @@ def estimate_held_out_gain(
 
 
 def predicts_motion(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether the model with its effects predicts a held-out motion better than the mean of that motion does. A law
-    that only stabilises an unstable model fails this test, as does one whose residuals are not finite. Channels that
-    contain only noise are not counted. True without a test where forces are compared, or where nothing is held out."""
+    """Whether the model with its effects predicts a held-out motion better than the mean of that motion does; not where
+    residuals are not finite. Channels that contain only noise are not counted. True without a test where forces are
+    compared, nothing is held out, or no channel is counted."""
     return measure.name == "predicted force" or _compute_remaining_share(measure, candidate, 0.0) < 1
 
 
 def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether the model with its effects explains more than half of the held-out power beyond noise (chosen: with less,
     its law may only be the best substitute for a law that was not found), and passes `predicts_motion`. True where
-    nothing is held out."""
+    nothing is held out, or all channels contain only noise."""
     return predicts_motion(measure, candidate) and _compute_remaining_share(measure, candidate, 1.0) < 0.5
 
 
@@ -91,7 +90,7 @@ def _compute_remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, 
 def _compute_stretch_powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
     """Compute (stretches, c): sums of squares of the held-out residuals, in units of `measure.unit`. All records
     together are cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record with held-out
-    samples; (0, …) without any."""
+    samples."""
     total_samples = sum(int(record.test.sum()) for record in measure.records)
     power_sums = []
     for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):

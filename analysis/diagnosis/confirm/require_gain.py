@@ -2,9 +2,7 @@
 
 The parameters of such a model have absorbed part of a missing law, and a wrong law may imitate the remainder. Therefore
 an effect must remove at least `FURTHER_LAW_SHARE` of the held-out error power, as the laws of a force balance must
-(`require_enough_gain`); effects of actuator and sensor become candidates, unless the signal itself shows them
-(`withdraw_doubtful_names`). Called by `search_by_simulation` and `diagnose`; `confirm_laws`, `laws_for_simulation` and
-`result.candidates` use the names of constant effects.
+(`require_enough_gain`); effects become candidates, unless the signal itself shows them (`withdraw_doubtful_names`).
 """
 
 from dataclasses import replace
@@ -19,7 +17,6 @@ from analysis.diagnosis.search.verdict import SearchResult, UnconfirmedEffect, j
 from analysis.diagnosis.settings import FURTHER_LAW_SHARE
 
 CONSTANT_FORCE = "constant_force"
-"""Name of the effect of a constant force."""
 CONSTANT_EFFECTS = {CONSTANT_FORCE: "force", "sensor_offset": "offset"}
 """Name of the parameter of each effect that is a constant of a fitted model and no missing physics."""
 EFFECTS_VISIBLE_IN_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
@@ -39,7 +36,7 @@ def require_enough_gain(result: SearchResult, noise_is_measured: bool) -> Search
     """Keep only effects that remove as much of the held-out error power as a law of a balance must: effects are dropped
     from the last on until the last one removes enough. noise_is_measured: whether repeated periods show the noise;
     without them the verdict `explained` becomes `partly_explained`, because no error is known to be noise alone.
-    Constants are parameters of the model: where all effects are constants, or none is left, `explained` stays."""
+    Where all effects are constants, which are parameters of the model, or none is left, `explained` stays."""
     explanation = result.found
     while explanation.steps and not _removes_enough(result.context, explanation):
         explanation = remove_effect(result.context, explanation, len(explanation.steps) - 1)
@@ -64,8 +61,7 @@ def withdraw_doubtful_names(result: SearchResult) -> SearchResult:
     """Make named effects candidates unless the signal itself shows them: the model was fitted to these recordings, so
     that a law of the motion that the catalogue lacks may have the same effect as a nonlinear or delayed sensor. An
     effect that the signal shows is a candidate, too, where the model without effects fails `predicts_motion`. A
-    candidate is reported with the gain of all effects up to it if that is positive on the held-out samples, and else
-    removed."""
+    candidate is reported with the gain of all effects up to it, if that is positive on the held-out samples."""
     explanation, context, candidates = result.found, result.context, []
     doubtful_indices = [
         step_index for step_index, step in enumerate(explanation.steps) if step.newest not in EFFECTS_VISIBLE_IN_SIGNAL

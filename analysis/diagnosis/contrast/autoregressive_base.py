@@ -3,7 +3,7 @@ from the past of all responses y and of all commands u,
 
     y_i(t) = sum over k = 1..n of a_k' y(t - k) + sum over k = 0..n of b_k' u(t - k) + c + e(t).
 
-Called by `bases` for devices that no force balance describes: voltages as responses, many modes.
+It also describes devices that no force balance does: voltages as responses, many modes.
 """
 
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ class AutoregressiveBase:
     """The model of a single response. Rows: its second difference, then the past of all responses and commands, and 1.
 
     The past of the responses is given as y(t - 1), its first difference, and second differences up to lag n - 2, which
-    span the same space as y(t - 1) to y(t - n): products of smooth readings are nearly equal, so that in double
-    precision errors below 1e-5 of them would be lost to rounding.
+    span the same space as y(t - 1) to y(t - n): products of successive smooth readings are nearly equal, so that small
+    errors would be lost to rounding.
     """
 
     channel: int
@@ -40,11 +40,11 @@ class AutoregressiveBase:
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
         """Build the rows of each part, (n, 1 + columns): predicted value and regressors of each decimated sample from
-        index `order` on. reusable_rows: not used; only `ForceBase` reuses columns."""
+        index `order` on. reusable_rows: not used."""
         return tuple(self._build_part_rows(part) for part in parts)
 
     def mask_command_columns(self, width: int) -> Mask:
-        """Mask (width,) of the columns that are made from commands. width: number of columns."""
+        """Mask (width,) of the columns of rows that are made from commands. width: 1 + number of regressors."""
         return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
     def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
@@ -62,7 +62,7 @@ class AutoregressiveBase:
         return tuple(masks)
 
     def _build_part_rows(self, part: Part) -> FloatArray:
-        """Build the rows (n, 1 + columns) of one part, as `build_rows` returns them."""
+        """Build the rows of one part, as `build_rows`."""
         response, command = (decimate(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
         row_count = max(len(response) - self.order, 0)
         first_difference = np.diff(response, axis=0, prepend=response[:1])

@@ -1,7 +1,4 @@
-"""Build the base models of a comparison: first a force balance where it fits, then an autoregressive model (ARX).
-
-Called by `rank_faults` and `study.evaluation.real.injected_halves`.
-"""
+"""Build the base models of a comparison: first a force balance where it fits, then an autoregressive model (ARX)."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

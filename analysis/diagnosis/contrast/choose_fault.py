@@ -32,7 +32,9 @@ from analysis.diagnosis.settings import (
 
 T_QUANTILE = float(stdtrit(FOLDS - 1, 0.975))
 """Half-width of a 95 % confidence interval in standard errors: quantile 0.975 of Student's t with FOLDS - 1 degrees of
-freedom. A fault is not named where the interval of its first parameter includes 0, or 1 for a gain."""
+freedom. A fault is not named where the interval of its first parameter includes 0, or 1 for a gain. A bandwidth is
+infinite without the fault, but has the relative error of its time constant; a limit, rate or position is fixed by the
+variant, without an error, and passes."""
 ALIASES = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),

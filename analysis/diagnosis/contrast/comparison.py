@@ -3,8 +3,7 @@
 A base is a linear model of the device (`bases`) that predicts a signal from others. With E the sum of squared whitened
 errors of one base fitted to both sets, and E0 that of a separate base for each set, the excess is E / E0 - 1. It is
 compared with the excess between stretches of a single set (negative control), where the device is the same. Undoing a
-fault means to transform the recorded signals to those without it (`fault`). Made by `rank_faults`, read by
-`choose_fault` and the report (`result.contrast_findings`).
+fault means to transform the recorded signals to those without it (`fault`). Made by `rank_faults`.
 """
 
 from dataclasses import dataclass
@@ -16,24 +15,24 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedFault:
-    """A fault with its fitted parameters, its gain, and its gains in the negative control (between stretches of one
+    """A fault with its fitted parameters, its gain, and its gain in the negative control (between stretches of one
     set)."""
 
     fault: Fault
     values: dict[str, float]
     """Fitted parameters of the effect by name, in SI units."""
     standard_errors: dict[str, float]
-    """Standard error of each parameter: jackknife that leaves out a sixth of either set, so that the variation within
-    the clean set counts as well as that within the faulty set."""
+    """Standard error of each parameter, by a jackknife that leaves out a sixth of either set; it includes the spacing
+    of the tried variants."""
     block_squares: FloatArray
     """(blocks,): sums of squared errors over all bases, each fitted to both sets with the fault undone, blocks of the
-    faulty set, then of the clean one; times 1 + the median gain in the negative control."""
+    faulty set, then of the clean one; times 1 + the median gain in the negative control, if that is positive."""
     gain: float
     """Sum of `Comparison.block_squares` (no fault undone) over the sum of `block_squares`, minus 1; above 0 = undoing
     it helps."""
     control_gain: float
-    """The largest gain in the negative control minus the median: the gain that the free parameters of the fault yield
-    where there is no fault."""
+    """The largest gain (at least 0) in the negative control minus the median: the gain that the free parameters of the
+    fault yield where there is no fault; 0 without a control, for a fault with a negligible gain."""
     share: float
     """Share of the excess error (`Comparison.excess`) that is removed with the fault undone; 0 without an excess."""
     held_out_squares: float
@@ -46,8 +45,7 @@ class JudgedFault:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """All tested faults with their gains, the errors with no fault undone, and the excess errors of the negative
-    control."""
+    """The tested faults, the errors with no fault undone, and the excess errors of the negative control."""
 
     faults: tuple[JudgedFault, ...]
     """The best fault first."""

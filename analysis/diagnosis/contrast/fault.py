@@ -2,7 +2,7 @@
 
 Undoing a fault of size s changes the rows of a base by about s times the change for size 1 (`joint_products`), so that
 the size is found by least squares; nonlinear parameters, such as widths and delays, are fixed in each `Variant`.
-`mechanism_faults`, `actuator_faults` and `sensor_faults` make the faults, `rank_faults` and `fit_faults` fit them.
+`mechanism_faults`, `actuator_faults` and `sensor_faults` make the faults, `fit_faults` fits them.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,6 @@ class Variant:
     undo: tuple[Undo, ...]
     """One function per size, each undoing a fault of size 1."""
     parameters_of: ParametersOf
-    """Parameters of the fault from its sizes."""
     lower_bound: float = -np.inf
     """Least value of each size."""
     upper_bound: float = np.inf

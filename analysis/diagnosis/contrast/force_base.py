@@ -3,7 +3,6 @@
 Per driven axis, F = M a + D v + K q + c + sum of w phi: linear regression of the force on the motion of all measured
 channels, a constant, and further laws phi of the motion, some of them linear or of the time (`balance.laws`), that
 lower the cross-validated error (`balance.regression`). The laws only make the base accurate; none of them is reported.
-Built by `bases`, used by `compared_base` and `rank_faults`.
 """
 
 from collections.abc import Sequence
@@ -75,7 +74,7 @@ class ForceBase:
 
 def build_force_base(motions: Sequence[Motion], axis: int, is_rotational: bool) -> ForceBase:
     """Build the base model of one axis: select laws first among the general laws, then with cogging at the pitches that
-    the residual force shows. motions: of the compared recordings; all known samples are fitted to."""
+    the residual force shows. motions: of the compared recordings."""
     scales = [measure_scales(motions, channel, is_rotational) for channel in range(len(motions[0].channels))]
     is_free_rotation = any(scale.turns for scale in scales)
     regression = build_regression(motions, axis, list(make_laws(motions, is_rotational)), is_free_rotation)

@@ -1,6 +1,6 @@
 """Interpolation between samples by splines, and the factor by which it reduces one-step prediction errors.
 
-`sensor_faults` and `actuator_faults` undo delays and deviating clock rates by interpolation. Interpolation attenuates
+Delays and deviating clock rates (`sensor_faults`) are undone by interpolation. Interpolation attenuates
 high frequencies, and thereby reduces the prediction errors even where there is no such fault; the reduction that is
 credited to a fault must not include this factor. By the Kolmogorov-Szegő formula the one-step prediction error variance
 of a signal is the geometric mean of its spectrum over frequency, so that a filter multiplies prediction errors by the

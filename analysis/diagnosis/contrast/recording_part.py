@@ -1,8 +1,4 @@
-"""Split recordings at long gaps into parts: arrays without missing values, in which a fault can be undone (`fault`).
-
-Undoing a fault replaces samples by those without the fault. Called by `rank_faults`, `compare_with_reference` and
-`study.evaluation.real.injected_halves` for the faulty and the clean recordings.
-"""
+"""Split recordings at long gaps into parts: arrays without missing values, in which a fault can be undone (`fault`)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -80,7 +76,7 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
 
 
 def _mask_finite_samples(part: Recording) -> Mask:
-    """Make the mask (n,) of the samples at which all channels of response and position are finite."""
+    """Mask (n,) of the samples at which all channels of response and position are finite."""
     signals = [part.response.samples, *([] if part.position is None else [part.position.samples])]
     return np.asarray(np.isfinite(np.hstack(signals)).all(axis=1), dtype=np.bool_)
 

@@ -1,8 +1,7 @@
 """Base model that predicts one sensor from another: a velocity or acceleration from the differentiated position.
 
 The prediction is a linear regression on the differentiated position at neighbouring times (a short FIR filter) and a
-constant. No physics of the device is involved, so that a difference between recordings is a fault of a sensor. Used by
-`rank_faults`.
+constant. No physics of the device is involved, so that a difference between recordings is a fault of a sensor.
 """
 
 from collections.abc import Sequence

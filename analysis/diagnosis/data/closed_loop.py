@@ -2,7 +2,6 @@
 
 Where the excitation was recorded, its difference from the command is the feedback. Otherwise the test is that of
 Granger (Econometrica 37 (1969), 424): whether past responses improve the prediction of the command from its own past.
-`error_measure_rule`, `choose_structure` and `rigid_model` choose error measure and first model by the result.
 """
 
 import numpy as np
@@ -31,14 +30,12 @@ def is_in_closed_loop(recording: Recording) -> bool:
             return False
         return bool(_compute_rms(feedback[is_complete]) > FED_BACK_SHARE * _compute_rms(command[is_complete]))
     if recording.hold is not Hold.ZERO_ORDER:
-        # The command written just before a sample may already depend on the sample after it.
         return False
     return any(_is_predicted_by_responses(command[:, axis], recording) for axis in range(command.shape[1]))
 
 
 def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> bool:
-    """Whether past responses improve the prediction of the command from its own past: Granger causality, by the ratio
-    of the rms residuals of two autoregressions. command: (n,), of one axis."""
+    """Test Granger causality by the ratio of the rms residuals of two autoregressions. command: (n,), of one axis."""
     signals = [recording.response.samples]
     if recording.position is not None:
         signals.append(recording.position.samples)
@@ -69,5 +66,5 @@ def _compute_residual_rms(target: FloatArray, regressors: FloatArray) -> float:
 
 
 def _compute_rms(samples: FloatArray) -> float:
-    """Compute the root mean square over all samples and channels, about zero."""
+    """Compute the root mean square over all samples and channels."""
     return float(np.sqrt(np.mean(samples**2)))

@@ -1,9 +1,7 @@
 """Statistics of residuals that are correlated from sample to sample: sample autocovariances and the block bootstrap.
 
-The autocovariances are those to which the callers (`whitened_measure`, `compared_base`) fit an autoregression (Yule
-1927, Walker 1931). The lower bound of a gain on held-out data is found by resampling blocks of samples instead of
-single samples (Kunsch, Ann. Stat. 17:1217, 1989); it is called by `judge_laws` and `actuator` (laws of a force
-balance), by `rank_faults` and `choose_fault`, and by `held_out_gain`.
+The autocovariances serve to fit an autoregression (Yule 1927, Walker 1931). The lower bound of a gain is found by
+resampling blocks of samples instead of single samples (Kunsch, Ann. Stat. 17:1217, 1989).
 """
 
 from collections.abc import Sequence

@@ -68,7 +68,7 @@ def _is_predictable(recording: Recording) -> bool:
 def _can_predict(targets: FloatArray, signals: FloatArray, uses_future: bool) -> bool:
     """Whether an FIR filter of signals (n, k), fitted to the first half by ridge regression, explains at least the
     share `DRIVEN_COHERENCE` of the power of a channel of targets (n, c) in the second half. uses_future: half of the
-    taps are non-causal, as a derivative needs."""
+    taps are non-causal, as a derivative needs. False where a half has no complete sample."""
     sample_count = len(targets)
     tap_step = max(int(FILTER_SPAN_SHARE * sample_count) // MAX_TAPS, 1)
     tap_count = min(int(FILTER_SPAN_SHARE * sample_count), MAX_TAPS)
@@ -82,12 +82,14 @@ def _can_predict(targets: FloatArray, signals: FloatArray, uses_future: bool) ->
     regressors = np.hstack([*shifted_signals, np.ones((sample_count, 1))])
     is_finite = np.isfinite(targets).all(axis=1) & np.isfinite(regressors).all(axis=1)
     first_half = is_finite & (np.arange(sample_count) < sample_count // 2)
+    second_half = is_finite & ~first_half
+    if not (first_half.any() and second_half.any()):
+        return False
     gram = regressors[first_half].T @ regressors[first_half]
     weights = np.linalg.solve(
         gram + RIDGE_SHARE * np.trace(gram) / len(gram) * np.eye(len(gram)),
         regressors[first_half].T @ targets[first_half],
     )
-    second_half = is_finite & ~first_half
     residual_squares = np.sum((targets[second_half] - regressors[second_half] @ weights) ** 2, axis=0)
     target_power = np.maximum(np.sum((targets[second_half] - targets[first_half].mean(axis=0)) ** 2, axis=0), 1e-300)
     return bool(np.any(residual_squares < (1 - DRIVEN_COHERENCE) * target_power))

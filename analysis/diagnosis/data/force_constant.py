@@ -1,7 +1,6 @@
 """Convert commands in A, V or no unit to forces or torques, by a force (torque) constant that the user states.
 
 force = constant x command, in N or N m per unit of the command, so that masses and stiffnesses are found in SI units.
-Called by `study.workflows.diagnosis.diagnosis_input`.
 """
 
 from collections.abc import Sequence
@@ -22,8 +21,8 @@ class ForceConstantError(ValueError):
 
 
 def convert_commands_to_forces(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
-    """Convert the commands to forces, and also an excitation with as many channels. Returns the recording and a
-    sentence about it. constants: a single value for all commands or a value for each, in N or N m per unit of the
+    """Convert the commands to forces (torques), and also an excitation with as many channels. Returns the recording and
+    a sentence about it. constants: a single value for all commands or a value for each, in N or N m per unit of the
     command. Raises ForceConstantError where the motion has no SI unit, a command is a force already, or the constants
     are of a wrong number, zero or not finite."""
     command, length_unit = (

@@ -102,14 +102,6 @@ class Observed:
         )
 
 
-def observe(recording: Recording, response_count: int) -> Observed:
-    """Make one record of a recording, with its samples divided by `split_samples`. response_count: number of the
-    model's outputs; a position with another number of channels is left out."""
-    measured, is_complete = stack_measured_signals(recording, response_count)
-    fit, choose, test = (mask & is_complete for mask in split_samples(recording.segments, len(recording)))
-    return Observed(recording, recording.command.samples, measured, fit, choose, test)
-
-
 def stack_measured_signals(recording: Recording, response_count: int) -> tuple[FloatArray, Mask]:
     """Stack response and position side by side, (n, c), with the mask (n,) of samples where all are finite. A position
     whose number of channels is not `response_count` is left out."""

@@ -1,9 +1,7 @@
 """Adapt the model and the effects to what differed during a recording: payload, conditions, signs of commands.
 
 Three properties may differ between recordings of one device: a mass or inertia that it carried (keys of `meta`),
-recorded conditions such as a temperature, on which effects depend, and the sign of commands. Called for every recording
-by the simulations of `errors`, `forces.predicted_force` and `confirm.balance_with_model`; `input_checks` checks the
-payload, and modules of `first_model`, `next_experiment` and `result` use single functions.
+recorded conditions such as a temperature, on which effects depend, and the sign of commands.
 """
 
 from collections.abc import Sequence
@@ -47,7 +45,7 @@ def is_unstable_within(model: MechanicalModel, longest_s: float) -> bool:
 
 def apply_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
     """Apply the recording's conditions to the effects that depend on conditions; missing samples of these are
-    interpolated. Without recorded conditions such effects are not changed, and cannot be simulated."""
+    interpolated. Without recorded conditions the effects are not changed."""
     condition = recording.condition
     if condition is None or all(placed_effect.effect.with_conditions is None for placed_effect in effects):
         return tuple(effects)

@@ -20,6 +20,5 @@ with linear factors w_j and nonlinear parameters a_j (exponents, widths, time co
    `add_laws` replaces effects by a law that fits better.
 
 References: Stone, J. R. Stat. Soc. B 36:111 (1974), cross-validation; Brunton, Proctor and Kutz, PNAS 113:3932 (2016),
-sparse regression of dynamics; Schmidt and Lipson, Science 324:81 (2009). Used by `search_by_simulation`. Begin at
-`discover.py`.
+sparse regression of dynamics; Schmidt and Lipson, Science 324:81 (2009). Begin at `discover.py`.
 """

@@ -2,8 +2,7 @@
 
 The search for unknown physics fits a sum  factor_1 term_1 + factor_2 term_2 + … (`fit_sum`) with signals named x, y, z
 by their order. A simulation needs a formula in the language of laws (`equalizer.laws`), with parameters p0, p1, … and
-the recording's own names for the signals. Called by `fit_laws`, `antisymmetric_pairs`, `snap_exponents`, `validation`
-and `add_laws`.
+the recording's own names for the signals.
 """
 
 import re

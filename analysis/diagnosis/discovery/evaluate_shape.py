@@ -1,7 +1,7 @@
 """Evaluates the formula of a term along the samples of a recording, and collects the signals that formulas may contain.
 
 Formulas without memory are evaluated by NumPy on all samples at once; those with memory, such as delays and filters, by
-the sample-by-sample evaluator of `equalizer.laws`. Called by `matched_filter`, `fit_sum` and `discover`.
+the sample-by-sample evaluator of `equalizer.laws`.
 """
 
 from collections.abc import Callable, Mapping, Sequence

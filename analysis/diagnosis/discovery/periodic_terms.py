@@ -1,5 +1,5 @@
 """Periodic terms of discovered laws: sines of the position, and of time, that start at spectral lines of the missing
-force. The ranges of the search and the bounds of the parameters are chosen by hand. Called by `view_terms`.
+force. The ranges of the search and the bounds of the parameters are chosen by hand.
 """
 
 from itertools import product

@@ -3,7 +3,7 @@
 A view is the filtered residual either of the force along an axis, with the terms of `grammar`, or of the reading of one
 response channel, with terms of sensor errors: sign, powers, soft limits, dead zones, hysteresis (play), drift, and
 products with other channels. Terms that are linear in the readings (gain, lag, cross-axis sensitivity) are left out,
-because the effects of the catalogue describe them. Start values and bounds are chosen by hand. Called by `discover`.
+because the effects of the catalogue describe them. Start values and bounds are chosen by hand.
 """
 
 from collections.abc import Iterator
@@ -69,8 +69,8 @@ def _generate_single_terms(reading: str, largest_reading: float) -> Iterator[Ter
 
 
 def _generate_cross_terms(reading: str, other_readings: list[str]) -> Iterator[Term]:
-    """Generate the products and powers up to the third order that contain readings of other response channels. reading:
-    name of the channel's reading."""
+    """Generate products and powers up to the third order that contain readings of other response channels. reading:
+    name of the channel's own."""
     for cross in other_readings:
         shapes = (
             f"{reading}*{cross}", f"{cross}**2", f"{cross}*abs({cross})", f"abs({cross})", f"{reading}*abs({cross})",

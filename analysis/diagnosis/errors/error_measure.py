@@ -2,8 +2,7 @@
 noise.
 
 `choose_measure` selects one of three: `free_simulation`, `windows` and `forces.predicted_force`. `whitened_measure`
-wraps any of them with a whitening filter that was learned from reference recordings. The fits (`output_error`), the
-search (`search`) and `localisation` use the measures only through this protocol.
+wraps any of them with a whitening filter that was learned from reference recordings.
 """
 
 from collections.abc import Sequence

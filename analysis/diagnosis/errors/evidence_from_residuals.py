@@ -1,8 +1,7 @@
 """Convert the residuals of a simulation to `Evidence`, from which an effect's starting values are estimated.
 
 A Wiener deconvolution (`estimate_missing_force`) gives the force along each driven axis that would explain the
-residuals, and the motion that it adds to the simulated one. The laws of the effects are then regressed on this force
-and motion. Called by `free_simulation`; `windows` uses `fill_gaps`, and `signature_curves` uses `EXPECTED_FORCE_SHARE`.
+residuals, and the motion that it adds to the simulated one.
 """
 
 import numpy as np

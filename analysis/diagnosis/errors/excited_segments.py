@@ -1,7 +1,7 @@
 """Select the segments of a recording in which a given axis is driven.
 
-The first fit of play (backlash) with impacts (`search.impacts`) uses only these segments: they contain the information
-about that axis, and simulating them takes less time than simulating the whole recording.
+The first fit of play (backlash) with impacts (`search.impacts`) uses these segments: they contain the information about
+that axis, and simulating them takes less time than simulating the whole recording.
 """
 
 from dataclasses import replace
@@ -21,8 +21,8 @@ LONGEST_S = 6.0
 
 def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:
     """Select the segments that excite an axis, each as a record that is simulated from rest, and return the error
-    measure on them. Segments without samples for fitting (`fit`) or for choosing among effects (`choose`) are left out;
-    where no segment remains, the measure is returned unchanged. axis: index of the command."""
+    measure on them. Segments of rest, or without samples for fitting (`fit`) or for choosing among effects (`choose`),
+    are left out; where none remains, the measure is returned unchanged. axis: index of the command."""
     segment_records = tuple(
         _cut_record(record, segment)
         for record in measure.records

@@ -1,8 +1,7 @@
 """Scores of a fit: rms error over rms noise per channel, on the samples to fit, to choose and to test by.
 
 `FitScore.mean_log_error` is the criterion by which fits are compared; the functions below compute rms errors and the
-rms of the measured signals that errors are normalised by. Used by the search (`search_context` and others), by the
-confirmation of laws (`held_out_gain`), by the tables of errors (`error_table`) and by `reference`.
+rms of the measured signals that errors are normalised by.
 """
 
 from dataclasses import dataclass

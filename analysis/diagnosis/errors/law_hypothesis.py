@@ -1,7 +1,6 @@
 """Convert a discovered law, a formula that is no effect of the catalogue, to a hypothesis that `output_error` can fit.
 
 The free numbers of the formula become the parameters of an effect (`make_law_effect`) at one axis or response channel.
-Called by `discovery.convert_sum` and `confirm.laws_for_simulation`.
 """
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, make_claim_hypothesis

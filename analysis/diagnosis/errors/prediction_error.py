@@ -1,8 +1,7 @@
 """Prediction error of a model on a recording, without and with a fitted gain factor.
 
 No parameter of the model is fitted. Which signals are compared, and how, is chosen by `choose_measure` as in a
-diagnosis. Called by `reference.compare_with_reference`, and by `study.evaluation.real` to check an improved model on
-recordings that it was not fitted to.
+diagnosis.
 """
 
 from collections.abc import Iterator
@@ -99,8 +98,8 @@ def _fit_gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
 
 
 def _compute_normalised_rms(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
-    """Compute the normalised rms error of prediction f of y, (n, c) each: sqrt(mean over channels of (rms error /
-    standard deviation of y)²). None where the mask is empty or the error is not finite."""
+    """Compute the error of `PredictionError` of prediction f of y, (n, c) each. None where the mask is empty or the
+    error is not finite."""
     if not mask.any():
         return None
     with np.errstate(over="ignore", invalid="ignore"):

@@ -2,7 +2,7 @@
 
 For responses with impacts, which are chaotic: simulations of one hypothesis from almost equal parameters diverge. Their
 standard deviation, the chance variation, therefore weights the band powers, and predictions are averaged over an
-ensemble of simulations. Called by `search.impacts` and `search.second_effect_with_play`.
+ensemble of simulations.
 """
 
 from dataclasses import replace
@@ -44,7 +44,6 @@ def weight_by_chance_variation(problem: BandPowerProblem, fit: BandPowerFit) -> 
     simulations. Its predictions are averaged over as many."""
 
     def predict(member: int) -> FloatArray:
-        """Predict the band powers of one simulation of the ensemble."""
         return problem.predict(fit.deviations, perturb(fit.hypothesis, member))
 
     chance_deviations = np.std(np.array(list(problem.map_(predict, range(ENSEMBLE_SIZE)))), axis=0, ddof=1)
@@ -57,7 +56,6 @@ def _differentiate_by_deviations(problem: BandPowerProblem, fit: BandPowerFit) -
     steps = np.eye(len(fit.deviations))
 
     def compute_difference(parameter_index: int) -> FloatArray:
-        """Compute the sensitivity to one parameter."""
         change = problem.predict(fit.deviations + steps[parameter_index], fit.hypothesis) - fit.predicted
         return np.where(np.isfinite(change), change, 0.0)
 

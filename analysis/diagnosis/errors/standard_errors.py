@@ -164,8 +164,8 @@ def _add_calibration_prior(gram: FloatArray, t: int) -> FloatArray:
 
 def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray:
     """Compute the standard errors (t + parameters,) of the model's deviations and the hypothesis's point; 0 for
-    parameters at a bound, or without effect on the prediction. jacobian: sensitivity to all parameters
-    (`compute_full_sensitivity`).
+    parameters at a bound, infinite for others of the point without effect on the prediction. jacobian: sensitivity to
+    all parameters (`compute_full_sensitivity`).
 
     Scores sum to zero at the minimum, so that few clusters underestimate the variance. For each parameter, the larger
     of the two estimates, with and without common clusters, is returned. Directions with less than 1e-12 of the largest
@@ -181,7 +181,9 @@ def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sen
     for pool_periods in (False, True):
         scores = _sum_scores(measure, jacobian, residuals, pool_periods) * is_free[:, None]
         variances.append(np.diagonal(inverse @ _add_calibration_prior(scores @ scores.T, t) @ inverse))
-    return np.asarray(np.sqrt(np.maximum(np.max(variances, axis=0), 0.0)))
+    errors = np.sqrt(np.maximum(np.max(variances, axis=0), 0.0))
+    errors[is_free & (np.diagonal(information) == 0)] = np.inf
+    return np.asarray(errors)
 
 
 def compute_segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:

@@ -99,8 +99,8 @@ def choose_structure(
         return ChosenStructure(best, trials, sentence, describe_remaining_error(None, best))
     best = choose_simplest(structure_fits)
     reason = (
-        f"{best.kind} is the structure of fewest parameters; no structure with more parameters lowers its "
-        f"cross-validated error power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %)."
+        "From the fewest parameters on, a structure with more was preferred where it lowers the cross-validated error "
+        f"power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %); the choice is {best.kind}."
     )
     return _compare_with_two_modes(
         ChosenStructure(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress

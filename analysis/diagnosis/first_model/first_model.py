@@ -1,8 +1,4 @@
-"""Result of fitting a starting model for a diagnosis, where the user gave none.
-
-Made by `fit_without_model` and `diagnose_values`, read by these, `study.workflows.diagnosis` and
-`study.evaluation.real.diagnose_real`.
-"""
+"""Result of fitting a starting model for a diagnosis, where the user gave none."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING

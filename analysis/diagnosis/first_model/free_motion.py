@@ -3,7 +3,7 @@
 Without a driving force, m q'' + c q' + k q + h(q, q') = 0 determines each term up to a common factor. Per unit mass,
 the force -q'' balances damping, spring and nonlinear laws h along the motion q. The result is a recording with an
 imposed motion q and a measured force -q'', of a device without mass. A decay is divided into segments of equal
-duration, each with its amplitude, so that fit and test both contain all levels. Called by `one_motion_per_force`.
+duration, each with its amplitude, so that fit and test both contain all levels.
 """
 
 from collections.abc import Sequence
@@ -75,8 +75,8 @@ def convert_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recordin
 
 def _split_into_levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
     """Split each moving part into segments of equal duration, with their amplitude on the channel of the largest range:
-    at most `DECAY_MOST_LEVELS`, of `DECAY_LEAST_CYCLES` cycles or more on average; a shorter motion is one segment. A
-    decay passes through all levels, and each should be both fitted and tested. samples: (n, p)."""
+    at most `DECAY_MOST_LEVELS`, of `DECAY_LEAST_CYCLES` cycles or more on average; a shorter motion is one segment.
+    samples: (n, p)."""
     segments = []
     for span in find_moving_spans(samples, find_parts(recording)):
         motion = samples[span.start : span.end_of_motion]

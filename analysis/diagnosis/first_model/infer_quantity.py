@@ -4,7 +4,7 @@ From the channel's name where that is clear; force where the commands are motion
 response y and its derivatives, f = m y'' + c y' + k y. With a position, mass makes y'' significant; with a velocity,
 mass multiplies y' and damping y, so that y'' is not needed. A response is a velocity where y'' explains less than
 `DERIVATIVE_GAIN` of the force's power in cross-validation and y at least that much, otherwise a position. A sensor's
-voltage is treated likewise. Called by `one_motion_per_force`.
+voltage is treated likewise. Without a command that changes, a response without a unit is taken for a position.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) -
 
 
 def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """Infer the quantity of the responses. Returns the recordings with it, and a sentence on the assumption; unchanged,
-    with an empty sentence, where a quantity was stated; where no force drives the device and a unit is stated; and for
-    a voltage that behaves like a position. recordings: alike in channels, units and rate."""
+    """Infer the quantity of the responses. Returns the recordings with it, and a sentence on the assumption. Unchanged,
+    with an empty sentence: where the quantity of any response is stated; with a unit, where no name tells a quantity
+    and no command changes; for a voltage that behaves like a position. recordings: alike in channels, units, rate."""
     first_recording = recordings[0]
     if set(first_recording.response.quantities) & BALANCE_QUANTITIES:
         return recordings, ""
@@ -56,7 +56,7 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 
 def _infer_from_names(recording: Recording) -> tuple[str, ...]:
-    """Infer the quantities of the responses from the channels' names and units; empty where these determine none."""
+    """Infer the quantities of the responses without a unit from their names; empty where no name determines one."""
     from equalizer.signals.quantity_words import detect_quantity  # only where a quantity is missing
 
     response = recording.response

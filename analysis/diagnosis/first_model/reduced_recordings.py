@@ -1,8 +1,8 @@
 """Subtract from the commands the linear forces of a balance that a model with one body per command cannot describe.
 
 These are forces of motions other than the driven ones, of modes, and of a delayed command, with the weights of the
-force balance. The reduced command drives one measured motion each, so that nonlinear laws are fitted and drawn as for
-any device. Called by `model_from_balance` and `force_balance_measures`.
+force balance. Each reduced command drives one measured motion, so that nonlinear laws are fitted and drawn as for any
+device.
 """
 
 from collections.abc import Sequence
@@ -71,8 +71,8 @@ def _reduce_recording(
 
 
 def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
-    """Compute (n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness.
-    The named laws are part of the regression, but not of this force."""
+    """Compute (n,), N (N m): force of the linear laws and, where more motions than commands are measured, of mass,
+    damping and stiffness of the other motions. The named laws are part of the regression, but not of this force."""
     regression, motion_count = balance.search.regression, len(motion.channels)
     linear_laws = [judged_law.law_index for judged_law in balance.laws if judged_law.law.is_linear]
     weights = regression.fit_weights(

@@ -6,7 +6,7 @@ balanced twice, with the recorded and with the negated command, each time with m
 where that lowers the cross-validated error by more than `REVERSED_SIGN_GAIN` and significantly
 (`improves_significantly`). A spring alone does not determine the sign, because k may be positive or negative. The
 reversed commands are listed in the recording's `meta`, so that a model is written for the commands as recorded
-(`recorded_conditions`). Called by `one_motion_per_force`.
+(`recorded_conditions`).
 """
 
 from collections.abc import Sequence
@@ -29,8 +29,8 @@ from equalizer.signals.signal import FloatArray, Signal
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """Negate the commands whose sign is opposite to the motion that they drive; returns the recordings and a sentence
     about these commands. Returns them unchanged, with an empty sentence, where there are none, the forces cannot be
-    balanced, or the motion was free (no command). Where the motion was imposed, the response (force) is negated
-    instead. recordings: at least one, with the same channels, units and rate."""
+    balanced, the motions are not as many as the forces, or the motion was free. Where the motion was imposed, the
+    response (force) is negated instead. recordings: at least one, with the same channels, units and rate."""
     if is_free_motion(recordings[0]):
         return recordings, ""
     force_driven = convert_all_to_force_driven(recordings)
@@ -62,8 +62,7 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
-    """Whether negating the force lowers the cross-validated error of an axis's balance by more than
-    `REVERSED_SIGN_GAIN` and significantly."""
+    """Whether negating the force lowers the error of an axis's balance (see the module's docstring)."""
     recorded_regression, negated_regression = (
         build_regression([replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)

@@ -149,7 +149,8 @@ def _compute_force_noise(
 ) -> NoiseFloor:
     """Compute the noise of the force along the motion, from the motion's noise through the model's inverse response up
     to `band_hz` (Hz). Frequencies below 1e-3 Hz (by hand) count as 1e-3 Hz; a density of the motion's noise that is not
-    finite is replaced by `ASSUMED_NOISE_SHARE`."""
+    finite is replaced by `ASSUMED_NOISE_SHARE`. The method then stays "unknown": nothing is tested against a noise that
+    was not estimated."""
     frequency_hz, input_count = floor.frequency_hz, model.inputs
     pass_gain = compute_low_pass_gain(frequency_hz, band_hz)[:, None, None]
     power_gain = (

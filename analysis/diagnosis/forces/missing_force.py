@@ -6,8 +6,7 @@ and the model's transfer H from the m forces to the c channels, both in units of
     f = (H* H + diag(1 / s²))^-1 H* r        s: expected rms of the force
 
 This f is the posterior mean of a white Gaussian force of variance s² (a latent force in the sense of Rogers and Friis,
-Mech. Syst. Signal Process. 2021). Starting values of effects (`evidence_from_residuals`), the screening of laws
-(`matched_filter`), figures (`signature_curves`) and `localisation` are computed from it.
+Mech. Syst. Signal Process. 2021).
 """
 
 from dataclasses import dataclass

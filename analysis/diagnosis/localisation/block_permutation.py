@@ -9,7 +9,7 @@ used,
     P(T >= t) = Q(m²/v, t m/v),      Q the regularised upper incomplete gamma function.
 
 References: Winkler, Ridgway, Douaud, Nichols and Smith, NeuroImage 141 (2016) 502 (gamma tail); Bartlett, J. Royal
-Stat. Soc. 98 (1935) 536 (correlation time). Called by `state_dependence` and `state_regions`.
+Stat. Soc. 98 (1935) 536 (correlation time).
 """
 
 from collections.abc import Callable
@@ -89,7 +89,6 @@ def compute_permutation_p_values(
     )
     mean, variance = permuted.mean(axis=0), np.maximum(permuted.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
     tail_p_values = gammaincc(mean**2 / variance, observed * mean / variance)
-    # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
     counted_p_values = (np.sum(permuted >= observed, axis=0) + 1) / (permutation_count + 1)
     combined_p_values = np.where(
         counted_p_values > _MIN_EXCEEDING_PERMUTATIONS / (permutation_count + 1),

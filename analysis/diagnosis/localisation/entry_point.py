@@ -8,7 +8,7 @@ entries are nearly parallel.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -113,6 +113,8 @@ class EntryScore:
     it, and where there are too few lines for a test."""
     equivalents: tuple[str, ...]
     """Names of the entries whose subspaces nearly coincide with this one in these channels."""
+    is_position_error: bool = False
+    """As that of `Entry`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +169,8 @@ def rank_entries(
         explained_shares = 1 - unexplained_powers[index][is_above_noise] / total_power[is_above_noise]
         entry = entries[index]
         share = float(np.median(explained_shares))
-        ranking.append(EntryScore(entry.name, entry.place, entry.axis, scores[index], share, p_value, equivalents))
+        entry_score = EntryScore(entry.name, entry.place, entry.axis, scores[index], share, p_value, equivalents)
+        ranking.append(replace(entry_score, is_position_error=entry.is_position_error))
     return EntryPoint(tuple(ranking), sensor_comparison, int(is_above_noise.sum()))
 
 

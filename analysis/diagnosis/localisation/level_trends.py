@@ -2,7 +2,7 @@
 
 Relative to the linear response, distortion by friction and dead zones falls with the level; by nonlinear stiffness and
 drag it rises; by saturation it rises from nothing; by position-dependent forces it stays. Timing errors increase the
-variation between periods; external noise does not depend on the level. Called by the report (`diagnosis_distortion`).
+variation between periods; external noise does not depend on the level.
 """
 
 from collections.abc import Sequence
@@ -35,11 +35,11 @@ class LevelTrend:
     """Slope of the relative distortion with the level, dB per doubling; None where it is not known, see
     `_estimate_slope`."""
     from_nothing: bool
-    """Whether it is not significant at the lowest level, but at another: the slope is then a lower bound."""
+    """Whether it is not significant at the lowest level, but at another."""
 
     @property
     def present(self) -> bool:
-        """Whether the distortion is significant at any level: p below `DISTORTION_P`."""
+        """Whether the distortion is significant: `p_value` below `DISTORTION_P`."""
         return self.p_value < DISTORTION_P
 
     @property
@@ -55,7 +55,7 @@ class LevelTrend:
 
 
 def compute_level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
-    """Compute the trends of all outputs, inputs, bands and kinds. cells: distortions at all levels."""
+    """Compute the trend of each output, input, band and kind. cells: distortions at all levels."""
     groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
     for cell in cells:
         # Realisations differ slightly in the band that they drive.

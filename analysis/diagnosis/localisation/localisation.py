@@ -78,8 +78,9 @@ def find_state_dependences(
     computed_evidence: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
     """Find the states on which the first recording's residual depends: those of the sensor's error where a sensor is
-    the best entry, else those of the missing force. cells: mismatch map of `fitted`; no state where none exceeds the
-    noise. computed_evidence: evidence of `fitted`; computed here if empty."""
+    the best entry (none for a position's sensor, whose error is not tested), else those of the missing force. cells:
+    mismatch map of `fitted`; no state where none exceeds the noise. computed_evidence: evidence of `fitted`; computed
+    here if empty."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
     recording, evidence = (
@@ -87,6 +88,8 @@ def find_state_dependences(
         (computed_evidence or gather_evidence(measure, tuning, fitted))[0],
     )
     best_entry = entry.ranking[0] if entry is not None and entry.ranking else None
+    if best_entry is not None and best_entry.is_position_error:
+        return ()
     if best_entry is not None and best_entry.place == "sensor":
         channels = recording.response.channels if best_entry.axis is None else (best_entry.axis,)
         return find_error_states(evidence, recording, cells, channels)

@@ -1,8 +1,5 @@
-"""Sentences for the user about the localisation of a mismatch: where it enters, and the states that it depends on.
-
-Called by the report (`diagnosis_report`) and by `make_real_answer`; the numbers come from `entry_point` and
-`state_regions`.
-"""
+"""Sentences for the user about the localisation of a mismatch: where it enters (`entry_point`), and the states that it
+depends on (`state_regions`)."""
 
 from collections.abc import Sequence
 

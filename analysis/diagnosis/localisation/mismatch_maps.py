@@ -147,8 +147,8 @@ def compute_cells(
     learned: ModelErrorFloor | None = None,
     held_out: bool = False,
 ) -> Cells:
-    """Compute the cells of all records for one fit. held_out: only from the samples to choose by and to test. learned:
-    mismatch of clean recordings."""
+    """Compute the cells of all records for one fit. held_out: only from the samples to choose by (to which
+    `confirm_laws` fits, too) and to test. learned: mismatch of clean recordings."""
     margin = Margin(learned=learned or ModelErrorFloor())
     cells: list[MismatchCell] = []
     for record_index, (record, residuals, floor) in enumerate(

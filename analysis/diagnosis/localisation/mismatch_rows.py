@@ -1,8 +1,6 @@
 """Convert significant mismatch cells and regions of state to rows of the diagnosis document (`Mismatch`).
 
-Cells are those of `mismatch_cells`, regions those of `state_regions`. Regions come before cells; within each kind, rows
-with the largest missing power come first.
-Called by `assemble_findings`.
+Cells are those of `mismatch_cells`, regions those of `state_regions`.
 """
 
 from collections.abc import Sequence

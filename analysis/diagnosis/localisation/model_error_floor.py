@@ -2,8 +2,7 @@
 
 Clean recordings are recordings of the same device without the fault. A mismatch of this size in the recordings to
 diagnose counts as model error, not as evidence for an effect: it is the floor of the significance test in
-`mismatch_cells`. `reference.learn_model_error` computes it; `diagnose` and `search_by_simulation` hand it on, and
-`assemble_findings` describes it.
+`mismatch_cells`. `reference.learn_model_error` computes it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,8 +38,8 @@ class ModelErrorFloor:
         return 1 + 1 / max(self.recordings, 1)
 
     def get_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Get the relative error of a cell. Where no clean recording drives this input, the largest of the same output
-        channel and octave; 0 without any."""
+        """Get the relative error of a cell; where the clean recordings have no such cell, the largest of the same
+        output channel and octave; 0 without any."""
         cell_share = self.shares.get((output, quantity, input, band_hz))
         if cell_share is not None:
             return cell_share

@@ -12,6 +12,7 @@ so that the sum of gains computed with the n-th part of the prior is a lower bou
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -182,10 +183,7 @@ def _compute_gains(
     )
     columns = []
     for index in range(len(rival.deviations)):
-        displaced_deviations = rival.deviations.copy()
-        displaced_deviations[index] += DIFFERENCE_STEP
-        displaced_signals = _simulate(bench, displaced_deviations, rival.hypothesis, rival.hypothesis.point, experiment)
-        columns.append((displaced_signals - rival_signals) / DIFFERENCE_STEP)
+        columns.append(_compute_deviation_column(bench, rival, index, experiment, rival_signals))
     for index, free_parameter in enumerate(rival.hypothesis.parameters):
         point = rival.hypothesis.point.copy()
         point[index] += free_parameter.difference_step
@@ -201,6 +199,21 @@ def _compute_gains(
         for prior_information in (information, information / MOST_RECORDINGS)
     )
     return single_gain, min(shared_gain, single_gain)
+
+
+def _compute_deviation_column(
+    bench: Bench, rival: Fitted, index: int, experiment: Experiment, rival_signals: FloatArray
+) -> FloatArray:
+    """Compute (n c,): change of the rival's prediction by one standard deviation of a parameter of the model, by its
+    index; backwards where the model is not valid with the step forwards, 0 where neither is. rival_signals: the
+    prediction."""
+    for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
+        displaced_deviations = rival.deviations.copy()
+        displaced_deviations[index] += step
+        with suppress(MechanicalModelError, np.linalg.LinAlgError):
+            signals = _simulate(bench, displaced_deviations, rival.hypothesis, rival.hypothesis.point, experiment)
+            return np.asarray((signals - rival_signals) / step)
+    return np.zeros_like(rival_signals)
 
 
 def _retune_rival(

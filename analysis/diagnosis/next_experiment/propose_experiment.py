@@ -1,4 +1,4 @@
-"""Propose the next recordings after a search whose data cannot distinguish effects. Called by `assemble_findings`."""
+"""Propose the next recordings after a search whose data cannot distinguish effects."""
 
 from dataclasses import dataclass
 
@@ -43,7 +43,7 @@ class Proposal:
 
 def propose_experiment(context: SearchContext, explanation: Explanation) -> Proposal | None:
     """Propose recordings for the first named effect that a recording of the menu distinguishes from one of its rivals,
-    else an empty set for the last effect with rivals. None where no effect has a rival that fits as well; effects that
+    else an empty set for the last effect with rivals; None where no effect has a rival that fits as well. Effects that
     depend on a recorded condition, and axes without a command, are skipped."""
     proposal = None
     for fitted_candidates in explanation.rounds[: len(explanation.steps)]:
@@ -74,8 +74,8 @@ def propose_experiment(context: SearchContext, explanation: Explanation) -> Prop
 
 
 def _select_rivals(fitted_candidates: tuple[FittedCandidate, ...]) -> list[FittedCandidate]:
-    """Select the best rivals, at most `MOST_RIVALS` of different names, that the data do not distinguish from the named
-    effect."""
+    """Select the best rivals, at most `MOST_RIVALS` of different names, that the data do not distinguish from the first
+    candidate, the named effect."""
     named_candidate = fitted_candidates[0]
     rivals: dict[str, FittedCandidate] = {}
     for candidate in fitted_candidates[1:]:

@@ -1,7 +1,6 @@
 """Data classes of the noise of a signal's channels: rms, power spectral density, degrees of freedom of the estimates.
 
-Made by `repeat_noise`, `noise_floor` and `force_measure`, read by the significance tests of `localisation` and by
-`search.impacts`. Variances are in the channel's unit squared."""
+Variances are in the channel's unit squared."""
 
 from dataclasses import dataclass
 
@@ -17,7 +16,7 @@ class SegmentNoise:
     amplitude: float
     """Level of the excitation, in the command's unit."""
     variance: FloatArray
-    """(channels,): in the channel's unit squared."""
+    """(channels,)."""
     freedom: FloatArray
     """(channels,): degrees of freedom of the variance."""
     is_pooled: tuple[bool, ...]

@@ -1,8 +1,4 @@
-"""Complete, settled periods of a recording's periodic segments, and their spectra.
-
-Called for the noise estimate from repeated periods (`noise_floor`, `repeat_noise`), for spectra of the residual
-(`localisation`), for clusters of residuals (`standard_errors`), for shorter fits (`search.short_recordings`) and by
-`analysis.look.repeats`."""
+"""Complete, settled periods of a recording's periodic segments, and their spectra."""
 
 from dataclasses import dataclass
 
@@ -42,16 +38,15 @@ class Periods:
         return len(self.starts)
 
     def compute_line_frequencies(self, sample_rate_hz: float) -> FloatArray:
-        """Compute (lines,), Hz: frequencies of the lines of `compute_period_spectra`, without zero and half the
-        rate."""
+        """Compute (lines,), Hz: frequencies of the lines of `compute_period_spectra`; not zero, nor half the rate."""
         lines: FloatArray = np.arange(1.0, (self.length + 1) // 2) * (sample_rate_hz / self.length)
         return lines
 
 
 def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
-    """Find the usable periods of every periodic segment. The first period is left out, unless it is the only
-    complete one, and further ones until the transient has decayed; so are periods with missing samples. Segments
-    without a usable period are left out."""
+    """Find the usable periods of the periodic segments. The first period is left out, unless it is the only complete
+    one, and further ones until the transient has decayed; so are periods with missing samples, periods of fewer than
+    `_SHORTEST_PERIOD` samples, and segments without a usable period."""
     usable_periods = []
     for index, segment in enumerate(recording.segments):
         if segment.period < _SHORTEST_PERIOD:

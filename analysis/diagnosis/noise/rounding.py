@@ -5,9 +5,8 @@ The part of it that repeats is a saw tooth blurred by the noise; with the power 
 
     repeating = sum over k >= 1 of exp(-4 pi² k² v) / (2 pi² k²),        between repeats = v + 1/12 - repeating
 
-(Widrow and Kollar, Quantization Noise, 2008). `undo_rounding` solves this for v, and so finds the total noise; called
-by `repeat_noise`. The checks of recordings (`analysis.look`), `find_segments` and the choice of the error measure use
-`find_rounding_step` alone. Tolerances are chosen by hand.
+(Widrow and Kollar, Quantization Noise, 2008). `undo_rounding` solves this for v, and so finds the total noise.
+Tolerances are chosen by hand.
 """
 
 from dataclasses import dataclass

@@ -43,7 +43,8 @@ SPECIAL_CASE = (
 )
 EQUALLY_GOOD = "equally good in its place on held-out data"
 DELAY_EFFECTS = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
-"""Effects that delay a signal: with a single measured response, a late command and a late reading are equivalent."""
+"""Effects that delay a signal: where each command moves a single measured response, a late command and a late reading
+are equivalent. The class is also stated for coupled axes, where it may be too wide."""
 LINEAR_DYNAMICS = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
 
 

@@ -2,7 +2,7 @@
 
 Errors are rms residuals over the rms of the measured signal (`compute_signal_rms`), root mean square over the channels,
 and are listed with the error that noise alone would leave. For impacts they are errors of the logarithm of band
-amplitudes instead. Called by `assemble_findings` and `examine_fits`.
+amplitudes instead.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,7 @@
 """Sentences of the report on backlash with impacts, whose diagnosis compares band powers instead of samples.
 
 Errors are rms natural logarithms of the ratio of predicted to measured amplitude (`errors.band_power`), so that
-exp(error) is the typical factor between them. Called by `wording`; the remark by `search_by_simulation`.
+exp(error) is the typical factor between them.
 """
 
 import math
@@ -21,8 +21,8 @@ IMPACTS_COMPARED = (
 def format_impact_answer(diagnosis: Diagnosis, effect_words: str) -> str:
     """Format the first sentences of the report: the named effects, and the factors between predicted and measured
     amplitudes without them, with them, and by chance alone, from held-out errors where there are any, else from those
-    of the fit; without all three errors, a statement that they are not known. effect_words: the named effects, in
-    words."""
+    of the fit; a statement that they are not known where one of the three is missing. effect_words: the named effects,
+    in words."""
     errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
     verdict_text = "" if diagnosis.verdict == "explained" else ", but that is not all"
     log_ratios = [errors.retuned, errors.after, errors.noise]

@@ -2,7 +2,7 @@
 
 Doubts are: a parameter at the bound of its fit, static friction below Coulomb friction, a confidence interval that
 contains the value without the effect, and negative damping or stiffness of the improved model (not passive, or
-unstable). Called by `wording` and `diagnosis_report`.
+unstable).
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,7 @@
 """Compute the amplitude densities of the residuals on held-out data, with those of the signal and the noise.
 
-Welch's spectra (`estimate_spectral_density`) of all held-out stretches are averaged in power with the lengths as
-weights, then over sixths of an octave. Called by `diagnosis_pictures`.
+Welch's spectra (`estimate_spectral_density`) of held-out stretches are averaged in power with the lengths as weights,
+then over sixths of an octave.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,6 @@
 """Entries of the diagnosis document that need held-out gains: candidates that were not confirmed, and named effects.
 
-The held-out gain is the share of the error power on held-out samples that an effect explains (`held_out_gain`). Called
-by `diagnose` (candidates) and `assemble_findings` (named effects).
+The held-out gain is the share of the error power on held-out samples that an effect explains (`held_out_gain`).
 """
 
 from collections.abc import Sequence
@@ -27,8 +26,7 @@ def list_unconfirmed_candidates(
 
     black_box: the fitted model without physics, for comparison; None where there is none. `share_of_black_box` of a
     candidate is its gain relative to that of the black box or, where a candidate gains more, to the largest gain of a
-    candidate. `held_out_gain` and `share_of_black_box` are limited to 1; the gains are at least 0. 1e-300
-    avoids a division by 0."""
+    candidate. `held_out_gain` and `share_of_black_box` are limited to 1."""
     if not unconfirmed:
         return ()
     labels, largest_gain = (

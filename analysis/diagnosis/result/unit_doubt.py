@@ -2,8 +2,7 @@
 only, or the command is not a force.
 
 A wrong unit or reversed wiring is more likely than a device with such a response. Thresholds: `UNIT_FACTOR` on the
-ratio of amplitudes, `UNIT_CORRELATION` on the correlation coefficient. Called by `assemble_findings` and
-`fit_first_model`.
+ratio of amplitudes, `UNIT_CORRELATION` on the correlation coefficient.
 """
 
 from collections.abc import Sequence

@@ -3,7 +3,7 @@
 A misfit is the rms logarithm of the ratio of measured and simulated amplitudes, divided by its chance variation: the
 same quantity between two simulations of one hypothesis, whose coordinates differ by 1e-9 (`perturb`). Impacts make
 these simulations diverge, so that no hypothesis can match the recording better than two of its own simulations match
-each other. Called by `impacts`.
+each other.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class BandPowerComparison:
 
     context: SearchContext
     power: BandPower
-    """Band powers of the whole recording."""
+    """Band powers of the recordings."""
     chance_variation: FloatArray
     """(c,): chance variation, the rms difference between two simulations of one hypothesis in the natural logarithm of
     the amplitude; at least `IMPACTS_LEAST_SPREAD`."""

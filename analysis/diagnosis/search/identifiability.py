@@ -260,10 +260,11 @@ def _is_undetermined(parameter: FreeParameter, coordinate: float, error: float) 
 
 
 def _compute_interval_and_distance(parameter: FreeParameter, coordinate: float, error: float) -> tuple[float, float]:
-    """Compute the half width of the parameter's 95 % interval (1.96 standard errors, times `INTERVAL_FACTOR`), and the
-    distance of its value from its null value."""
+    """Compute the half width of the parameter's 95 % interval (1.96 standard errors, times `INTERVAL_FACTOR`; infinite
+    for an infinite error), and the distance of its value from its null value."""
     value, null_value = parameter.to_value(coordinate), parameter.parameter.none or 0.0
-    return 1.96 * INTERVAL_FACTOR * abs(parameter.to_value(coordinate + error) - value), abs(value - null_value)
+    width = abs(parameter.to_value(coordinate + error) - value) if np.isfinite(error) else np.inf  # no limit of values
+    return 1.96 * INTERVAL_FACTOR * width, abs(value - null_value)
 
 
 def compute_null_distance(

@@ -1,8 +1,7 @@
 """Detect explanations without predictive power: their prediction is hardly better than a constant.
 
 An effect that stops the simulated device, or a low-pass filter that passes nothing, leaves the whole signal as
-residual. That can be a smaller error than that of a wrong prediction, although it explains nothing. Called by `search`,
-`next_effect` and `search_with_reference`.
+residual. That can be a smaller error than that of a wrong prediction, although it explains nothing.
 """
 
 import numpy as np

@@ -8,7 +8,6 @@ that minimises |e - S d - c s|² + |d0 + d|² within its bounds reduces this sum
     2 z'g - z'P z        P = [[S'S + I, S'c], [c'S, c'c]],   g = (S'e - d0, c'e)
 
 with d0 the deviations of the base (Draper and Smith, Applied Regression Analysis, 1998, ch. 6: extra sum of squares).
-Called by `next_effect` and `short_recordings`.
 """
 
 from collections.abc import Sequence
@@ -49,7 +48,6 @@ def screen(
     errors = stack_fit_residuals(measure, base.residuals)
 
     def screen_hypothesis(hypothesis: Hypothesis) -> ScreenedHypothesis:
-        """Simulate one hypothesis and predict the cost of its fit."""
         combined_hypothesis = combine_hypotheses(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
             changed_errors = stack_fit_residuals(

@@ -1,8 +1,4 @@
-"""Time limits of a search (`TimeBudget`). A search that reaches its limit returns its result so far.
-
-Used by the searches of `analysis.diagnosis.search` and `discovery`, by `search_by_simulation` and by
-`diagnosis_settings`; `study.evaluation.real.real_recordings` limits a diagnosis by a `CountedBudget`.
-"""
+"""Time limits of a search (`TimeBudget`). A search that reaches its limit returns its result so far."""
 
 from collections.abc import Callable, Iterable
 from functools import wraps

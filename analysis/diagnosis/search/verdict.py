@@ -48,8 +48,8 @@ MILDER_TEST_USED = (
 )
 TEST_ONLY = "The held-out data show a mismatch that the rest of the recording does not contain."
 ONLY_REFINES = (
-    "The best explanation is a law that was excluded from the search. Laws that contain it as a special case explain "
-    "the mismatch equally well, but their additional terms are not significant, so none of them is named."
+    "The best explanation is a law that was excluded from the search. Other laws, such as those that contain it as a "
+    "special case, also reduce the mismatch, but none of them explains it better, so none is named."
 )
 MODEL_MOVED = (
     f"The model's own parameters were allowed to move by up to {WIDER_RETUNING_BOUND:g} standard deviations of their "

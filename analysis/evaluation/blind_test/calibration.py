@@ -2,8 +2,8 @@
 
     error = sum over bins of |sum of stated probabilities - number of right names| / number of names
 
-Its interval is the percentile bootstrap over names (2.5 and 97.5 %). A name is an effect that a diagnosis named. Called
-by `score`; `blind_test_pictures` draws the curve. Reference: Naeini et al., AAAI 2015.
+Its interval is the percentile bootstrap over names (2.5 and 97.5 %). A name is an effect that a diagnosis named.
+Reference: Naeini et al., AAAI 2015.
 """
 
 from collections.abc import Sequence

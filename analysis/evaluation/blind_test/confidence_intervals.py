@@ -5,8 +5,7 @@ of cases that come in dependent groups, and a median or mean, have a percentile 
 
 References: Wilson, Journal of the American Statistical Association 22 (1927), 209; Efron and Tibshirani, An
 Introduction to the Bootstrap (1993), chapter 13; Davison and Hinkley, Bootstrap Methods and their Application (1997),
-section 3.8 (groups resampled as a whole). Used by the modules of `blind_test` that compute figures, by
-`laws.law_score` and by the reports.
+section 3.8 (groups resampled as a whole).
 """
 
 from collections.abc import Callable, Iterable, Sequence

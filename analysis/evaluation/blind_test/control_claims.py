@@ -3,7 +3,7 @@
 A recording that is shuffled or silent must give no named effect (negative control); a recording that is mirrored, or
 whose axes are exchanged, must give the corresponding answer. A claim is a predicate on the answers to a control's
 inputs (`CLAIMS`); an answer is None where the diagnosis refused or failed. `study.evaluation.challenge.controls` makes
-the inputs; `study.evaluation.bank.run_controls` runs the controls and calls `judge_control`.
+the inputs.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -69,7 +69,7 @@ def _has_equal_answers_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
 
 def _has_exchanged_axes(answers: Sequence[Diagnosis | None]) -> bool:
     """Whether two answers have the same verdict and effects, at least one, and each effect is on another axis in the
-    second; False where an effect has no axis or an answer is None. Raises ValueError for another number of answers."""
+    second; False where an effect has no axis or an answer is None."""
     if not _has_equal_answers_but_axes(answers):
         return False
     first_axes, second_axes = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
@@ -80,9 +80,8 @@ def _has_exchanged_axes(answers: Sequence[Diagnosis | None]) -> bool:
 
 
 def _has_opposite_signs(answers: Sequence[Diagnosis | None]) -> bool:
-    """Whether the first two answers have the same verdict, effects and axes, and the first parameter of their first
-    effect has the same magnitude (`MAGNITUDE_TOLERANCE`) and the opposite sign; False if an answer is None or has no
-    effect."""
+    """Whether two answers have the same verdict, effects and axes, and the first parameter of their first effect has
+    the same magnitude (`MAGNITUDE_TOLERANCE`) and the opposite sign; False if an answer is None or has no effect."""
     main_parameters = [
         next(iter(answer.effects[0].parameters.values())).value for answer in answers if answer and answer.effects
     ]

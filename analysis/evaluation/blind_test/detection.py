@@ -1,5 +1,5 @@
 """Detection of single effects in a blind test: outcomes and an ideal observer's threshold by the strength of each
-effect, and the rate of right names by the size of the effects. Called by `analysis.figures.blind_test_pictures`."""
+effect, and the rate of right names by the size of the effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,8 +24,7 @@ class EffectDraws:
     draws: tuple[tuple[float, str], ...]
     """Strength (0 to 1) and outcome: right, in the set, missed or invisible; weakest first."""
     ideal_threshold: float | None
-    """Strength from which an ideal observer detects it; None where the draws do not determine it
-    (`compute_ideal_threshold`)."""
+    """Of `compute_ideal_threshold`; None where the draws do not determine it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +56,7 @@ def collect_effect_draws(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
 
 
 def compute_ideal_threshold(draws: Sequence[Outcome]) -> float | None:
-    """Compute the strength (0 to 1) from which an ideal observer detects an effect
+    """Compute the strength, limited to 0 to 1, from which an ideal observer detects an effect
     (`Outcome.is_seen_by_ideal_observer`) by a line fit to the logarithm of its change of the readings, `Outcome.adds`:
     strength is the logarithm of the effect's parameter, and the change grows about as a power of that parameter. draws:
     of one effect. None with fewer than `LEAST_LINE_DRAWS` draws that change the readings, of one strength only, or

@@ -2,7 +2,7 @@
 
 A diagnosis is ambiguous if it returned several effects although the device has a single one. The comparison shows
 whether the proposed recordings discriminate between effects better than random ones. `study.evaluation.bank.follow_up`
-makes the recordings and the `FollowUp`s; `score` calls `compute_follow_up_figures`.
+makes the recordings and the `FollowUp`s.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """Outcome of one blind-test case after its label is revealed: the concealed effects, the diagnosis and its errors.
 
-A bank is a set of simulated recordings with concealed effects. Outcomes are made by `study.evaluation.bank.prove`,
-scored by `score` and `calibration`, grouped by strength by `detection`, and described by `wording` and
-`analysis.reports`. `laws.law_outcome` extends `AnsweredCase`.
+A bank is a set of simulated recordings, with concealed effects or none. Outcomes are made by
+`study.evaluation.bank.prove`; `laws.law_outcome` extends `AnsweredCase`.
 """
 
 from collections.abc import Mapping
@@ -45,7 +44,7 @@ class AnsweredCase:
     adds: float
     """Simulated change of the readings by the concealed effects: its rms over the noise's rms, in the worst channel."""
     diagnosis: Diagnosis | None
-    """The diagnosis; None where it failed."""
+    """None where it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
     """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float

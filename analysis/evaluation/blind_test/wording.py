@@ -1,5 +1,4 @@
-"""Texts for reports of a blind test: scores with confidence intervals, concealed effects, and answers. Called by
-`analysis.reports.blind_test_report`, `study.evaluation.bank.proof_summary` and `bank.laws.write_law_proof`."""
+"""Texts for reports of a blind test: scores with confidence intervals, concealed effects, and answers."""
 
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.outcome import Outcome

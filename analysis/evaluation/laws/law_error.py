@@ -4,7 +4,7 @@
 
 f: contribution of the laws, (samples,); P: projection onto the orthogonal complement of the signals that the model
 without the law fits: acceleration, velocity, position and a constant for forces; acceleration and a constant for
-readings. Called by `prove_laws` of the blind test of laws, with motions that `seal_laws` simulated.
+readings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -59,7 +59,6 @@ def _compute_axis_error(laws: Sequence[Law], motion: FreshMotion, axis: str) -> 
     )[0]
 
     def compute_projected_norm(force: FloatArray) -> float:
-        """Compute the Euclidean norm of P force, with P as in the module's equation."""
         return float(np.linalg.norm(force - fitted_basis @ (fitted_basis.T @ force)))
 
     # The lower bound prevents a division by zero where the model can fit the true law.

@@ -2,7 +2,7 @@
 
 A bank is a set of simulated recordings, some with a concealed force law; the program must discover the law. Cases count
 for discovery only where the law is detectable (`outcome.DETECTABLE_ERROR`). False alarms are counted on devices without
-a missing effect, and on decoys: devices with an effect of the catalogue or a linear mode. Called by `prove_laws`."""
+a missing effect, and on decoys: devices with an effect of the catalogue or a linear mode."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -3,7 +3,6 @@ Devices.
 
 The figure shows acceleration ellipses under a sinusoidal force along one test direction. Coupling is the ratio of
 off-axis to along-axis amplitude at the driven frequency (`PhasorEllipse.off_axis_ratio`), here of the simulated device.
-Called by `study.evaluation.reproduction.write_reproduction`.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,6 @@
 """Data class of a device's frequency response over its whole range, with its resonances and coupling onset.
 
-Made by `study.evaluation.reproduction.reproduce_paper` from swept-sine recordings, for the comparison with figures 4
-and 1 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices (`response_findings`), and
-drawn by `reproduction_pictures`.
+It is compared with figures 1 and 4 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices.
 """
 
 from dataclasses import dataclass
@@ -21,4 +19,4 @@ class MeasuredDevice:
     resonances: tuple[Resonance, ...]
     """Resonances of the response, with frequencies in Hz (see `Resonance`)."""
     onset: CouplingOnset
-    """Onset of coupling: the frequency (Hz) above which a force along one axis also moves others."""
+    """Onset of coupling: the frequency (Hz) from which a force along one axis also moves others."""

@@ -1,8 +1,6 @@
-"""Draw all figures of one diagnosis, in the order of the report.
+"""Draw the figures of one diagnosis, in independent units of work, so that one that crashes can be left out (`Guard`).
 
-Each figure is drawn as an independent unit of work, so that one whose drawing crashes can be left out (`Guard`).
-`study.workflows.diagnosis.write_diagnosis` calls `list_drawings`; `draw_diagnosis_pictures` is part of the Python
-interface (`analysis`).
+`draw_diagnosis_pictures` is part of the Python interface (`analysis`).
 """
 
 from collections.abc import Callable, Sequence
@@ -37,7 +35,6 @@ def list_drawings(findings: Findings) -> list[WorkPart]:
     held_out_data = findings.time_series, findings.noise_rms, findings.channel_errors
 
     def draw_map(input_number: int) -> Sequence[Picture]:
-        """Make the mismatch map of one driving input."""
         return [make_mismatch_map_picture(findings.maps, input_number, level_unit)]
 
     drawings: list[tuple[str, Callable[[], Sequence[Picture]]]] = [

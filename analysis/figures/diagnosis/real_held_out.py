@@ -1,7 +1,6 @@
 """Figure of a real recording: a held-out excerpt, measured and predicted, and the held-out errors of all models.
 
-Errors are rms errors relative to the signal, on a logarithmic axis; the noise is the lower limit of any model. Called
-by `study.evaluation.real.write_real`; `analysis.reports.real_report` lists the same errors in its table.
+Errors are rms errors relative to the signal, on a logarithmic axis.
 """
 
 import numpy as np
@@ -49,7 +48,7 @@ def list_error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
 
 
 def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
-    """Draw the excerpt on the left and the errors on the right; a note where either is missing."""
+    """Draw the excerpt on the left and the errors on the right; only a note where either is missing."""
     if excerpt is None or not rows:
         return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
     figure = create_figure(8.8, 3.4)

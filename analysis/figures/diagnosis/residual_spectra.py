@@ -1,7 +1,6 @@
 """Figure of the residual spectra on held-out data, compared with the spectra of the signal and the noise.
 
 Where the residual of the completed model equals the noise, nothing is left to explain at that frequency.
-Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Sequence
@@ -76,7 +75,7 @@ def _draw_panel(axes: Axes, spectrum: HeldOutSpectrum) -> None:
 
 
 def _write_alternative_text(spectrum: HeldOutSpectrum) -> str:
-    """Write the largest ratio of the completed model's residual to the noise, and its frequency, in words."""
+    """Write the largest ratio of the completed model's residual to the noise, if it is known, and its frequency."""
     ratio = spectrum.after / spectrum.noise
     if not np.isfinite(ratio).any():
         return f"{spectrum.channel}: the noise is not known."

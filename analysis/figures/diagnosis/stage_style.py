@@ -1,7 +1,6 @@
-"""Line styles and legend labels of the three model predictions, shared by all figures of a diagnosis.
+"""Line styles and legend labels of the three model predictions, shared by the figures of a diagnosis.
 
-A stage is a state of the model: as given, re-tuned (parameters fitted again), or completed with the effects found. Used
-by the modules of `analysis.figures.diagnosis`.
+A stage is a state of the model: as given, re-tuned (parameters fitted again), or completed with the effects found.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
 """Measured coverage of each confidence interval near the force cap, as sentences for reports and as a table.
 
-Coverage is the share of simulated studies whose 95 % interval contains the true value. `measured_coverage` has the
-counts; a report shows the sentence with the interval it belongs to. Called by `two_analyses`; `make coverage`
-(tests/references) writes the table into docs/statistics.md.
+Coverage is the share of 95 % intervals, in simulated studies, that contain the true value. `measured_coverage` has the
+counts; `make coverage` (tests/references) writes the table into docs/statistics.md.
 """
 
 from collections.abc import Sequence

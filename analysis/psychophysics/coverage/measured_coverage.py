@@ -1,9 +1,8 @@
 """Measured coverage near the force cap: how many intervals of a report contain the true value.
 
-Reports print these counts beside each interval (`coverage_words`). Each row: analysis
-(`coverage_words.INTERVAL_TITLES`), frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None
-where the analysis gives no size in dB), 95 % intervals that contain the true value (one-way: studies with a significant
-difference although there is none), and all intervals.
+Each row: analysis (`coverage_words.INTERVAL_TITLES`), frequency (Hz; 0 where all frequencies are judged together), mean
+error (dB; None where the analysis gives no size in dB), 95 % intervals that contain the true value (one-way: studies
+with a significant difference although there is none), and all intervals (studies).
 
 Counted in simulated studies of ten people ("single": of one) with known thresholds under the published staircase and
 cap (one-way: thresholds of equal median). Tobit gives no interval where all runs of a frequency are censored. Written

@@ -1,8 +1,7 @@
 """Counts of a study's answers by person, frequency, level and direction: the data of the hierarchical likelihood.
 
 Trials that agree in all four form a cell; with its numbers of right and wrong answers, a cell enters the binomial
-likelihood of the psychometric function once instead of trial by trial. `study_analysis` and `power.simulated_study`
-count the answers; the fits of `hierarchy` and the figures use them.
+likelihood of the psychometric function once instead of trial by trial.
 """
 
 import math
@@ -48,7 +47,6 @@ class Answers:
 
     @property
     def persons(self) -> int:
-        """Number of persons."""
         return len(self.subjects)
 
     @property
@@ -76,8 +74,7 @@ class Answers:
 
 
 def count_answers(trials: Iterable[Trial], frequencies_hz: Iterable[float]) -> Answers | None:
-    """Count all valid answers (`Trial.is_valid`) of the test phase at these frequencies; no participant with such an
-    answer is dropped. None without any such answer.
+    """Count all valid answers (`Trial.is_valid`) of the test phase at these frequencies. None without any such answer.
 
     Answers of an unfinished run count too: where a run stops depends on the answers before, not on the threshold
     itself, so that the stopping rule does not enter the likelihood.

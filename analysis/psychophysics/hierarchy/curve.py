@@ -11,8 +11,7 @@ t = t0 + slope ln(10)/20 (level - threshold), where t0 makes the share of right 
 that to which the staircase converges: 79.37 %.
 
 Source: F. A. Wichmann, N. J. Hill, Percept. Psychophys. 63 (2001), 1293-1313; N. A. Macmillan, C. D. Creelman,
-Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2. Called by the likelihoods of `hierarchy`, by
-`analysis.figures.psychometric` and by the simulations of `power`.
+Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
 """
 
 import math
@@ -72,8 +71,7 @@ def differentiate_evidence(t: FloatArray, family: Family) -> tuple[FloatArray, F
 
 
 def compute_mean_evidence(t: FloatArray, family: Family) -> FloatArray:
-    """Compute q(t) without its derivatives, in the shape of t, in a quarter of the time of `differentiate_evidence`. t
-    above `LARGEST_T` is replaced by it."""
+    """Compute q(t) in the shape of t, faster than `differentiate_evidence`. t above `LARGEST_T` is replaced by it."""
     t = np.minimum(t, LARGEST_T)
     match family:
         case Family.WEIBULL:

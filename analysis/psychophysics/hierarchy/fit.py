@@ -3,8 +3,7 @@
 Each of n persons has a threshold (dB) at each of k frequencies, a log-slope and a response criterion. These latent
 parameters are drawn from normal distributions, whose means and standard deviations are estimated (`marginal`, with the
 sources). The latent parameters are integrated out, first by Laplace's method (`objective`), then by adaptive quadrature
-(`quadrature_search`). Called by `primary` and by simulations of power; `inference` computes intervals from the scores
-and the curvature of the fit.
+(`quadrature_search`).
 """
 
 from dataclasses import dataclass

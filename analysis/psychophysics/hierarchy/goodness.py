@@ -1,7 +1,7 @@
 """Goodness of fit of the hierarchical psychometric model: predicted against observed shares of right answers.
 
 Trials are binned by their predicted share (calibration plot); per bin, z = (observed - predicted) / standard error,
-with the binomial variance sum of n p (1 - p). Equations of p: `curve`. Called by `primary`.
+with the binomial variance sum of n p (1 - p). Equations of p: `curve`.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
 BIN_COUNT = 8
-"""Number of bins with equal numbers of trials: about 400 trials each in a study of ten participants. Chosen."""
+"""Largest number of bins, with about equal numbers of trials. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +38,16 @@ class ShareBin:
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
     """Observed and predicted shares in bins. There is no p-value: the staircase sets each level by the answers before,
-    and each person's parameters were fitted to the same answers, so that the observed shares of the lowest bins are
-    some standard errors too low even for a correct model. Only a systematic pattern over the bins indicates misfit."""
+    and each person's parameters were fitted to the same answers, so that the observed shares of the lowest bins tend to
+    be too low even for a correct model."""
 
     bins: tuple[ShareBin, ...]
     """In ascending order of the predicted share."""
 
 
 def compute_goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
-    """Compute the shares in at most `BIN_COUNT` bins of about equally many trials, in ascending order of the predicted
-    share. All trials of a cell (one run, level and direction) are in the same bin."""
+    """Compute the shares in at most `BIN_COUNT` bins. All trials of a cell (one run, level and direction) are in the
+    same bin."""
     predicted_shares, answers = predict_shares(fit), fit.answers
     trial_counts = answers.right + answers.wrong
     cell_order = np.argsort(predicted_shares, kind="stable")

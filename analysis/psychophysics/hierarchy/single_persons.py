@@ -6,7 +6,6 @@ the mean level played with an SD of 30 dB, the logarithm of the slope around its
 of 1.5), the criterion (response bias) around 0 with an SD of 0.3 d'. Only the lapse rate is fitted, under its prior of
 `objective.Prior`; then thresholds, slopes and criteria are the maximum a posteriori. Each run also has the likelihood
 interval of `run_likelihood`, in which slope, criterion and lapse rate are averaged over the same priors.
-Called by `study_analysis`.
 """
 
 import math
@@ -71,7 +70,6 @@ def fit_single_persons(
     parameters[layout.log_sds] = [0.0, math.log(THRESHOLD_SD_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
     def evaluate_cost(logit_lapse: float) -> float:
-        """Evaluate the cost at a lapse rate, given by its logit."""
         parameters[layout.lapse] = logit_lapse
         return objective(parameters)[0]
 

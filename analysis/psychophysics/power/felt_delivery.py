@@ -2,7 +2,7 @@
 
 Model of `study.participants.delivered_feeler`: the felt amplitude is sqrt(along^2 - across^2), harmonics add to the
 threshold in squares, and the threshold rises during a run (adaptation). The level matters, because friction absorbs
-weak forces. Called by `study.cli.power`; `simulated_study` uses the tables.
+weak forces.
 """
 
 from collections.abc import Iterable, Sequence
@@ -25,7 +25,7 @@ class FeltDelivery:
     """Tables of the delivered stimulus by frequency and direction, with masking and adaptation of simulated people."""
 
     tables: tuple[tuple[DeliveryTable, DeliveryTable], ...]
-    """Per frequency of the crowd: of direction 1 and 2, the sides +1 and -1 of `DeliveredTrials`."""
+    """Per frequency of the crowd: of the sides +1 and -1 of `DeliveredTrials`."""
     masking: float = 1.0
     """Factor by which harmonics add to the threshold, in squares (masking)."""
     adaptation_db: float = 1.0

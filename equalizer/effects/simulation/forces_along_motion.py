@@ -1,8 +1,7 @@
 """Forces along a measured motion: the actuators' force, and the motion-dependent forces of effects.
 
-Nothing is simulated: the laws are evaluated at the measured positions, velocities and accelerations, for a balance of
-forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m). Called by `force_measure`,
-`predicted_force`, `balance_with_model` and `windows` of `analysis.diagnosis`; `friction_laws` reads `REST_SPEED_SHARE`.
+The motion is not simulated: the laws are evaluated at the measured positions, velocities and accelerations. Sizes: n
+samples, m driven axes. Forces are in N (a rotation: N m). Called by `analysis.diagnosis`.
 """
 
 from collections.abc import Sequence
@@ -77,9 +76,9 @@ def _limit_light_axis_response(
     motion_per_newton (3, m) is changed in place.
 
     The mass of an axis is negligible where the rms command would change its velocity within a step by more than the rms
-    velocity: the mass is at a fit's lower bound, or the recording has no time axis. Friction would then be at rest at
-    all times and would balance the whole missing force. With motion_per_newton reduced, friction is at rest only where
-    the measured velocity is below about `REST_SPEED_SHARE` of its rms.
+    velocity, as with a mass at a fit's lower bound, or without a time axis. Friction would then hardly ever slide, and
+    would balance most of the missing force. With motion_per_newton reduced, it is at rest only where the measured
+    velocity is below about `REST_SPEED_SHARE` of its rms.
     """
     rms_command, rms_speed = (np.sqrt(np.mean(signal**2, axis=0)) for signal in (commands, velocity))
     is_light = (motion_per_newton[2] * step_s * rms_command > rms_speed) & (rms_speed > 0)

@@ -13,13 +13,13 @@ X_FREE, V_FREE = 2, 3
 X_PER_N, V_PER_N = 4, 5
 """Change of position and velocity at the step's end per 1 N held over the step."""
 A_FREE, A_PER_N = 6, 7
-"""Acceleration at the start without this force, and its change per 1 N; NaN unless the effect declares that its law
-reads accelerations."""
+"""Acceleration at the start without this force, and its change per 1 N. The former may be NaN unless the effect
+declares that its law reads accelerations."""
 STEP_S, TIME_S = 8, 9
 """Length of the step, and time of its start since the first sample, in s."""
 F_END = 10
-"""Written by the law: its force at the step's end, which determines the acceleration there. Where it stays NaN, the
-mean over the step is used."""
+"""Written by the law: its force at the step's end, for the acceleration there. Where it stays NaN, a simulation uses
+the mean over the step."""
 LENGTH = 11
 """Length of `step_motion` without the blocks below."""
 AXIS_X, AXIS_V, AXIS_X_END, AXIS_V_END, AXIS_X_PER_N, AXIS_V_PER_N, AXIS_A, AXIS_A_PER_N, AXIS_COMMAND = range(9)

@@ -1,7 +1,7 @@
 """Resampling of a response at shifted or scaled times, by windowed-sinc or linear interpolation.
 
 The sinc has a Kaiser window and is tabulated at fractions of a sample; `logger_kernel.interpolate_samples` interpolates
-the table linearly. Called by the effects `clock_drift` and `logger_offset`, and for their starting values.
+the table linearly. Used by the effects `clock_drift` and `logger_offset`, and to estimate time shifts.
 """
 
 from functools import cache

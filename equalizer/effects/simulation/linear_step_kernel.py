@@ -10,7 +10,7 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 
 FAST_MATH_FLAGS = {"reassoc", "contract"}
-"""LLVM flags: sums may be reordered and products fused, for vectorised loops; NaN and infinity are still exact."""
+"""LLVM flags: sums may be reordered and products fused, for vectorised loops; NaN and infinity are kept."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 """numba types of contiguous arrays that a kernel may write to."""

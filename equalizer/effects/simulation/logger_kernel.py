@@ -1,9 +1,8 @@
 """Compiled sampling faults of a data logger: a wrong clock, and lost samples that repeat the preceding one.
 
-Wrong clock: sample k is the response at the time k step_samples + offset_samples (in samples), interpolated by a
-tabulated windowed sinc (see `interpolated_response`) or linearly. Lost samples: given by a mask, or decided by a
-likelihood-ratio test against a measurement. With white noise of standard deviation s per channel, sample k is lost
-where
+Wrong clock: the response at shifted or scaled times, interpolated by a tabulated windowed sinc
+(`interpolated_response`), linearly, or by a mixture. Lost samples: given by a mask, or decided by a likelihood-ratio
+test against a measurement. With white noise of standard deviation s per channel, sample k is lost where
 
     sum over channels of ((y - x_k)² - (y - x_before)²) / s²  >  2 ln(odds against a loss),
 

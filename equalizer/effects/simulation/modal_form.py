@@ -2,8 +2,7 @@
 
 With x = W z, the step x[k+1] = A x[k] becomes z[k+1] = W^-1 A W z[k]. Each pair of columns of W spans the invariant
 plane of two eigenvalues of A (a complex pair, or two real ones), so that a step costs O(s) instead of O(s²). A is
-balanced first. Where W is ill-conditioned or leaves coupling, the full matrix is kept. Called by `stepping`; the steps
-themselves are computed by `linear_step_kernel`.
+balanced first. `stepping` calls `build_step_form`; `linear_step_kernel` computes the steps.
 """
 
 from collections.abc import Iterator

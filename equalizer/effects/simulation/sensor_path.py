@@ -1,8 +1,7 @@
 """Model of a sensor: first-order low pass (bandwidth), then clipping at the measuring range.
 
-`simulator` applies both to the true response; the effects `sensor_lag` and `loose_joint` and the diagnosis apply or
-invert the low pass alone, `command_path` applies `filter_one_pole` to commands. The low pass is discrete at the sample
-rate f_s and starts from zero, with the bandwidth f:
+`simulator` applies both to the true response; effects and the diagnosis also apply or invert the low pass alone. It is
+discrete at the sample rate f_s and starts from zero, with the bandwidth f:
 
     y[k] = d y[k-1] + (1 - d) x[k],    d = exp(-2 pi f / f_s)
 """

@@ -1,4 +1,4 @@
-"""Starting values of effects at the response: parameter values and time shifts of the predicted to the measured one.
+"""Starting values of effects at the response: a parameter, or the time shift from predicted to measured response.
 
 A single parameter is found by grid search, a time shift by cross-correlation, refined by Gauss-Newton steps. Called by
 the effects at the response, by the delays and lags of the actuator, and by `analysis.diagnosis.contrast.likely_delays`.
@@ -50,8 +50,8 @@ def find_response_parameter(
 
 def estimate_axis_lag(evidence: Evidence, axis: int, largest_lag_s: float) -> float:
     """Estimate the time (s) by which the measured response to a driven axis lags the predicted one: in the axis's own
-    channel where there are as many channels as axes, else over all channels. At most `largest_lag_s`, or half of the
-    recording, either way."""
+    channel where there are as many channels as axes, else over all channels. Sought up to `largest_lag_s`, or half of
+    the recording, either way."""
     sample_rate_hz, has_own_channel = evidence.sample_rate_hz, evidence.response.shape[1] == evidence.command.shape[1]
     channels = list(list_site_channels(evidence, axis if has_own_channel else ALL_SITES))
     weight = evidence.used[:, None] / evidence.noise[channels]
@@ -86,8 +86,8 @@ def fit_coefficients(residual: FloatArray, basis: FloatArray, used: FloatArray) 
 
 def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag_samples: int) -> float:
     """Estimate the number of samples by which the measured response (n, p) lags the predicted one, from the peak of the
-    normalised cross-correlation, summed over channels. At most `largest_lag_samples` either way; not refined at that
-    limit."""
+    normalised cross-correlation, summed over channels, up to `largest_lag_samples` either way; refined unless the peak
+    is at that limit."""
     largest_lag_samples = min(largest_lag_samples, len(measured) - 1)
     padded_length = next_fast_len(len(measured) + largest_lag_samples, True)
     correlation_sum: FloatArray = np.zeros(2 * largest_lag_samples + 1)

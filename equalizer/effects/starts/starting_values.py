@@ -31,7 +31,7 @@ class AxisMotion:
     """The missing force."""
 
     def select(self, is_selected: npt.NDArray[np.bool_]) -> "AxisMotion":
-        """Select the samples where `is_selected` (n,) is true; their times need not be evenly spaced."""
+        """Select the samples where `is_selected` (n,) is true."""
         return AxisMotion(*(getattr(self, name)[is_selected] for name in self.__dataclass_fields__))
 
 

@@ -14,8 +14,8 @@ def compute_worst_coupling(response: ComplexArray) -> FloatArray:
 
         max over i of sqrt(sum over j != i of |H_ji|²) / |H_ii|
 
-    response: complex H (..., outputs, inputs), both in the same frame. Returns (...). An axis without on-axis response
-    gives a very large number. Raises ValueError if H is not square.
+    response: complex H (..., outputs, inputs), both in the same frame. Returns (...). An axis whose
+    response is off-axis only gives a very large number. Raises ValueError if H is not square.
     """
     require_square_response(response)
     power = np.abs(response) ** 2

@@ -1,5 +1,5 @@
 """Measured frequency response, per frequency line, with noise variance and coherence. `transfer_estimate` estimates it;
-state-space and mechanical models are fitted to it."""
+state-space models are fitted to it."""
 
 from dataclasses import dataclass
 

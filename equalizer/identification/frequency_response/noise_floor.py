@@ -2,8 +2,7 @@
 spectrum of the response at rest, or, where neither exists, the scatter between neighbouring lines.
 
 Spectra are rfft / length; a noise density s is the power per line times that length, so that it does not depend on it.
-Called by `transfer_estimate`, `shared_lines`, the fit of mechanical models (`mechanical_lines`, `mechanical_misfit`)
-and the diagnosis (`quiet_noise`, `repeat_noise`, `segment_spectra`).
+Called by the estimation of frequency responses, the fit of mechanical models and the diagnosis.
 """
 
 from collections.abc import Sequence
@@ -100,8 +99,8 @@ def interpolate_rest_density(mean_power: FloatArray, lines_hz: FloatArray, frequ
 
 def find_rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Find the intervals of samples (start, stop exclusive) without excitation, after settling_s seconds. The interval
-    at the start of a recording counts from sample 0, because recordings begin at rest. Where a pause is no longer than
-    settling_s, start >= stop."""
+    at the start of a recording counts from sample 0, because recordings begin at rest. Where a later pause is no longer
+    than settling_s, start >= stop."""
     idle_runs = find_runs((select_instrument_signal(recording) == 0).all(axis=1))
     settling_samples = round(settling_s * recording.sample_rate_hz)
     return [(start + (settling_samples if start else 0), stop) for start, stop in idle_runs]

@@ -15,7 +15,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
 
 _MIN_INDEPENDENCE = 0.1
 """Singular value to be exceeded by the smallest one of the matrix whose columns are the excited directions, each of
-unit length: 1 where they are orthogonal, 0 where one lies in the span of the others. Chosen."""
+unit length: 1 for as many orthogonal ones as inputs, 0 where they do not span all inputs. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,4 @@
-"""Data classes of the fit of a mechanical model (`mechanical_fit`): settings, errors, compared structures, result.
-
-Made and read by `mechanical_fit`, `mechanical_order`, `modal_order`, `rigid_body` and `analysis.diagnosis.first_model`.
-"""
+"""Data classes of the fit of a mechanical model (`mechanical_fit`): settings, errors, compared structures, result."""
 
 from dataclasses import dataclass, field
 
@@ -19,7 +16,7 @@ class MechanicalFitSettings:
     number of modes, or a floor outside 0 to 1."""
 
     band_hz: tuple[float, float] | None = None
-    """Band of the fit in Hz; None: the band that the commands excite, from the lowest line on."""
+    """Band of the fit in Hz; None: the band that the commands excite."""
     most_modes: int = 8
     """Largest number of modes in addition to the driven axes."""
     sensor: SensorLimits = field(default_factory=SensorLimits)
@@ -75,7 +72,7 @@ class ChannelError:
     """Error of a free simulation of the held-out samples from the best-fitting initial state; None without such
     samples."""
     noise: float | None
-    """Noise: rms of the differences between periods; None where nothing repeats."""
+    """Noise as estimated for each segment; None where it is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

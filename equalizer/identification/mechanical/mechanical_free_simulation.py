@@ -2,7 +2,7 @@
 
 The error is computed from spectra: measured response minus the response to the commands minus that to the initial
 state, which is fitted by least squares. By Parseval's theorem its power is that of a free simulation's error over the
-segment, without the mean. Called by `mechanical_fit` and by `first_model.choose_structure`.
+segment, without the mean. Called by `mechanical_fit` and `analysis.diagnosis.first_model.choose_structure`.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _MAX_FITTED_LINES = 3000
-"""Approximate number of lines to which the initial state is fitted; more are thinned out to limit computing time.
-Chosen."""
+"""Number of lines, up to a factor of two, to which the initial state is fitted; more are thinned out to limit computing
+time. Chosen."""
 
 
 def compute_simulation_errors(

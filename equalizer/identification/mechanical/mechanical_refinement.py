@@ -67,7 +67,7 @@ def refine_unknowns(
     start_residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(start)))
 
     def compute_residuals(unknowns: FloatArray) -> FloatArray:
-        """Compute the real residuals on the fitted lines; 1e6 each where the unknowns are not a valid model."""
+        """Compute the real residuals on the fitted lines; 1e6 each for an invalid model or non-finite residuals."""
         try:
             residuals = stack_real(compute_misfits(fitted_groups, structure.build_model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):

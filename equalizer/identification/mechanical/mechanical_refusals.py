@@ -1,8 +1,8 @@
 """Checks that refuse a mechanical fit; each message states the cause and, where there is one, the remedy.
 
-Before the fit: no recording, recordings that disagree in rate, hold, channels or units, mixed quantities, fewer
-responses than commands, too few samples, constant channels. After it: a model that explains no channel, or is unstable.
-Called by `mechanical_fit`.
+Before the fit: no recording, recordings that disagree in rate, hold, channels or units, responses fewer than commands
+or of unsuitable quantities, too few samples, constant or empty channels. After it: a model that explains no channel, or
+is unstable. Called by `mechanical_fit`.
 """
 
 from collections.abc import Sequence

@@ -107,7 +107,7 @@ def transform_to_driven_axes(model: MechanicalModel) -> MechanicalModel:
     B = model.input
     m, n = B.shape[1], model.coordinates
     left_vectors, singular_values, right_vectors = np.linalg.svd(B)
-    if singular_values[-1] < _RANK_TOLERANCE * singular_values[0]:
+    if n < m or singular_values[-1] < _RANK_TOLERANCE * singular_values[0]:
         raise np.linalg.LinAlgError("no mode moves one of the driven axes")
     axis_shapes = left_vectors[:, :m] / singular_values @ right_vectors
     internal_modes = left_vectors[:, m:]

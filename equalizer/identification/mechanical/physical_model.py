@@ -27,9 +27,9 @@ AnyFit = RefinedFit[Structure] | RefinedFit[ModalStructure]
 
 
 def make_physical_model(fit: AnyFit, name: str) -> MechanicalModel:
-    """Make the mechanical model of a fit with its tolerance, in absolute coordinates, in which oscillators have no
-    inertial coupling with the driven axes; a fit with modes is converted by `transform_to_driven_axes`. Raises
-    numpy.linalg.LinAlgError where such modes do not move every driven axis independently."""
+    """Make the mechanical model of a fit with its tolerance, in absolute coordinates; a fit with modes is converted by
+    `transform_to_driven_axes`. Raises numpy.linalg.LinAlgError where such modes do not move every driven axis
+    independently."""
     model = fit.structure.build_model(fit.unknowns, name)
     if isinstance(fit.structure, ModalStructure):
         model = transform_to_driven_axes(model)

@@ -1,9 +1,8 @@
 """Subtraction of the free decay of slow poles from periodic recordings, which are then in the steady state.
 
 A period of N samples that begins in the state x_0 and ends in x_N contains, in addition to the periodic response, the
-free decay C A^t (I - A^N)^-1 (x_0 - x_N), t = 0 ... N - 1. In periods shorter than about ten time constants it does not
-vanish, and would bias the estimate of the frequency response. The states are simulated from rest. Called by
-`identify_recordings`.
+free decay C A^t (I - A^N)^-1 (x_0 - x_N), t = 0 ... N - 1. Before about ten time constants have passed, it would bias
+the estimate of the frequency response. The states are simulated from rest. Called by `identify_recordings`.
 """
 
 from collections.abc import Sequence

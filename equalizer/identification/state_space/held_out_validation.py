@@ -40,8 +40,8 @@ def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) ->
     """Compute the simulation error over all segments with the role "test"; None where there are none. The model's input
     is the recorded total command.
 
-    Raises ValueError where the number of channels or the rate are not the model's, samples are missing in a segment, or
-    it is too short for the band.
+    Raises ValueError where the number of channels or the rate are not the model's, samples are missing in a segment, it
+    is too short for the band, or the response is zero within the band.
     """
     comparisons = [
         _compare_segment(model, recording, segment) for recording, segment in _iterate_test_segments(recordings)
@@ -49,6 +49,11 @@ def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) ->
     if not comparisons:
         return None
     response_power = sum(comparison.response_power for comparison in comparisons)
+    if response_power == 0:
+        raise ValueError(
+            f"the test segments hold no response between {model.band_hz[0]:g} and {model.band_hz[1]:g} Hz, so no "
+            "relative error exists; test with a recording in which the device moves"
+        )
     noise_powers = [comparison.noise_power for comparison in comparisons]
     known_noise_powers = [noise_power for noise_power in noise_powers if noise_power is not None]
     return HeldOutValidation(

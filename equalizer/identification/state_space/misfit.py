@@ -1,8 +1,7 @@
 """Misfit of an identified model on the lines of a measured frequency response, reported with the model.
 
 It is the power of the residuals in excess of the noise power of the lines, with an upper bound of the misfit that the
-noise may hide, and the correlation of the residuals from line to line. Called by `identify`, `identify_recordings` and
-`study.workflows.equalizer.identify_model`.
+noise may hide, and the correlation of the residuals from line to line. Called by `identify` and `identify_recordings`.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
 """Modal form of a discrete state-space model: A is block-diagonal, with blocks [[a, 1], [b, a]] and poles a ± sqrt(b).
 
 A complex pair (b < 0) becomes two real poles (b > 0) continuously, so that a gradient-based fit can pass from a pair to
-two real poles. The order is even, because a block has two poles. Used by the starting models (`canonical_variate`,
-`warped_subspace`), `candidates` and `refinement`.
+two real poles. The order is even, because a block has two poles. Used by the starting models and their `refinement`.
 """
 
 from dataclasses import dataclass

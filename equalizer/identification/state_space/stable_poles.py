@@ -2,8 +2,7 @@
 
 The free response of a pole p decays as |p|^k; a time constant T corresponds to |p| = exp(-1 / (T sample rate)). The
 bound is needed because a superfluous pole at 0.99999 does not change a fit over 5 to 35 Hz, but makes simulations
-drift. Called by `canonical_variate`, `warped_subspace`, `candidates`, `relaxed_poles`, `refinement` and
-`identify_recordings`.
+drift. Used by the fit of state-space models.
 """
 
 import numpy as np

@@ -6,7 +6,7 @@ quarter turn of the unit circle; and block rows are whitened before their singul
 and powers zeta^q, q < horizon, the rows zeta^q G are projected onto the complement of the input's rows; the left
 singular vectors of the result span the extended observability matrix, whose shift structure gives the poles. The
 horizon is short, because with a long horizon the noise covers the singular values that show the order. Called by
-`candidates` and `order_report`; `refusals` reads the horizon.
+`candidates` and `order_report`.
 """
 
 from dataclasses import dataclass

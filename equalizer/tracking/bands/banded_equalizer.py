@@ -234,7 +234,7 @@ class BandedEqualizer:
         band."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m
         if k == b == 0:
-            return np.zeros_like(middle_response)
+            return np.zeros((len(middle_response), self.middle.B.shape[1]))
         planned_motions = [self._plan_motion(middle_response, CORNER_HZ)] + ([] if motion is None else [motion])
         force: FloatArray = -sum(
             (k * motion_part.position_m + b * motion_part.velocity_m_s for motion_part in planned_motions), np.zeros(())

@@ -43,10 +43,10 @@ def plan_motion(reference: FloatArray, sample_rate_hz: float, corner_hz: float =
     at both ends. Raises ValueError for a corner that is not between zero and half the sample rate.
 
     x = a / (s² - w²), a convolution with a two-sided exponential kernel. The filter from the reference to the planned
-    acceleration is real, f² / (f² + corner²), so that there is no phase error.
+    acceleration, f² / (f² + corner²), is real.
     """
     a, corner_rad_s = np.asarray(reference, dtype=np.float64), _convert_corner_to_rad_per_s(corner_hz, sample_rate_hz)
-    # Zeros over eight time constants, after which exp(-8) of the kernel remains: it does not wrap around the ends.
+    # Zeros over eight time constants, after which exp(-8) of the kernel remains: hardly any of it wraps around.
     padding_rows = int(np.ceil(8 * sample_rate_hz / corner_rad_s))
     padded_acceleration = np.pad(a, ((padding_rows, padding_rows), (0, 0)))
     s = 2j * np.pi * np.fft.rfftfreq(len(padded_acceleration), 1 / sample_rate_hz)[:, None]
@@ -71,7 +71,7 @@ def plan_motion_causally(reference: FloatArray, sample_rate_hz: float, corner_hz
     once_filtered = lfilter(*low_pass, a, axis=0)
     position = lfilter(*low_pass, once_filtered, axis=0)
     # s / (s + w) = 1 - w / (s + w), applied once for the velocity and twice for the acceleration: all three signals are
-    # derivatives of each other to rounding.
+    # derivatives of each other by the bilinear transform, to rounding.
     velocity = once_filtered - corner_rad_s * position
     return SlowMotion(position, velocity, a - 2 * corner_rad_s * once_filtered + corner_rad_s**2 * position)
 

@@ -14,7 +14,7 @@ import numpy as np
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 MAX_CONDITION = 1e6
-"""Largest condition number of a response that is inverted. Chosen: a larger one means that an axis was not driven."""
+"""Largest condition number of a response that is inverted. Chosen: a larger one suggests an axis that is not driven."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,7 @@
 """Role of each effect in a feedforward: compensated by a force, used for scaling or timing, or not compensated.
 
 The texts are shown to the user as the reason why an effect is not compensated. Called by `effect_compensation` and
-`subtract_effects`, and by `study.workflows.equalizer.recordings_without_effects`.
+`subtract_effects`.
 """
 
 import numpy as np
@@ -33,8 +33,8 @@ REASONS_NOT_COMPENSATED = {
     "force_nonlinearity": "the identified model contains the gain at the level of its identification",
     "slew_limit": "the device cannot change its force faster",
 }
-"""Reasons by name of the effect, for effects of mechanism and actuator that are not compensated. The reason for effects
-of the sensor other than its lag is `SENSOR_ERROR`."""
+"""Reasons by name of the effect, for effects of mechanism, hand and actuator that are not compensated. The reason for
+effects of the sensor other than its lag is `SENSOR_ERROR`."""
 
 SCALING_REASON = "in the identified model as far as it is linear; used to scale what is added"
 TIMING_REASON = "in the identified model; used to send what is added ahead of time"
@@ -64,7 +64,7 @@ def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx"
 
 def compute_lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
     """Compute the delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the
-    time constant 1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f (0: no
+    time constant 1 / (2 pi f) of each first-order low pass of actuator and sensor, valid well below its corner f (0: no
     low pass); an effect `sensor_lag` replaces the sensor's corner. The identified model includes this delay; forces
     that are added to the model's forces must be advanced by it."""
     corners_hz = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]

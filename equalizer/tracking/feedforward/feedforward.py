@@ -25,6 +25,7 @@ from equalizer.tracking.lqr.tracking_problem import (
     TrackingProblem,
     TrackingWeights,
     make_tracking_problem,
+    require_trajectory,
 )
 
 BAND_MARGIN_HZ = 1.0
@@ -102,7 +103,7 @@ def compute_feedforward_forces(
     settings = settings or FeedforwardSettings()
     check_reference(model, reference)
     tracking_problem = make_tracking_problem(model, TrackingWeights(settings.weight))
-    in_band_reference = extract_band(model, reference.samples)
+    in_band_reference = extract_band(model, require_trajectory(tracking_problem, reference.samples))
     if not np.linalg.norm(in_band_reference) > LEAKAGE_SHARE * np.linalg.norm(reference.samples):
         low_hz, high_hz = model.band_hz
         raise TrackingError(

@@ -2,8 +2,7 @@
 
 In the steady state every spectral line is independent: with the response G from forces to outputs and the weight w, the
 forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the reference output y. Called by
-`model_equalizer`, `baselines`, `workspace.models_at_place` and `study.evaluation.reproduction`; `feedforward` and
-`bands.narrow_and_wide_models` use the check of a reference.
+`model_equalizer` and `workspace.models_at_place`, among others.
 """
 
 import numpy as np

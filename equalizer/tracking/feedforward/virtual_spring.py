@@ -3,7 +3,7 @@
 The input of an identified model is the total force f on the plant. Where the control loop adds the force f_s of the
 spring to the command u, the command is u = f - f_s with f_s = -(k x + b v), where x and v are the planned displacement
 and velocity of the handle, k is the stiffness and b the damping. Used by the equalizers that subtract the spring's
-force from the commands (`model_equalizer`, `bands`, `workspace`, `learning`) and by `study.workflows`.
+force from the commands.
 """
 
 import math

@@ -24,8 +24,7 @@ class Convergence:
     frequency_hz: FloatArray
     """(lines,): frequencies within the band."""
     remaining_share: FloatArray
-    """(lines,): largest singular value of I - beta G L, the largest of all draws where several responses were
-    given."""
+    """(lines,): largest singular value of I - beta G L, the largest of all draws where several responses were given."""
     beta: float
     """Gain of the correction."""
     safe_beta: float

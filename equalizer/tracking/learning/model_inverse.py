@@ -1,8 +1,8 @@
 """The inverse of a model as a linear operator on records of a fixed length, for iterative learning control.
 
 The operator maps reference accelerations (N, p), m/s², to forces (N, m), N, by finite-horizon LQR tracking (`lqr`). The
-gains depend on the length only, so that they are computed once. `workspace.feedforward_at_place` combines the operators
-of several models; `compensate_spring` is also used by `study.workflows.equalizer`.
+gains do not depend on the record, so that they are computed once for a length. `workspace.feedforward_at_place`
+combines the operators of several models; `study.workflows.equalizer` calls `compensate_spring`.
 """
 
 from collections.abc import Callable

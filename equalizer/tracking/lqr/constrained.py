@@ -147,7 +147,7 @@ def _alternate_directions(
     penalty = _choose_initial_penalty(capped_problem.problem)
     gains = _compute_penalised_gains(capped_problem.problem, len(capped_problem.reference), penalty)
     z, scaled_multipliers = capped_problem.project(initial_forces), np.zeros_like(initial_forces)
-    best_forces, best_cost, cost_bound = z, capped_problem.compute_cost(z), -np.inf
+    best_forces, best_cost, cost_bound, gap = z, capped_problem.compute_cost(z), -np.inf, np.inf
     for round_count in range(1, settings.rounds + 1):
         u = track(gains, np.hstack((capped_problem.reference, z - scaled_multipliers))).forces
         cost_bound = max(cost_bound, capped_problem.compute_lower_bound(u, 2 * penalty * (u - z + scaled_multipliers)))

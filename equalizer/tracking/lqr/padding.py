@@ -4,7 +4,6 @@ A row is the sample of all channels at one time. The inverse of a device is non-
 trajectory and end after it, within the padding. Where only the rows of the trajectory are played, from rest, the forces
 before the first row are lost, and the other forces were computed for an initial motion that does not exist. No padding
 before the trajectory (`CAUSAL`) is then best: it gives the optimal forces among those that start with the first row.
-Called by `feedforward`, `contact`, `narrow_and_wide_models`, `realtime_controller` and `study.workflows.equalizer`.
 """
 
 from dataclasses import dataclass

@@ -48,7 +48,7 @@ class ControllerCases:
 
 
 def compute_controller_cases(controller: RealtimeController, seed: int = 1) -> ControllerCases:
-    """Compute reference inputs and forces for as many ticks as the transient has rows or the preview has samples, and
+    """Compute reference inputs and forces for as many ticks as the transient has rows or the tracker has gains, and
     `TICKS_AFTER` more. Raises TrackingError where transient or stream give no force, so that nothing could be
     compared."""
     generator, p = np.random.default_rng(seed), controller.problem.outputs
@@ -64,7 +64,7 @@ def compute_controller_cases(controller: RealtimeController, seed: int = 1) -> C
 
 def _compute_cap_factor(forces: FloatArray, cap_n: float, part: str) -> float:
     """Factor that scales the largest norm of forces (T, m) to `CAP_SHARE` of the cap. part: transient or stream, for
-    the error. Raises TrackingError for forces of zero."""
+    the error. Raises TrackingError for forces below `RELATIVE_TOLERANCE` of the cap."""
     peak_n = float(np.linalg.norm(forces, axis=1).max())
     if not peak_n >= RELATIVE_TOLERANCE * cap_n:
         raise TrackingError(

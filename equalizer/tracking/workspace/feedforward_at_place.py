@@ -1,7 +1,7 @@
 """Feedforward forces at a place of the workspace, by a single model or by the weighted sum of several models' forces.
 
 The models and weights come from an interpolation between places (`interpolation_choice`). Called by the workflows
-`equalize_trajectory` and `repeat_trajectory`; `playback_models` and `convergence_at_place` use the selection of models.
+`equalize_trajectory` and `repeat_trajectory`.
 """
 
 from dataclasses import replace
@@ -26,9 +26,9 @@ def compute_feedforward_at_place(
     place_models: ModelsAtPlace, reference: Signal, settings: FeedforwardSettings
 ) -> Feedforward:
     """Compute feedforward forces at a place: the weighted sum of the forces of all models with a weight above zero.
-    Error and loss are the largest of any model's forces, predicted by that model; `predicted` and the other fields are
-    those of the model with the largest weight. reference: (N, p), m/s². Raises ForceLimitError where the sum exceeds
-    the cap, and the errors of `compute_feedforward_forces`."""
+    Error and loss are the largest of any model's forces, predicted by that model; `peaks` are those of the sum;
+    `predicted` and the other fields are those of the model with the largest weight. reference: (N, p), m/s². Raises
+    ForceLimitError where the sum exceeds the cap, and the errors of `compute_feedforward_forces`."""
     used_models = select_used_models(place_models)
     if len(used_models) == 1:
         return compute_feedforward_forces(used_models[0][1], reference, settings)

@@ -133,6 +133,8 @@ def _choose_by_checks(
 
 def _check_distances(workspace: WorkspaceModels, held_out_places: Sequence[HeldOutPlace]) -> None:
     """Raise WorkspaceError for a held-out place within `HULL_TOLERANCE_M` (m) of a model's place."""
+    if workspace.models[0].place_m is None:  # a single model that is used everywhere
+        return
     for place in held_out_places:
         distances_m = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
         if distances_m.min() < HULL_TOLERANCE_M:

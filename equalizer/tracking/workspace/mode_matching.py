@@ -17,8 +17,7 @@ from equalizer.tracking.workspace.band_modes import BandMode
 FREQUENCY_SCALE = 0.3
 """Change of the natural logarithm of the frequency that costs as much as orthogonal shapes (MAC = 0). Chosen."""
 UNMATCHED_COST = 0.6
-"""Cost of a mode without a partner; a pair is therefore matched only where it costs at most twice as much.
-Chosen."""
+"""Cost of a mode without a partner; a pair is therefore matched only where it costs at most twice as much. Chosen."""
 LEAST_MAC = 0.5
 """Least MAC (0 to 1) of two modes that are matched. Chosen."""
 LEAST_COST_MARGIN = 0.1

@@ -1,8 +1,8 @@
 """Models with weights for a place of the workspace: the forces there are the weighted sum of the models' forces.
 
-Result of an interpolation between places: a single model by `modal_interpolation`, several by `blended_inverse`, chosen
-by `interpolation_choice`. Used by `feedforward_at_place` (models and weights), `convergence_at_place` and
-`interpolation_choice` (inverse), and `study.evaluation.reproduction` (forces). Sizes: m inputs, p outputs of a model.
+Result of an interpolation between places: a single model by `modal_interpolation`, models with weights by
+`blended_inverse`, chosen by `interpolation_choice`. Used by `feedforward_at_place` and `convergence_at_place`. Sizes: m
+inputs, p outputs of a model.
 """
 
 from collections.abc import Callable
@@ -43,7 +43,7 @@ class ModelsAtPlace:
         return np.asarray(sum(weighted_inverses), dtype=np.complex128)
 
     def compute_forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
-        """Compute the weighted sum of the forces (samples, m), in newtons, that `track` returns for each model."""
+        """Compute the weighted sum of the forces (samples, m), in newtons, that `track` returns for a model."""
         return np.asarray(
             sum(force_weight * track(model) for force_weight, model in self._select_used_models()),
             dtype=np.float64,

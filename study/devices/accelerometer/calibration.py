@@ -1,8 +1,7 @@
 """Six-position calibration of an accelerometer under gravity: bias, sensitivity with cross-axis terms, and noise.
 
 raw = sensitivity a + bias is solved by least squares for six known directions of gravity. An accelerometer measures
-specific force: at rest it reads +g along the axis that points up. `six_positions` calls `calibrate`; `sensor` converts
-samples with a `Calibration`, which `study.devices.force_dimension.lab` reads from the laboratory's file.
+specific force: at rest it reads +g along the axis that points up. `six_positions` calls `calibrate`.
 """
 
 from dataclasses import dataclass

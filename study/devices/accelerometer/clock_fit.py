@@ -2,7 +2,7 @@
 
 A sample arrives after it was taken, never before. The line from device time to host time therefore lies below all
 arrivals. Of all such lines the fit takes the one with the smallest mean distance to the arrivals, which is the edge of
-their lower convex hull at the mean device time; no constant has to be chosen. Called by `tick_resampling`.
+their lower convex hull at the mean device time; no constant has to be chosen.
 Source: S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements,
 INFOCOM 1999.
 """
@@ -39,8 +39,8 @@ class ClockFit:
 
 
 def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
-    """Fit the device's clock to the host's: a line below all arrivals. device_s (n,), strictly rising: times of the
-    samples by the device's clock (s); arrived_s (n,): their times of arrival by the host's clock (s).
+    """Fit the device's clock to the host's. device_s (n,), strictly rising: times of the samples by the device's clock
+    (s); arrived_s (n,): their times of arrival by the host's clock (s).
 
     Raises ValueError for fewer than two samples, device times that do not rise or are NaN, or arrivals that are not
     finite.

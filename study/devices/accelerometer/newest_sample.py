@@ -1,10 +1,9 @@
 """Lock-free ring buffer that passes the newest accelerometer sample from its reading thread to a control loop.
 
 One thread writes (`sensor`), any number of threads read: Python by `read_zeroed`, the compiled control loop by the same
-steps in `force_dimension.tick_io`. Readers take no lock, so that they never wait. A reader copies the newest row, then
-checks by the sample counter that the writer cannot have overwritten that row in the meantime; otherwise it copies
-again. The writer's lock serves as a memory barrier only: its release makes a row visible before the counter that refers
-to it.
+steps in `force_dimension.tick_io`. Readers take no lock. A reader copies the newest row, then checks by the sample
+counter that the writer cannot have overwritten that row in the meantime; otherwise it copies again. The writer's lock
+serves as a memory barrier only: its release makes a row visible before the counter that refers to it.
 """
 
 import threading
@@ -56,9 +55,8 @@ class NewestSample:
         self.rows[0, REST_MPS2 : REST_MPS2 + 3] = acceleration
 
     def read_zeroed(self, now_s: float) -> tuple[FloatArray, bool]:
-        """Read the newest acceleration less the reading at rest, (3,), m/s², NaN without a sample younger than
-        `MAX_AGE_S`; and whether it was marked as clipped, False without such a sample. now_s: present time by
-        `time.monotonic`."""
+        """Read the newest acceleration less the reading at rest, (3,), m/s², and whether it was marked as clipped; NaN
+        and False where there is none, or it is older than `MAX_AGE_S`. now_s: present time by `time.monotonic`."""
         row = self._copy_newest_row()
         if row is None or now_s - row[ARRIVAL_S] > MAX_AGE_S:
             return np.full(3, np.nan), False

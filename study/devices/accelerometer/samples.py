@@ -1,7 +1,6 @@
 """Raw samples of an accelerometer: sequence numbers, times by the sensor's clock, counts of received and lost packets.
 
-`SampleSource` is the interface of a serial line (`serial_reader`) and of a data-acquisition device (`sources`); all
-further processing is the same for both. `parser` makes `Samples`; `sensor`, `history` and `six_positions` use them.
+`SampleSource` is the interface of a serial line (`serial_reader`) and of a data-acquisition device (`sources`).
 """
 
 from dataclasses import dataclass
@@ -36,7 +35,7 @@ class PacketCounts:
     packets: int = 0
     """Complete packets received."""
     lost: int = 0
-    """Packets lost, counted by gaps in the sequence numbers, so that incomplete and corrupt packets are included."""
+    """Packets lost; of a board by gaps in the sequence numbers, so that incomplete and corrupt ones are included."""
     spoiled_bytes: int = 0
     """Bytes that belonged to no complete packet."""
     restarts: int = 0

@@ -1,7 +1,6 @@
 """Findings of `hapteq doctor` about an accelerometer at rest: sample rate, lost packets, clock drift and delay, noise.
 
-Called by `study.devices.force_dimension.findings`. A finding out of its limits is a warning with a remedy: none
-prevents the use of a device. The limits are chosen; their docstrings state the typical values.
+A finding out of its limits is a warning with a remedy; none prevents the use of a device. The limits are chosen.
 """
 
 import time

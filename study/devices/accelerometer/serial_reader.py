@@ -15,7 +15,7 @@ MAX_READ_BYTES = 4096
 """Maximum number of bytes per read: 256 packets of 16 bytes, 0.13 s at 2 kHz. Chosen."""
 
 READ_TIMEOUT_S = 0.01
-"""Timeout (s) of a read on a silent line; the reading thread detects `close` no later than this. Chosen."""
+"""Timeout (s) of a read on a silent line. Chosen: short, so that the reading thread soon detects a close."""
 
 
 class Port(Protocol):
@@ -74,7 +74,7 @@ def open_serial(path: str, baud: int) -> SerialSource:
 
 
 class _SerialPort:
-    """`Port` by pyserial, whose own `read(size)` would wait until all `size` bytes have arrived: this class waits for
+    """`Port` by pyserial, whose own `read(size)` would wait for all `size` bytes or the timeout: this class waits for
     the first byte only, then reads the bytes that are already in the buffer."""
 
     def __init__(self, serial_port: Any) -> None:

@@ -1,7 +1,7 @@
 """Procedure of the six-position calibration: records the sensor at rest with each axis up and down.
 
 The calibration itself (least squares under gravity) is in `calibration`; the result is the [accelerometer] table for
-the laboratory's settings file. Called through `study.devices.opening` by `hapteq doctor` and the app.
+the laboratory's settings file.
 """
 
 import time

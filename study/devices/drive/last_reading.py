@@ -1,7 +1,4 @@
-"""Last reading of a device's loop, and its conversion to a `Look`, the snapshot of a device that displays show.
-
-Written by the runners of this folder, read by `study.devices.safe` on request of a display.
-"""
+"""Last reading of a device's loop, and its conversion to a `Look`, the snapshot of a device that displays show."""
 
 import math
 from dataclasses import dataclass

@@ -1,7 +1,6 @@
 """Converts the rows that the control loop recorded to a `Recording` with the counters of the safety layer.
 
-The accelerations of an accelerometer with its own clock are inserted here, resampled to the ticks of the rows. Called
-by `study.devices.safe` when a stimulus or a sequence of commands has ended.
+The accelerations of an accelerometer with its own clock are inserted here, resampled to the ticks of the rows.
 """
 
 from dataclasses import replace

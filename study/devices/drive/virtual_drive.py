@@ -1,6 +1,6 @@
 """Control ticks in virtual time: when the program sleeps, the ticks that fall due in that time are run at once.
 
-Used by `study.devices.safe` for simulated devices, so that a session runs as fast as the computer allows.
+Made by `study.devices.safe` for a simulated device with a virtual clock.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from study.devices.governor.governor import Governor
 
 
 class VirtualDrive:
-    """Drive of a device in virtual time: ticks run in the caller's thread whenever the clock advances."""
+    """Drive of a device in virtual time: due ticks run in the caller's thread when the clock advances."""
 
     def __init__(self, runner: Runner, governor: Governor, clock: VirtualClock, rate_hz: float) -> None:
         self._runner = runner

@@ -1,8 +1,7 @@
-"""Acceptance record of a device: tested with no hand on the handle, with an operator's name, void after any change.
+"""Acceptance record of a device (acceptance.json): tested with no hand on the handle, with an operator's name.
 
-Without a valid record, a real device cannot be opened with a hand on the handle. The tests are `force_limit_check`; the
-record is acceptance.json. Written by `study.devices.opening.accept_device`, checked by `open_rig` at every opening of a
-device with a hand on the handle.
+Without a valid record, a real device cannot be opened with a hand on the handle. The record is void after `VALID_FOR`
+and for another device, firmware or SDK. The tests are in `force_limit_check`.
 """
 
 import json
@@ -18,7 +17,7 @@ FORMAT, VERSION = "hapteq-acceptance", 1
 """Values by which the file and its version are recognised."""
 
 VALID_FOR = timedelta(days=180)
-"""Validity of an acceptance: half a year, so that the device is tested twice a year."""
+"""Validity of an acceptance. Chosen: half a year."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +38,7 @@ class Acceptance:
     gone_after_s: float
     """Time (s) from the last command until the device reported its force as off."""
     asked_n: float = 0.0
-    """Force (N) commanded of each layer, above the cap of `force_n`; 0 where this was not tested, as before November
-    2026."""
+    """Force (N) commanded of each layer, above the cap of `force_n`; 0 in older records, where it was not tested."""
     most_given_n: float = 0.0
     """Largest force (N) that the device reported during the test of the force limit."""
     baseline: str = ""
@@ -68,8 +66,8 @@ def write_acceptance(acceptance: Acceptance) -> Path:
 
 def check_accepted(info: DeviceInfo, today: date) -> tuple[str, str]:
     """Check that this device is accepted on the day `today` (UTC). Returns file name and SHA-256 of the accepted
-    baseline, both empty where none was made. Raises `DeviceError` where this device, with its present serial number,
-    firmware and SDK, was not accepted, or where `today` is before the acceptance or after its validity."""
+    baseline, both empty where none was made. Raises `DeviceError` where the record cannot be read or is that of another
+    device, serial number, firmware or SDK, or where `today` is before the acceptance or after its validity."""
     path = locate_acceptance_file()
     try:
         document = json.loads(path.read_text("utf-8"))

@@ -1,8 +1,6 @@
 """Device models of Force Dimension that can be opened (omega.3 to sigma.7), with their constants.
 
-Used by the driver of this folder, by `study.devices.opening` and `rigs_by_name`, which look a model up by the name in
-`--device`, and by `study.devices.replay.replay_rig`. Imports no large package, because the command line reads the names
-at every start.
+Imports no large package, so that commands which only need the names start quickly.
 """
 
 from dataclasses import dataclass
@@ -21,8 +19,8 @@ class DeviceModel:
     CHAI3D."""
     effective_mass_kg: float
     """Effective mass at the handle, from which the stiffness of the centring spring is computed. The vendor publishes
-    none: the values are assumptions, from the simulated omega.3 and the heavier wrists of the other models. The
-    spring's natural frequency changes with the square root of the ratio of assumed to true mass."""
+    none: the values are assumptions. The spring's natural frequency changes with the square root of the ratio of
+    assumed to true mass."""
     effector_mass_kg: float | None
     """Mass for the gravity compensation (kg); the omega.3's is that of configurations for CHAI3D. None: the library's
     default."""

@@ -1,4 +1,4 @@
-"""Locates the shared library of Force Dimension's SDK (libdrd or libdhd) on this computer. Called by `connect`.
+"""Locates the shared library of Force Dimension's SDK (libdrd or libdhd) on this computer.
 
 The folders that environment variables state are searched first, then those in which the vendor's installer and tools
 put the library on Windows, macOS and Linux.
@@ -45,15 +45,15 @@ def find_library(computer: Computer) -> Path | None:
 
 
 def list_library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
-    """List pairs (folder, file pattern) in order of preference. Folders of environment variables come first, because
-    the user chose them."""
+    """List pairs (folder, file pattern) in order of preference."""
     for folder in _list_folders(computer):
         for library_name in ("drd", "dhd"):
             yield folder, _make_file_pattern(library_name, computer)
 
 
 def _list_folders(computer: Computer) -> Iterator[Path]:
-    """List the folders to search, in order of preference; on Windows the newest version of the SDK first."""
+    """List the folders to search, in order of preference: those of `SDK_VARIABLES` first, because the user chose them;
+    then, on Windows, those of each of `WINDOWS_FOLDERS`, the newest version first."""
     environ = computer.environ
     roots = [Path(environ[name]) for name in SDK_VARIABLES if environ.get(name)]
     if computer.system == "win32":

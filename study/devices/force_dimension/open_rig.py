@@ -1,8 +1,7 @@
-"""Open a Force Dimension device by name and make it ready for a study. Called by `study.devices.rigs_by_name`;
-`findings` and `linkage` use `read_info`.
+"""Open a Force Dimension device by name and make it ready for a study.
 
-Order: load the vendor's library, open the accelerometer and the device, check its identity and its acceptance, set
-force limit, gravity compensation and watchdog, test the watchdog. After a failure everything is closed again.
+Order: load the vendor's library, open the accelerometer and the device, check its identity and, for a hand on the
+handle, its acceptance; set force limit, gravity compensation and watchdog; test the watchdog.
 """
 
 import math
@@ -27,9 +26,9 @@ LOOP_RATE_HZ = 1000.0
 
 
 def open_force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
-    """Open a device of the vendor by the name of its model (`MODELS`), with watchdog and gravity compensation, and its
-    accelerometer where one is configured and `settings.with_sensor` is true. Raises `DeviceError` with the reason;
-    device and accelerometer are then stopped and closed."""
+    """Open a device of the vendor by the key of its model in `MODELS`, and its accelerometer where one is configured
+    and `settings.with_sensor` is true. Raises `DeviceError` with the reason; device and accelerometer are then stopped
+    and closed."""
     model, lab = MODELS[name], read_lab_settings()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None

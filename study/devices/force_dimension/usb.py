@@ -34,9 +34,9 @@ class UsbDevice:
 def find_usb_devices(
     devices_folder: Path = Path("/sys/bus/usb/devices"), device_files_folder: Path = Path("/dev/bus/usb")
 ) -> tuple[UsbDevice, ...] | None:
-    """List the Force Dimension devices that are plugged in; None where this system cannot list them (not Linux).
-    devices_folder: contains one folder per USB device. device_files_folder: contains the device files, BUS/NUMBER with
-    three digits each."""
+    """List the Force Dimension devices that are plugged in; None where there is no `devices_folder` (not Linux), which
+    contains one folder per USB device. device_files_folder: contains the device files, BUS/NUMBER with three digits
+    each."""
     if not devices_folder.is_dir():
         return None
     usb_devices = []

@@ -1,9 +1,8 @@
-"""Test of the device's watchdog at every opening: the commands are paused, and the device must report its force as off.
+"""Test of the device's watchdog at its opening: the commands are paused, and the device must report its force as off.
 
 The commanded force is zero throughout, so that the test is safe even if the watchdog fails. It passes if the device
 reports its forces as off, its brakes as on, and the watchdog as the cause. It fails where a status that is read after
-the timeout and `MARGIN_S` still reports forces as on; a late release before that reading is not noticed. Called by
-`open_rig` and `findings`.
+the timeout and `MARGIN_S` still reports forces as on; a late release before that reading is not noticed.
 """
 
 from collections.abc import Callable
@@ -71,8 +70,7 @@ def _check_release_cause(status: Status) -> None:
 
 
 def _make_watchdog_error(reason: str) -> DeviceError:
-    """Make the error for a watchdog that failed the test. reason: a sentence; the text adds to each that the device
-    would hold its last force, which not every reason shows."""
+    """Make the error for a watchdog that failed the test. reason: a sentence."""
     return DeviceError(
         "The device's watchdog failed its test",
         f"{reason} If this program died, the device would hold its last force.",

@@ -1,8 +1,7 @@
 """Indices into the arrays of the safety layer's control tick (settings, state, rows), and its phase and fault codes.
 
 The compiled tick takes arrays of 64-bit floats, so that each quantity is a cell with a named index. The name of a
-vector is the index of its x component; names that begin with an underscore reserve the cells of y and z. Used by the
-modules of this folder, by the loops of `study.devices.drive`, and by `study.devices.telemetry`.
+vector is the index of its x component; names that begin with an underscore reserve the cells of y and z.
 """
 
 import numpy as np

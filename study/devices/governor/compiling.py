@@ -1,10 +1,8 @@
-"""Compilation of the control tick with numba, and invalidation of cached machine code. Used by the safety layer
-(`governor`), the loops (`drive`), and the compiled drivers and simulations.
+"""Compilation of the control tick with numba, and invalidation of cached machine code.
 
 numba reuses cached code of a function while the file of that function is unchanged; it ignores changes in the files of
 the functions that it calls. It also compares the values that a closure captures. Entry points therefore capture the
-fingerprint of a folder, so that they are compiled again after a change of any file in it; the functions that they call
-are not cached themselves.
+fingerprint of a folder, so that they are compiled again after a change of any Python source in it.
 """
 
 import hashlib

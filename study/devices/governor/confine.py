@@ -1,7 +1,6 @@
 """Limits the norm of a force to a cap within a tick, with its direction unchanged: F <- F min(1, cap / |F|).
 
-A force that is not finite becomes zero. The functions are compiled into the safety layer's tick (`govern`, `feedback`,
-`plausibility`); `study.devices.force_dimension.loop_cells` uses `is_bounded`.
+A force that is not finite becomes zero. The functions are compiled into the safety layer's tick.
 """
 
 import math

@@ -4,7 +4,7 @@
 
 K (STIFFNESS) in N/m, B (DAMPING) in N s/m. Spring, damper and their sum are each limited to FEEDBACK_CAP, separately
 from the cap of the stimulus: a wrong reading that no plausibility check detects then exerts at most this force. Called
-by `govern` at each tick.
+by `govern` at each tick of a stimulus.
 """
 
 import math
@@ -50,7 +50,7 @@ def _filter_velocity(state: FloatArray, settings: FloatArray, reading: FloatArra
 
 @njit_inline
 def _reduce_feedback(state: FloatArray, settings: FloatArray) -> None:
-    """Reduce the feedback force slowly while the position reading does not change (UNCHANGED_TICKS, by `plausibility`).
+    """Reduce the feedback force slowly while, unreduced, it exceeds dry friction and the position reading stays equal.
 
     A handle that dry friction holds at rest looks like a frozen encoder. With the force reduced, a real handle moves
     and shows that the encoder works; an encoder whose reading still does not change is reported as stale. The reduction
@@ -63,7 +63,7 @@ def _reduce_feedback(state: FloatArray, settings: FloatArray) -> None:
 @njit_inline
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
     """Add spring and damper to `force` (3,), N, each and their sum limited to FEEDBACK_CAP. gain: 0 to 1, the ramp at
-    the start and end of a hold. FEEDBACK_FORCE (N) is their magnitude before `_reduce_feedback` reduces it."""
+    the start and end. FEEDBACK_FORCE (N) is their magnitude before `_reduce_feedback` reduces it."""
     _filter_velocity(state, settings, reading)
     cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
     x = stiffness * (reading[0] - settings[CENTRE_X])

@@ -1,4 +1,4 @@
-"""Writes the row of a tick into the telemetry ring, in place of the oldest row. Called by `govern.publish`.
+"""Writes the row of a tick into the telemetry ring; in a full ring, in place of the oldest row.
 
 The loop is the only writer and never waits; readers (`study.devices.telemetry`) only read. A row that is being written
 is recognised by its index and its checksum, on any processor: the method does not depend on the order of the stores.
@@ -44,8 +44,8 @@ from study.devices.governor.compiling import njit_inline
 
 @njit_inline
 def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
-    """Write the row of a tick into the ring; called after `tick`, which has advanced TICK already. ring (1 + rows,
-    RING_WIDTH): a header, then the rows. Time in s, position in m, acceleration in m/s², forces in N."""
+    """Write the row of a tick, after `govern.tick` has advanced TICK. ring (1 + rows, RING_WIDTH): a header, then the
+    rows. Time in s, position in m, acceleration in m/s², forces in N."""
     row_count = ring[0, RING_COUNT]
     row = ring[1 + int(row_count) % (ring.shape[0] - 1)]
     # The excitation and the velocity are computed in these two phases only.

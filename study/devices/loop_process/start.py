@@ -21,10 +21,10 @@ KILL_TIMEOUT_S = 2.0
 
 class LoopProcess:
     """The process of the device loop, with a `CallPipe` for each group of methods, named as in `PIPE_NAMES`. The
-    constructor starts it, and raises `DeviceError` where the system refuses.
+    constructor starts it, and raises `DeviceError` where the system refuses to start a process.
 
-    It has a separate session, so that the terminal's Ctrl-C and Ctrl-Z do not reach it. Its pipes are closed when this
-    process ends for any reason. It inherits this process's stderr, for warnings after its pipes are closed.
+    It has its own session (on Windows, process group), so that the terminal's Ctrl-C and Ctrl-Z do not reach it. Its
+    pipes are closed when this process ends for any reason. It inherits stderr, for warnings after that.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class LoopProcess:
             pipe.close_after_calls()
 
     def kill(self) -> None:
-        """Kill the process: the device's own watchdog then drops the force."""
+        """Kill the process: only the watchdog of the device, if it has one, then drops the force."""
         self._killed = True
         self._process.kill()
 

@@ -1,8 +1,7 @@
-"""Compiled entry points of the simulated device. Their machine code is kept on disk: only a first run compiles.
+"""Compiled entry points of the simulated device. Their machine code is kept on disk for later runs.
 
 numba checks only the file of an entry point for changes, but most of the mechanism is in other files of this folder.
-Each entry point therefore captures the fingerprint of all of them (`study.devices.governor.compiling`). Used by
-`omega3` (`sense`, `advance`) and by `packing` and `simulated_linkage` (`solve_pose`).
+Each entry point therefore captures the fingerprint of all of them (`study.devices.governor.compiling`).
 """
 
 from pathlib import Path

@@ -1,8 +1,7 @@
 """Mass matrix of the simulated device on the arm side of the cables, and two small linear solvers.
 
 Platform, handle and arms move on a base that rocks. The motors are on the other side of the cables (`drives`). The
-solvers are written out, because every function of a tick is compiled without calls into a library. Called by
-`dynamics`, once per tick.
+solvers are written out, because every function of a tick is compiled without calls into a library.
 """
 
 from equalizer.signals.signal import FloatArray

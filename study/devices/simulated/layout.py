@@ -1,14 +1,14 @@
 """Indices into the two flat arrays of the simulated device's compiled functions: state and parameters, in SI units.
 
-Each constant is the index of the first number of a quantity; the quantity ends where the next constant begins. A
-quantity of the handle or the sensor has the order x, y, z, a quantity of a drive the order of the legs. `packing` fills
-the arrays, the functions of `dynamics` and `sensors` use them; the equations are in docs/simulated_omega3.md.
+Each constant of the two lists is the index of the first number of a quantity, which ends where the next constant
+begins. Vectors have the order x, y, z; quantities of the drives have the order of the legs. `packing` fills the arrays;
+the equations are in docs/simulated_omega3.md.
 """
 
 HANDLE_MODES = 6
 """Number of handle modes; a constant, because the compiled code needs the sizes of its arrays."""
 MOUNT_MODES = 2
-"""Number of modes of the mount, in which the base rocks; a constant for the same reason."""
+"""Number of modes of the mount, in which the base rocks."""
 SUBSTEPS = 10
 """Integration steps in a tick; chosen, so that a step of 0.1 ms is short against the modes (up to 391 Hz)."""
 TICK_S = 1e-3
@@ -56,7 +56,7 @@ PLATFORM_DEPTH = 3
 AZIMUTH = 4
 """Cosine and sine of the azimuth of each leg."""
 PLATFORM_MASS = AZIMUTH + 6
-"""(3, 3), kg: platform and handle without the masses of the handle modes; with the mass of a hand."""
+"""(3, 3), kg: platform and handle without the masses of the handle modes; with that of the hand, if any."""
 ARM_INERTIA = PLATFORM_MASS + 9
 """Inertia of an arm about its pivot, kg m², with the part of the forearm that is lumped at the elbow."""
 DRIVE_INERTIA = ARM_INERTIA + 1

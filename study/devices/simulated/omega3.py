@@ -1,7 +1,6 @@
 """Builds the simulated omega.3 as a rig, with packed parameters, state at rest and compiled functions.
 
-Its numbers are not those of the real device: see docs/simulated_omega3.md and `parameters`. Called by
-`study.devices.rigs_by_name`; `simulated_linkage` uses the device's properties.
+Its numbers are not those of the real device: see docs/simulated_omega3.md and `parameters`.
 """
 
 import math
@@ -49,8 +48,8 @@ def build_omega3(
     )
 
     def simulate_hand(on_handle: bool) -> None:
-        """Put the simulated hand on the handle or take it off; no effect in a device without a hand. Only the
-        parameters that the hand changes are set: others, which a test may have altered, are kept."""
+        """Put the simulated hand on the handle or take it off; no effect in a device without a hand. Parameters that
+        the hand does not change are kept, because a test may have altered them."""
         differs_with_hand = parameters_without_hand != parameters_with_hand
         packed_parameters[differs_with_hand] = (
             parameters_with_hand if on_handle and hand else parameters_without_hand

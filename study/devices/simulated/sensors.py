@@ -2,7 +2,7 @@
 
 The noise comes from a generator with a 64-bit state (SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast splittable
 pseudorandom number generators", OOPSLA 2014), turned into normal numbers by Box and Muller's method. Its state is part
-of the rig, so that a recording depends on the seed alone. Compiled into `compiled.sense`.
+of the rig, so that the noise depends on the seed alone. Compiled into `compiled.sense`.
 """
 
 import math

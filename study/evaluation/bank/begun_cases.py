@@ -3,8 +3,7 @@ the process that draws the cases is killed at any point.
 
 The files of a case are written into a folder under `begun`; then the label is written; last, the folder is renamed into
 `open`. After a kill, the next run renames the folders in `begun` that have a label, and removes the others, whose cases
-are drawn again. Called by the modules that write cases: `seal_cases`, `follow_up`, `laws.seal_laws` and
-`study.evaluation.real.inject_real`.
+are drawn again.
 """
 
 import secrets

@@ -2,9 +2,8 @@
 
 Layout: bank.json (settings of the bank), open/CASE/ (all that the diagnosis gets, and its answer), sealed/NUMBER.json
 (labels), labels.sha256 (seals), engine.log, and begun/ while cases are written. The random name of a case does not
-reveal its number, so that the diagnosis cannot find its label. next/ and controls/SEED/ are the banks of follow-up
-cases and of controls, with the same layout; a bank of laws has the test motions of each case beside its label. Used by
-all modules of this folder, in particular `seal_cases` (writes cases), `ask_engine` (diagnoses them) and `prove`."""
+reveal its number. next/ is the bank of follow-up cases, with the same layout; controls/SEED/ has cases in open/, but no
+labels; a bank of laws has the test motions of each case beside its label."""
 
 import json
 from dataclasses import dataclass
@@ -52,7 +51,7 @@ class ProofFolder:
 
 
 RECORDING_FILE, MODEL_FILE, SETTINGS_FILE, ANSWER_FILE = "recording.h5", "model.toml", "settings.json", "answer.json"
-"""Files in a case's folder under `open`; the last is written by the diagnosis."""
+"""Files in a case's folder under `open`; the last holds the answer of the diagnosis."""
 FURTHER_RECORDING_FILE = "recording_{}.h5"
 """File name of a further recording of a case; the braces stand for its number."""
 WORKER_DIED_KEY = "died"

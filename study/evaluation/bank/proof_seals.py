@@ -1,10 +1,8 @@
-"""Seals of a blind test (commitment by hash): the SHA-256 of every label is written before any case is answered, and
-compared at every later step.
+"""Seals of a blind test (commitment by hash): the SHA-256 of a label is written before its cases are answered, and
+compared when it is revealed.
 
 A label states the true effect of a case and the hashes of its files; an answer must have been given to files with the
-same hashes. So neither label nor recording can be changed after an answer is known. Called by `seal_cases`,
-`sealed_bank`, `follow_up` and `study.evaluation.real.inject_real`; `ask_engine`, `prove` and `run_controls` read labels
-and answers with it.
+same hashes. So neither label nor recording can be changed unnoticed after an answer is known.
 """
 
 import hashlib

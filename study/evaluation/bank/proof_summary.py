@@ -1,8 +1,7 @@
 """Summary of a blind test of the diagnosis (`hapteq prove`), as lines for the terminal and as JSON values.
 
 A blind test diagnoses a bank of simulated cases with concealed effects, whose labels are sealed (hashed) beforehand. A
-miss is a case with a wrong answer; a control is an altered input for which the correct answer is known. Called by
-`study.cli.prove`; `write_proof` adds `list_remarks` to its report.
+miss is a case with a wrong answer; a control is an altered input for which the expected answer is known.
 """
 
 import math
@@ -20,9 +19,8 @@ from study.evaluation.bank.prove import BlindTest
 
 
 def format_blind_test(result: BlindTest) -> Iterator[str]:
-    """Format the summary as lines for the terminal: number of misses and each miss, number of controls that held and
-    each other one, each figure with its 95 % confidence interval (names padded to 52 characters), the expected
-    calibration error of the probabilities, remarks, the seal of the labels (SHA-256), and the folder."""
+    """Format the summary as lines for the terminal: misses, controls, figures with their 95 % confidence intervals, the
+    expected calibration error of the probabilities where it is known, remarks, the seal of the labels, the folder."""
     score = result.score
     yield f"{len(score.misses)} misses in {len(result.outcomes)} cases"
     for miss in score.misses:

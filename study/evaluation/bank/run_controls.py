@@ -1,5 +1,4 @@
-"""Run the controls of a diagnosis: altered inputs with a known expected change of the answer, diagnosed by the same
-processes as a bank. Called by `study.evaluation.bank.prove`.
+"""Run the controls of a diagnosis: altered inputs with a known expected answer, or change of it.
 
 The inputs are drawn by `challenge.controls`; `analysis.evaluation.blind_test.control_claims` judges the answers.
 """

@@ -1,7 +1,7 @@
 """Steps that all sealed banks (effects and laws) share: check the seals, reveal the labels, pair them with answers.
 
 A label is revealed only if its SHA-256 is the sealed hash, and an answer counts only if it was given to the sealed
-files (`proof_seals`). Called by `prove` and `laws.prove_laws`.
+files (`proof_seals`).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -52,9 +52,9 @@ def reveal_bank(
     make_outcome: Callable[[dict[str, Any], dict[str, Any]], OutcomeT],
     is_unchanged: Callable[[dict[str, Any]], bool] = lambda label: True,
 ) -> tuple[OutcomeT, ...]:
-    """Check all seals, and return the outcomes of the answered cases with numbers below `case_count`, sorted by the
-    names of their label files. make_outcome: makes an outcome from a label and its answer. is_unchanged: whether
-    further files whose hashes the label holds are unchanged. Raises StudyError where a label or such a file has
+    """Check the labels in the folder, and return the outcomes of the answered cases with numbers below `case_count`,
+    sorted by the names of their label files. make_outcome: makes an outcome from a label and its answer. is_unchanged:
+    whether further files whose hashes the label holds are unchanged. Raises StudyError where a label or such a file has
     changed, or an answer was given to other files."""
     seals = read_seals(folder)
     outcomes: list[OutcomeT] = []

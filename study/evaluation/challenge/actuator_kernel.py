@@ -1,5 +1,4 @@
-"""Force of each amplifier and motor from the command, at the mechanism's integration step (compiled). Called by
-`study.evaluation.challenge.device`; `effects.actuator` and `effects.decoys` set the columns.
+"""Force of each amplifier and motor from the command, at the mechanism's integration step (compiled).
 
 In this order: delay (interpolated between steps), dead band, hysteresis (play operator), slew limit, saturation,
 first-order lag (explicit Euler), and a gain that falls with the averaged square of the force, as by heating.

@@ -1,6 +1,5 @@
 """Linear part of a simulated device, the bench: a handle with three axes on springs and dampers to the ground, with
-three oscillators (structural modes) attached. Drawn by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`,
-integrated by `device`.
+oscillators (structural modes) attached. `device` integrates it.
 
 Equation of motion: M d2q/dt2 + C dq/dt + K q = (f, 0), where q holds the positions of the handle and of the
 oscillators' masses along their directions, and f is the force on the handle. All ranges of parameters were chosen.
@@ -69,8 +68,8 @@ class Bench:
 
 
 def draw_bench(random: np.random.Generator) -> Bench:
-    """Draw the bench of a case, with oscillators near 11, 95 and 175 Hz. All values are uniformly distributed in the
-    ranges below (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
+    """Draw the bench of a case, with three oscillators. Means and factors are uniformly distributed in the ranges below
+    (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
     mean_mass_kg = random.uniform(0.17, 0.29)
     mass = np.diag(mean_mass_kg * random.uniform(0.92, 1.08, 3)) + _draw_symmetric(random, MAX_MASS_COUPLING_KG)
     mean_stiffness_n_per_m = random.uniform(90.0, 210.0)

@@ -1,7 +1,4 @@
-"""Settings of a simulated case of the blind test: driven axes, recording, nuisance effects, integration steps.
-
-Drawn by `draw_bank`; read by `draw_case`, `drive_plan` (excitation) and the other modules that simulate cases.
-"""
+"""Settings of a simulated case of the blind test: driven axes, recording, nuisance effects, integration steps."""
 
 from dataclasses import dataclass
 

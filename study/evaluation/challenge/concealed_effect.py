@@ -1,7 +1,6 @@
 """Definition of a concealable effect: how its parameters are drawn for a strength, and how it is built into a device.
 
-The effects themselves are in `effects`; `draw_case` draws them and builds them in. The strength, 0 to 1, places the
-main parameter of an effect geometrically between its weakest and its strongest value.
+The effects themselves are in `effects`; `draw_case` draws them and builds them in.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,6 +1,6 @@
-"""Excitation of every challenge recording: multisines to fit; sweeps, all axes at once and slow sines to test.
+"""Excitation of a challenge recording: multisines to fit; sweeps, all driven axes at once and slow sines to test.
 
-`draw_plan` is called by `draw_case`, `laws.draw_law` and `second_engine.mujoco_case`; all numbers were chosen by hand.
+All numbers were chosen by hand; those of samples, except rests and fades, are for a period of 2000 samples.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ RATE_HZ = 1000.0
 AXES = ("x", "y", "z")
 """Names of the bench's axes."""
 LEVELS_N = (0.5, 1.5, 3.0)
-"""Peaks of the multisines (N)."""
+"""Peaks of the multisines to fit (N); the second also that of one to test."""
 PERIOD_SAMPLES, FIT_PERIODS, TEST_PERIODS = 2000, 4, 2
 """Samples of a multisine's period, and periods of a segment to fit and of one to test."""
 REST_SAMPLES = 500

@@ -5,7 +5,7 @@ The friction level L depends on position x and velocity v:
     dz/dt = v - |v| K z / L,    F = -K z,    L = level (1 + a x + b x^2) (1 + (ratio - 1) exp(-(v/speed)^2))
 
 z: deflection of the bristle (m); K: its stiffness (N/m). The last factor is Stribeck's; it applies where ratio > 1.
-Where L <= 0 there is no friction and z is reset to 0. Called by `mechanism_kernel` at every integration step.
+Where L <= 0 there is no friction and z is reset to 0.
 
 Source: P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1976, 1675-1682.
 """

@@ -2,8 +2,7 @@
 
     F = c - k2 x^2 - k3 x^3 + A sin(2 pi x / pitch + phase) - (b |v| + d x^2) v - k_s (x - x_s) beyond an end stop x_s
 
-`mechanism_kernel` evaluates it at every integration step and adds it to the other forces on the handle. Without cogging
-(A = 0) the pitch may be 0; the stops may be at infinity.
+Without cogging (A = 0) the pitch may be 0; the stops may be at infinity.
 """
 
 from math import pi, sin

@@ -1,9 +1,8 @@
-"""Small nuisance effects of the simulated devices of the challenge: every real device has some that no model contains.
+"""Small nuisance effects of the simulated devices of the challenge, as real devices have them and models do not.
 
-Each device gets four, drawn from seven; the labels of the cases do not name them. A diagnosis must not report them, nor
-be misled by them. At factor 1 they change the readings by about a tenth of the noise; the factor scales each size. The
-sizes in the functions below are those at factor 1, drawn uniformly; their ranges were chosen by hand. Called by
-`draw_case` and `laws.draw_law`.
+A device gets four, drawn from seven; the labels of the cases do not name them. A diagnosis must not report them, nor be
+misled by them. At factor 1 they change the readings by about a tenth of the noise; the factor scales each size. The
+sizes in the functions below are those at factor 1, drawn uniformly; their ranges were chosen by hand.
 """
 
 from collections.abc import Callable

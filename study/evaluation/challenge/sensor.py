@@ -2,8 +2,7 @@
 
 Order of the effects on the acceleration: low-pass, orientation, static law, gain and cubic term, saturation, play
 hysteresis; offset, drift, mains hum; clock error and delay; noise; range; quantization; lost samples. The position has
-clock error, noise, quantization and the same lost samples. Called by `device.record`, `laws.draw_law`, `draw_case` and
-`second_engine.mujoco_case`.
+clock error, noise, quantization and the same lost samples.
 """
 
 from collections.abc import Callable
@@ -25,8 +24,8 @@ POSITION_NOISE_M, POSITION_STEP_M = 4e-6, 1e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """Parameters of a simulated accelerometer and of its faults; by default it has noise and a limited band and range,
-    but no fault. Arrays (3,) have a value per channel."""
+    """Parameters of the sensors and of their faults; by default there are noise and a limited band and range, but no
+    fault. Arrays (3,) have a value per channel of the accelerometer."""
 
     bandwidth_hz: float = BANDWIDTH_HZ
     """Cut-off frequency (-3 dB) of the first-order low-pass (Hz)."""

@@ -1,7 +1,4 @@
-"""First-order low-pass and play hysteresis of a simulated accelerometer, sample by sample (compiled).
-
-Called by `sensor`; `nominal_models` uses the low-pass for the linear model of the sensor.
-"""
+"""First-order low-pass and play hysteresis of a simulated accelerometer, sample by sample (compiled)."""
 
 import numpy as np
 from numba import njit

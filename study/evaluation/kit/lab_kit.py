@@ -1,7 +1,7 @@
 """Blind test for a laboratory: draws the random order of physical changes to a device, and seals the table of labels.
 
 The seal is a commitment by hash: the SHA-256 of the table is published before the recordings are diagnosed, so that the
-labels cannot be changed to suit the answers. `score_kit` scores the answers. Called by `study.cli.kit`.
+labels cannot be changed to suit the answers. `score_kit` scores the answers.
 """
 
 import secrets

@@ -1,5 +1,4 @@
-"""Format the lines for the terminal that summarise the diagnosis of a folder of real recordings. Called by
-`study.cli.real` (`hapteq real`)."""
+"""Format the lines that `hapteq real` prints: a summary of the diagnosis of a folder of real recordings."""
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import format_error

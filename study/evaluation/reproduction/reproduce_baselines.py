@@ -1,8 +1,7 @@
 """Play baseline methods of equalization on the simulated device, for comparison with the equalizer.
 
 Each method is played at the centre of the workspace, near its edge, and in a simulated hand. All baselines are designed
-from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them. Called by
-`reproduce_paper`.
+from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them.
 """
 
 from collections.abc import Callable
@@ -102,11 +101,10 @@ def _list_band_frequencies_hz(plan: ReproductionPlan, rate_hz: float) -> FloatAr
 
 
 def _make_driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
-    """Make the driver that multiplies the spectrum of the target acceleration by the inverse, line by line in the band,
-    to give the forces (n, axes), N; they have no spectral lines outside the band."""
+    """Make the driver that multiplies the spectrum of one period of the target acceleration by the inverse, line by
+    line in the band, to give the forces (n, axes), N; they have no spectral lines outside the band."""
 
     def drive(target: Signal) -> FloatArray:
-        """Compute the forces (n, axes), N, for a period of the target acceleration, m/s²."""
         band_lines = mask_lines_in_band(plan.band_hz, len(target), target.sample_rate_hz)
         target_spectrum = np.fft.rfft(target.samples, axis=0)
         force_spectrum = np.zeros((len(target_spectrum), inverse.response.shape[1]), dtype=complex)

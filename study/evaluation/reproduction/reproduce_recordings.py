@@ -2,8 +2,7 @@
 
 A recording is reused only where protocol, seed, position of the handle and version of hapteq agree with the request.
 The device is not compared: each file name stands for a single simulated device, which changes with the version only. A
-recording that differs is never overwritten (StudyError); an interrupted one is removed and made again. Called by
-`reproduce_paper`.
+recording that differs is not overwritten (StudyError); otherwise an interrupted one is removed and made again.
 """
 
 from collections.abc import Callable
@@ -68,7 +67,7 @@ def record_or_load(
 def _load_cached_recording(
     path: Path, plan: ReproductionPlan, request: RecordingRequest, protocol: RecordingProtocol
 ) -> Recording | None:
-    """Load the cached recording; None where there is none, or only an interrupted one, which is removed. Raises
+    """Load the cached recording; None where there is none, or an interrupted one of this run, which is removed. Raises
     StudyError for a file that cannot be read or belongs to another run."""
     if not path.exists():
         return None

@@ -1,7 +1,4 @@
-"""Settings of `hapteq reproduce`, the folders of its results, and its overall progress.
-
-`study.cli.reproduce` makes the plan; the modules of this package that record, play and write read it.
-"""
+"""Settings of `hapteq reproduce`, the folders of its results, and its overall progress."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -37,8 +34,7 @@ class ReproducedProtocols:
 
 @dataclass(frozen=True, slots=True)
 class ReproductionPlan:
-    """Settings of a reproduction: output folder, numbers of simulated participants and of worker processes, seed, and
-    settings of the identified models."""
+    """Settings of a reproduction of the paper's figures, and the folders of its results."""
 
     output_folder: Path
     """Folder of all results."""

@@ -280,10 +280,9 @@ def _parse_numbers(
     """Parse a column of texts as numbers (n,), NaN where empty. Raises ValueError with line, field and remedy."""
     import pandas as pd
 
-    fields = column.str.strip()
+    fields, is_empty = column.str.strip(), _is_missing(column)
     if layout.decimal == ",":
-        fields = fields.str.replace(".", " ", regex=False).str.replace(",", ".", regex=False)
-    is_empty = fields.str.lower().isin(MISSING)
+        fields = fields.str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
     values = pd.to_numeric(fields.where(~is_empty), errors="coerce")
     is_unparsed = (values.isna() & ~is_empty).to_numpy()
     is_time = fields.map(is_stamp).to_numpy() & is_unparsed if is_unparsed.any() else is_unparsed

@@ -1,4 +1,4 @@
-"""Read the arrays of NPZ, NPY and HDF5 files by name; called by `read_arrays`.
+"""Read the arrays of NPZ, NPY and HDF5 files by name.
 
 Declared sizes are checked before memory is allocated, and nothing in a file is executed: arrays of Python objects,
 which would have to be unpickled, are not read.
@@ -25,7 +25,7 @@ _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _CELL_DESCRIPTION = "a cell, which is read where the file was saved with -v7"
 """Description of a Matlab cell, which an HDF5 file stores as references."""
 _NON_NUMERIC = np.array(None, dtype=object)
-"""Placeholder for the values of HDF5 texts and objects, which are listed but not read."""
+"""Placeholder for the values of HDF5 texts and objects that are listed but not read."""
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:

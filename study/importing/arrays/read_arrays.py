@@ -1,8 +1,7 @@
 """Read the arrays of a file by name: tables, workbooks, JSON, NumPy, Matlab and HDF5 files.
 
 The format follows from the ending of the file; `csv_arrays`, `workbook_arrays`, `json_arrays`, `mat_arrays` and
-`npz_hdf5_arrays` read one format each. Dates and clock times become seconds since the first. Called by the modules of
-`study.importing` and by the workflows and commands that open files of unknown content.
+`npz_hdf5_arrays` read the formats. Dates and clock times become seconds since the first.
 """
 
 from collections.abc import Mapping
@@ -25,7 +24,7 @@ from study.store.disk.file_errors import DAMAGE_ERRORS, CannotReadError, Unusabl
 from study.store.disk.hdf5_file import is_hdf5
 
 Array = npt.NDArray[Any]
-"""Array of numbers or texts, or a placeholder (an object array with one entry) for one that is not read."""
+"""Array of numbers or texts, or a placeholder (an object array with one entry) for one that was not read."""
 READABLE_ENDINGS = (
     ".csv, .txt, .tsv, .dat (tables), .xlsx, .xlsm, .json, .jsonl, .ndjson, .npz, .npy, .mat, .h5 and .hdf5"
 )

@@ -54,11 +54,11 @@ def split_row(line: str, delimiter: str) -> list[str]:
 
 def is_number(field: str, decimal: str) -> bool:
     """Whether a field is a number (also infinite) or stands for a missing one. decimal: decimal sign; with a comma, a
-    field with a point between digits is no number: the point would separate thousands."""
+    field with a point is no number: the point may separate thousands."""
     if "_" in field:  # Python reads 1_000 as 1000, but in files it is a label
         return False
     try:
-        float(field.replace(".", " ").replace(",", ".") if decimal == "," else field)
+        float(field.replace(".", "?").replace(",", ".") if decimal == "," else field)
     except ValueError:
         return field.lower() in MISSING
     return True

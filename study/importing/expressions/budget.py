@@ -1,9 +1,8 @@
 """Limits of the cost of a map's expressions: array elements held at once, elements computed in total, nesting depth.
 
-A definition may use another one twice, and that one a third one twice: a chain of 40 such definitions computes
-2^40 = 10^12 values, although the map is short. Therefore the cost is counted during evaluation, not estimated from the
-text. Called by `expression` and `namespace`; `build_recording` makes a budget per import, `map_library` one
-per recording whose arrays it checks.
+A definition may use another one twice, and that one a third one twice: a chain of 40 such definitions computes 2^40,
+about 10^12, values, although the map is short. Therefore the cost is counted during evaluation, not estimated from the
+text.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Errors of an import, raised throughout `study.importing`: each states its cause and a remedy."""
+"""Errors of an import, with cause and remedy; raised throughout `study.importing`."""
 
 import re
 from collections.abc import Iterable
@@ -9,7 +9,8 @@ from analysis.wording import format_sentence
 from study.errors import StudyError, WrongUseError
 
 _MAX_WORD_LENGTH = 60
-"""Largest number of characters of a name that are compared and shown. Chosen."""
+"""Largest number of characters of a name that are compared and shown: a damaged file may have a name of a million
+letters, whose comparison would take minutes. Chosen."""
 _MAX_SENTENCE_LENGTH = 2000
 """Approximate largest number of characters of a message. Chosen."""
 _MAX_NAMES = 500
@@ -55,8 +56,7 @@ class MapNeededError(WrongUseError):
 
 
 def _format_problem(problem: str) -> str:
-    """Format a problem as a sentence. Long quotations and long lists are shortened: a name in a damaged file may have a
-    million letters."""
+    """Format a problem as a sentence. Long quotations and long lists are shortened."""
     text = _LONG_QUOTATION.sub(r"'\1…'", problem)
     if len(text) > _MAX_SENTENCE_LENGTH:
         text = f"{text[:_MAX_SENTENCE_LENGTH].rpartition('; ')[0] or text[:_MAX_SENTENCE_LENGTH]}; and more"
@@ -64,8 +64,8 @@ def _format_problem(problem: str) -> str:
 
 
 def suggest_name(word: str, known_names: Iterable[str]) -> str:
-    """Make the clause "; did you mean 'x'" with the known name x that is most similar; empty without a similar name."""
-    compared_names = list(islice(known_names, _MAX_NAMES))  # comparing a name of a million letters would take minutes
+    """Make the clause "; did you mean 'x'" with the most similar of the first `_MAX_NAMES` names; empty without one."""
+    compared_names = list(islice(known_names, _MAX_NAMES))
     matches = (
         get_close_matches(word[:_MAX_WORD_LENGTH], compared_names, n=1)
         or [name for name in compared_names if name.lower() == word.lower()][:1]

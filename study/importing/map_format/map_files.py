@@ -1,5 +1,4 @@
-"""Assign the files of an import to the parts of the recording, or to the clocks (loggers) that wrote them. Called by
-`build_recording` and `map_library`.
+"""Assign the files of an import to the parts of the recording, or to the clocks (loggers) that wrote them.
 
 A recording may be split over files in two ways: one after the other in time (parts), or in parallel, a file for each
 logger with its own clock. The import map states file-name patterns for either way.
@@ -80,8 +79,8 @@ def _assign_parallel(import_map: ImportMap, files: Sequence[Path]) -> PartFiles:
 
 
 def _assign_sequential(import_map: ImportMap, files: Sequence[Path]) -> Iterator[PartFiles]:
-    """Make a part for each file, in the order of the map's parts; all clocks are in the same file. Raises
-    ImportProblemError where no file fits a part."""
+    """Make a part for each file that fits a part of the map, in the order of the map; all clocks are in the same file.
+    Raises ImportProblemError where no file fits a part."""
     for part in import_map.part or (PartMap(),):
         matching_paths = [path for path in files if fnmatchcase(path.name, part.file)]
         if not matching_paths:

@@ -1,6 +1,6 @@
 """Convert the segments of an import map, in seconds or samples, to the segments of a recording, in samples.
 
-Called by `study.importing.build_recording` for each part of the recording (a file, or its arrays with one prefix).
+A part of a recording is a file, or its arrays with one prefix.
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ def _place_segment(segment_map: SegmentMap, command: FloatArray, rate_hz: float)
 
 
 def _find_bounds(segment_map: SegmentMap, sample_count: int, rate_hz: float) -> tuple[int, int]:
-    """Find the first sample, and the sample after the last. Times in seconds take precedence unless 0. Negative samples
+    """Find the first sample, and the sample after the last. Times in seconds take precedence unless 0. Negative bounds
     count from the end of the part; a stop of 0 is its end. Raises ImportProblemError for bounds outside the part."""
     start = round(segment_map.start_s * rate_hz) if segment_map.start_s else segment_map.start
     stop = round(segment_map.stop_s * rate_hz) if segment_map.stop_s else segment_map.stop

@@ -1,7 +1,6 @@
 """Logged event of an answer, with the counters of the device at that moment.
 
 If the program is killed before the measurement of the trial is logged, these counters decide whether the trial counts.
-Made by `study.workflows.trial.trial_events`; part of the events in `events`. Types of fields: `fact_types`.
 """
 
 from typing import Annotated, Literal

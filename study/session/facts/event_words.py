@@ -61,11 +61,6 @@ def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...
     return tuple(lines)
 
 
-def describe_event(event: Event) -> str:
-    """Describe one event alone. Direction and correctness of a trial are left out."""
-    return _describe_in_context(event, {})
-
-
 def _describe_in_context(event: Event, presentations: dict[_PresentationKey, TrialPresented]) -> str:
     """Describe an event in sentences. presentations: those of trials that count, by run, trial and attempt."""
     match event:
@@ -156,7 +151,8 @@ def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted
             mended_text = " An incomplete last line, left by a crash, was removed." if event.mended else ""
             return f"The session was continued, on {_describe_device(event.device)}.{mended_text}"
         case SessionInterrupted():
-            return f"The sitting ended: {_join_lines(event.reason)}. The session can be resumed."
+            # Whether the session can be resumed, later events decide: its line in a list tells that.
+            return f"The sitting ended: {_join_lines(event.reason)}."
         case SessionClosed():
             if event.outcome != "completed":
                 return f"The session is over: {INELIGIBILITY_REASONS[event.outcome]}. The person does not take part."

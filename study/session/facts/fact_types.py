@@ -1,8 +1,7 @@
 """Types of the fields of logged events: constraints on values, which pydantic checks when a log is written and read.
 
 The bounds are chosen wider than the values of any device or person. They keep powers finite, numbers printable, times
-comparable and files inside the session's folder, so that no reader fails on a logged value. Used by all modules of this
-package that define events, and by `study.store.sessions`.
+comparable and files inside the session's folder, so that readers do not fail on a logged value.
 """
 
 import re

@@ -2,8 +2,7 @@
 
 Levels remain forces in newtons, so that cap, steps and rules do not change: a level is the larger of the two forces
 that the directions need for the same acceleration. Both directions therefore reach the cap at the same acceleration.
-The facts are written into the log when a session is opened; `due_trial` and, in `study.workflows.trial`, `demonstrate`
-and `ask_participant` convert levels.
+The facts are written into the log when a session is opened.
 """
 
 from pydantic.dataclasses import dataclass

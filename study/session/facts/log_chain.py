@@ -3,8 +3,7 @@
 The checksum of line n is the first 128 bits of SHA-256(checksum of line n - 1, line feed, bytes of the event). A line
 without checksum (of an older version) enters the hash, too, so that when such a log is continued, the first checksum
 covers all lines before it. There is no key: the chain detects damage, and edits without recomputed checksums; it does
-not prove who wrote a log. Called by `event_log` and `log_seal` of `study.store.sessions`, and by `participant_number`
-and `watch_session` of `study.workflows`, which read logs that another program may be writing.
+not prove who wrote a log.
 """
 
 import hashlib

@@ -1,12 +1,12 @@
 """Elapsed time from a log: by the monotonic clock within a sitting, by the wall clock between sittings.
 
-The wall clock can be set forward and back at any moment; the monotonic clock cannot. Every entry states both, so that
-no exposure limit depends on the wall clock within a sitting. Between sittings only the wall clock is available: setting
-it forward there cannot be distinguished from elapsed time; setting it back is detected and counts as no time.
+The wall clock can be set forward and back at any moment; the monotonic clock cannot. Entries of a sitting state both
+(not in older logs, nor those of another program), so that exposure limits within a sitting do not depend on the wall
+clock. Between sittings only the wall clock is available: setting it forward there cannot be distinguished from elapsed
+time; setting it back is detected and counts as no time.
 
-The monotonic clock stops while the computer sleeps: sleep within a sitting cannot be distinguished from a clock set
-forward. Called where a log is folded into a state (`study.session.state`), written (`study.workflows.trial.sitting`)
-or watched (`study.session.watching`, `study.workflows.views.watch_session`).
+Where the monotonic clock stops while the computer sleeps, as on Linux, sleep within a sitting cannot be distinguished
+from a clock set forward.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Counts of received and lost samples of an accelerometer that has its own clock, logged for each trial.
 
-Made by `study.devices.accelerometer`; a field of the logged events (`study.session.facts.events`).
-
 Where the missing fraction (`missing`) exceeds the limit of the protocol, `study.workflows.trial.judge_trial` makes the
 trial void if the protocol requires the accelerometer, and adds a remark otherwise.
 """

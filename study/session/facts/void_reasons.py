@@ -2,9 +2,7 @@
 
 A computer that is too busy delays the 1 kHz control loop or the screen; trials that are void for this reason are
 repeated. `is_computer_busy` recognises this cause by the text of the logged reason; therefore the texts must not
-change. Used where trials are judged (`judge_trial`, `present_trial`, `timing_verdict`), where void trials are counted
-(`fold_trial`, `session_facts`), where a sitting ends (`run_session`, `end_sitting`), by the safety layer of a device,
-by the screens and by the alarms of `hapteq watch`.
+change.
 """
 
 SCREEN_UNRESPONSIVE = "the screen gave no sign of life"

@@ -1,9 +1,8 @@
 """Vibration dose of the same hand in other sessions of the day.
 
 The daily exposure A(8) of hand-transmitted vibration (ISO 5349-1, `vibration_dose`) adds up over all sessions since
-the last night's rest, not per session. When a sitting begins, `study.workflows.session.other_session_dose` computes the
-dose with `find_dose_elsewhere`; it is logged in the event that begins the sitting, and `state` and `fold` set it in the
-state with `set_dose_elsewhere`.
+the last night's rest, not per session. When a sitting begins, `find_dose_elsewhere` computes the dose of the others; it
+is logged in the event that begins the sitting, and `set_dose_elsewhere` sets it in the state.
 """
 
 from collections.abc import Mapping

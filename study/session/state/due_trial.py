@@ -1,8 +1,7 @@
 """Computation of the next trial: the presentation that follows from protocol, rules, seed and position in the session.
 
 Order: draw direction and polarity, compute the level by the staircase, practice or catch trial, rove the level within
-the safety cap. Called by `state` (`find_due_presentation`), which gives the trial to present to `machine` and the
-values of a logged trial to `fold_trial`, for `presentation_check`.
+the safety cap. The same computation gives the trial to present, and the values that a logged one is checked against.
 """
 
 from dataclasses import dataclass
@@ -47,7 +46,7 @@ class PresentTrial:
     label: int
     """Number of the correct answer: of a direction or, in a detection run, of an interval."""
     direction: int
-    """The protocol's direction to play, 1 or 2; differs from the label where labels are swapped."""
+    """The protocol's direction to play, 1 or 2; may differ from the label (swapped labels, detection run)."""
     angle_deg: float
     """Angle of the direction in the protocol's plane (degrees)."""
     polarity: int

@@ -1,8 +1,7 @@
 """Check of a logged presentation against the presentation that follows from protocol, rules, seed and position.
 
-The state of a session is computed from its log. A log that was written under other rules, or altered, is refused here;
-otherwise it would give a wrong state. Called by `fold_trial`; other modules of this package raise
-`LogContradictionError`.
+The state of a session is computed from its log. A log that was written under other rules, or altered, would give a
+wrong state; where its presentations disagree, it is refused here.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Estimate the progress of a session that the participant sees, from completed runs and the number of trials.
 
 Stimulus levels are not used, because the display would reveal the state of the staircase and so the participant's
-performance. Called by `run_session` (rests) and `present_trial`.
+performance.
 """
 
 import math
@@ -18,7 +18,7 @@ and 110 (pure guessing): only the displayed progress depends on it."""
 TRIALS_PER_REVERSAL = TYPICAL_STAIRCASE_TRIALS / 13
 """Typical number of trials per reversal."""
 RECENT_ANSWERS = 30
-"""Number of the most recent valid trials from which the time per trial is estimated. Chosen by hand."""
+"""Largest number of the most recent valid trials from which the time per trial is estimated. Chosen by hand."""
 MIN_ANSWERS = 8
 """Number of answers in this sitting before which no time is estimated, because the first answers are slow. Chosen by
 hand."""

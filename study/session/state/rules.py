@@ -1,7 +1,6 @@
 """Rules of a session on void trials, refusals and participant numbers, by version of the rules.
 
-Called by `state`, `due_trial` and `fold`; `open_session` of `study.workflows.session` states the version in the opening
-event, and the session keeps it.
+The event that opens a session states the version, and the session keeps it.
 
 Version 1 (older logs, which state none): a void trial is presented with newly drawn direction and polarity, as often as
 requested; a person who refused is asked again when the session is resumed; the participant number is that of the

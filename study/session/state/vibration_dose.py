@@ -1,5 +1,4 @@
-"""Vibration dose of a hand: daily exposure A(8) of hand-transmitted vibration. Called by `sitting_state` and
-`daily_dose`; `machine` and `study.session.watching.make_watch_view` compute A(8) with it.
+"""Vibration dose of a hand: daily exposure A(8) of hand-transmitted vibration.
 
     A(8) = sqrt( (1 / T0) * integral of a_hw(t)^2 dt ),        T0 = 8 h
 

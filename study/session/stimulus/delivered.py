@@ -1,8 +1,7 @@
 """Delivered stimulus of a trial: acceleration along and across the played direction, harmonics, and displacement.
 
 The amplitudes are those of phasors, fitted to the measured acceleration at the stimulus frequency and its harmonics
-(`equalizer.signals.lockin`). Called by `study.workflows`: `present_trial` after each trial, `resume_session` for a
-trial whose measurement was not logged, and `stimulus_sampler` for simulated participants.
+(`equalizer.signals.lockin`).
 """
 
 import math

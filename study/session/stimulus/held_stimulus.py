@@ -1,7 +1,6 @@
-"""The stimulus of a trial in the form that a device plays: a periodic force, repeated until the participant answers.
+"""The stimulus of a trial or probe in the form that a device plays: a periodic force, repeated until it is released.
 
-Made by `stimulus` and `probe_stimulus`, played by `study.devices.device.Device.hold`. The module is separate from
-`stimulus`, which computes the force, so that devices do not depend on equalizers.
+The module is separate from `stimulus`, which computes the force, so that devices do not depend on equalizers.
 """
 
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 @dataclass(frozen=True, slots=True)
 class HeldStimulus:
-    """A force that a device repeats until the answer: a loop of whole periods, with a fade at either end."""
+    """A force that a device repeats until its release: a loop of whole periods, with a fade at either end."""
 
     loop: Signal
     """(n, 3) in N, axes x, y, z, at the device's rate."""
@@ -21,7 +20,7 @@ class HeldStimulus:
     """Duration of the fade-in (s). Not applied to the force of a stimulus with an `onset`. The gain of the virtual
     spring is ramped up over the same time, or over the device's `release_s` if that is longer."""
     fade_out_s: float
-    """Duration of the fade-out (s), which begins when the participant has answered."""
+    """Duration of the fade-out (s), which begins at the release."""
     fade_shape: str
     """Shape of both fades: "raised_cosine" or "linear"."""
     onset: Signal | None = None

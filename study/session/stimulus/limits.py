@@ -1,6 +1,5 @@
 """Safety limits of a sitting or recording, computed from its protocol; the device's safety layer enforces them at every
-tick. Called by `study.workflows` (`device_settings`, `equalize_stimuli`, `record_device`, `check_device`),
-`study.cli.protocol` and `study.evaluation.reproduction.reproduce_playback`.
+tick.
 
 The slew rate is the largest slope that a stimulus of the protocol can have, plus an allowance for the spring:
 
@@ -54,8 +53,8 @@ class Limits:
 
 
 def make_study_limits(protocol: StudyProtocol) -> Limits:
-    """Make the limits of a study, with a slew rate just above that of the steepest stimulus: the highest frequency at
-    the highest level, during a fade."""
+    """Make the limits of a study. The slew rate allows the steepest stimulus, the highest frequency at the highest
+    level during a fade, and the spring."""
     stimulus = protocol.stimulus
     highest_frequency_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
@@ -73,7 +72,7 @@ def compute_highest_level_n(protocol: StudyProtocol) -> float:
 
 
 def make_recording_limits(protocol: RecordingProtocol) -> Limits:
-    """Make the limits of a recording, with a slew rate just above that of its steepest excitation."""
+    """Make the limits of a recording. The slew rate allows its steepest excitation and the spring."""
     slew_rates_n_per_s = [
         (MULTISINE_PEAK_FACTOR if isinstance(segment, MultisineSegment) else 1.0)
         * _bound_slew_n_per_s(find_highest_hz(segment), segment.amplitude_n, protocol.fade_s)

@@ -3,8 +3,7 @@
 Only odd multiples of 1 / period are excited, so that even-order distortion appears at the even lines, and the lines of
 the axes are interleaved, so that one period gives the response to each axis (Pintelon and Schoukens, System
 Identification, 2nd ed., 2012, chapters 2 and 4). A probe is played with the hand on the handle, between trials; a
-reference is longer, at two levels, and played with no hand on the handle. Called by
-`study.workflows.trial.play_probe`.
+reference is longer, at two levels, and played with no hand on the handle.
 """
 
 import numpy as np

@@ -1,7 +1,6 @@
 """Stimulus of a trial from its level: a sinusoid of whole periods along one of the two directions of the task.
 
-`study.workflows` makes each trial's stimulus here before the device holds it. The commanded force (N), or the target
-acceleration (m/s²) where stimuli are equalized, is
+The commanded force (N), or the target acceleration (m/s²) where stimuli are equalized, is
 
     w(t) = A sin(2 pi f t) d,        d = (cos a, sin a) in the protocol's plane, a = symmetry + 45° or - 45°
 

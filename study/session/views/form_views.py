@@ -2,8 +2,7 @@
 the validation and encoding of their answers.
 
 Texts are shown in the participant's language; answers are logged as codes that are the same in every language, so that
-studies in several languages can be analysed together (`encode_answers`). `forms` makes the forms from a protocol, and
-encodes their answers for the log; `form_entry`, the screens and the line mode (`study.tui`) fill them in.
+studies in several languages can be analysed together (`encode_answers`). `forms` makes the forms from a protocol.
 """
 
 import re

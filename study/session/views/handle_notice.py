@@ -1,7 +1,4 @@
-"""Safety notices before a real device moves: whether a hand may be on the handle, largest force, duration.
-
-Used by the workflows that move a device: recordings, equalizer playbacks and the test of the force limit.
-"""
+"""Safety notices before a real device moves: whether a hand may be on the handle, largest force, duration."""
 
 from collections.abc import Callable
 

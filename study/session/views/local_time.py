@@ -1,8 +1,6 @@
 """Format logged UTC times as local time with the offset from UTC, for screens, command-line tables and messages.
 
-Logs, tables and JSON contain UTC. The time zone is an argument, because this package does not read settings of the
-computer; callers outside it (`study.tui`, `study.cli`, `study.workflows`, `study.evaluation`) pass
-`study.local_clock.convert_to_machine_zone`.
+The time zone is an argument, such as `study.local_clock.convert_to_machine_zone`.
 """
 
 from collections import Counter
@@ -18,16 +16,15 @@ TimePrecision = Literal["minutes", "seconds"]
 
 
 def to_utc(time: datetime) -> datetime:
-    """Convert a time to UTC, the time zone of logs and JSON; a time without offset is taken as the computer's local
-    time."""
+    """Convert a time to UTC; a time without offset is taken as the computer's local time."""
     return time.astimezone(UTC)
 
 
 def format_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "minutes") -> str:
     """Format date, time and offset, such as "2026-11-22 14:05 +01:00".
 
-    utc: ISO 8601; without an offset it is taken as UTC. A text that is no time, or cannot be converted, is returned
-    unchanged.
+    utc: ISO 8601; without an offset it is taken as UTC. A text that cannot be converted is returned without
+    surrounding blanks.
     """
     return " ".join(split_time_in_zone(utc, zone, precision)).strip()
 
@@ -45,7 +42,7 @@ def split_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "seconds
 
 
 def format_times_in_zone(utc_times: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
-    """Format UTC times as a column of a table. Returns the most frequent offset, for the header ("" without times), and
+    """Format UTC times as a column of a table. Returns the most frequent offset, for the header ("" without one), and
     each time, with its own offset where that differs, such as in daylight saving time."""
     local_times = [split_time_in_zone(utc, zone, "minutes") for utc in utc_times]
     offsets = Counter(offset for _, _, offset in local_times if offset)

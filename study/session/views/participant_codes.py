@@ -1,18 +1,13 @@
-"""Validation and suggestion of participant codes, with the same rule for screens, command line and stored files.
-
-A code is 1 to 16 ASCII letters and digits with at least one digit, such as P01. Called by the form of a new session
-(`study.tui`), `study.workflows.views.plan_study` and `study.store.sessions.archive`.
-"""
+"""Validation and suggestion of participant codes: 1 to 16 ASCII letters and digits with at least one digit."""
 
 import re
 
 CODE_RULE = "a code has 1 to 16 letters and digits, at least one digit, such as P01"
-"""Rule of a valid code in words, for messages."""
+"""The rule in words, for messages."""
 
 _CODE_PATTERN = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
-"""Matches a valid code."""
 _NUMBERED_CODE_PATTERN = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
-"""Matches a code of letters and then 1 to 9 digits, from which the next code can be derived."""
+"""Matches a code of letters (or none) and then 1 to 9 digits, from which the next code can be derived."""
 
 
 def is_code(text: str) -> bool:
@@ -30,7 +25,7 @@ def explain_invalid_code(text: str) -> str:
 
 
 def suggest_code(used_codes: tuple[str, ...]) -> str:
-    """Suggest the next code. The latest code of letters and a number (such as P07) sets the letters and the least
+    """Suggest the next code. The latest code such as P07 (`_NUMBERED_CODE_PATTERN`) sets the letters and the least
     number of digits; the number is one more than the highest that was used with these letters. P01 if there is no such
     code, or if the result were longer than 16 characters. used_codes: the latest first."""
     for code in used_codes:

@@ -1,15 +1,12 @@
 """Replace non-printable characters in text from files by blanks, before it is shown in a terminal.
 
-Control characters in a note or a damaged file could otherwise move the cursor or clear the screen. The functions that
-build views (`study.workflows.views`) call `make_printable` on their result; `cli.look` and the form of a new session
-call `replace_unprintable` on single texts.
+Control characters in a note or a damaged file could otherwise move the cursor or clear the screen.
 """
 
 import dataclasses
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-"""Type of the view that is copied."""
 
 
 def replace_unprintable(text: str) -> str:
@@ -20,7 +17,7 @@ def replace_unprintable(text: str) -> str:
 
 
 def make_printable(view: T) -> T:
-    """Copy a value of nested dataclasses and tuples, with `replace_unprintable` applied to every string in them; values
+    """Copy a value of nested dataclasses and tuples, with `replace_unprintable` applied to the strings in them; values
     of other types, lists and dictionaries included, are kept unchanged."""
     printable_view: T = _replace_in_value(view)
     return printable_view

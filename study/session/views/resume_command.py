@@ -1,18 +1,13 @@
-"""Command line that resumes an unfinished session, for messages after a sitting or a failure of its process.
-
-Called by `run_session`, `end_sitting` and `plan_sitting` of `study.workflows.session`, by `study.cli.watch` and
-`study.tui.engine.client`; the form of a new session (`new_session_form`) uses `SIMULATED_DEVICE`.
-"""
+"""Command line that resumes an unfinished session, for messages."""
 
 SIMULATED_DEVICE = "simulated"
 """Name of the simulated device, which `hapteq resume` opens without the option --device. Equal to
-`study.devices.opening.SIMULATED`, which this package and the screens must not import, because they load no drivers."""
+`study.devices.opening.SIMULATED`, which is not imported, because this package loads no drivers."""
 
 
 def find_device_option(logged_name: str, simulated: bool) -> str:
-    """Find the name, as `open_device` takes it, of a session's device from its log: for a real one the vendor's name
-    without its dot; the simulated device for any other, because a log does not name the file of a replay. Without it
-    the command would open the simulated device, on which a session of a real one is refused."""
+    """Find the name, as `open_device` takes it, of the device that a session's log names: for a real one the vendor's
+    name without dots; otherwise the simulated device, because a log does not name the file of a replay."""
     return SIMULATED_DEVICE if simulated else logged_name.replace(".", "")
 
 

@@ -1,8 +1,7 @@
-"""Live state of a running session, for viewers in other terminals.
+"""Live state of a running session, for viewers in other processes.
 
-`study.workflows.trial.session_supervisor` makes it several times a second, and `study.store.sessions.live_file` writes
-it to `live.json` beside the log, where it replaces the previous state. No result depends on it: the record of a session
-is its log.
+It is written to `live.json` beside the session's log (`study.store.sessions.live_file`), where it replaces the previous
+state. No result depends on it: the record of a session is its log.
 """
 
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ Activity = Literal[
     "preparing", "form", "instructions", "demo", "waiting for the handle", "trial", "rest", "pause", "idle",
     "probe", "reference",
 ]  # fmt: skip
-"""Present activity of the session. `idle`: between two trials; `probe`, `reference`: measurements between trials."""
+"""Present activity of the session. `idle`: between two actions; `probe`, `reference`: measurements of the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,20 +19,20 @@ class LiveState:
     """Present state of a session. It contains no direction of a stimulus, because it can be read during a trial."""
 
     utc: str
-    """Time of this state (UTC, ISO 8601)."""
+    """Time of this state (ISO 8601)."""
     activity: Activity
     since_utc: str
-    """Time at which this activity began (UTC, ISO 8601)."""
+    """Time at which this activity began (ISO 8601)."""
     fault: str
     """Fault of the device in words; empty without a fault."""
     offset_mm: float | None
     """Distance of the handle from the position at which trials start (mm); None where its position is unknown."""
     handle_ready: bool
-    """Whether the handle is within the gate (the radius within which a trial may start); true without a gate."""
+    """False while a session waits for the handle to be within the radius at which a trial may start."""
     acceleration_mps2: float | None
     """Norm of the last reading of the accelerometer (m/s²); None without a reading."""
     sensor_clipped: bool
-    """Whether the accelerometer is at the limit of its range."""
+    """Whether a channel of the accelerometer is at the limit of its range."""
     missed_ticks: int
     """Number of missed ticks of the control loop in the present stimulus."""
     monotonic_s: float | None = None

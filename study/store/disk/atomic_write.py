@@ -1,7 +1,4 @@
-"""Atomic writes: a file appears under its final name complete and synced to disk, or not at all.
-
-Called by the writers of result files (text, HDF5, WAV, images), so that a crash or a full disk leaves no partial file.
-"""
+"""Atomic writes: a file appears under its final name complete and synced to disk, or not at all."""
 
 import os
 import secrets
@@ -15,8 +12,8 @@ from study.store.disk.privacy import choose_file_mode
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
     """Write `content` to a temporary file in the same folder, sync it, and move it to `path`; its mode is
     `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyExistsError if the file exists and is
-    not to be replaced, CannotWriteError for any error of the operating system, also where the file is in place and only
-    the sync of the folder failed; the temporary file is then removed."""
+    not to be replaced, CannotWriteError for an error of the operating system, also where the file is in place and only
+    the sync of the folder failed. After an error the temporary file is removed."""
     temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not overwrite:
@@ -48,9 +45,9 @@ def sync_folder(folder: Path) -> None:
 
 
 def _move_into_place(temporary_path: Path, path: Path, overwrite: bool) -> None:
-    """Move the complete file to `path` (without `overwrite`: link it there). Without `overwrite`, raises
-    AlreadyExistsError if `path` exists; on file systems without hard links, a file that another program creates between
-    the check and the move is replaced. Other errors are OSError."""
+    """Move the complete file to `path`. Without `overwrite`, raises AlreadyExistsError if `path` exists; on file
+    systems without hard links, a file that another program creates between the check and the move is replaced. Other
+    errors are OSError."""
     if overwrite:
         temporary_path.replace(path)
         return

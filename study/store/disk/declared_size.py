@@ -1,25 +1,23 @@
 """Limit of the size that a file declares for its contents, checked before memory is allocated.
 
 A small damaged or malicious file can declare gigabytes. The limit is `MAX_EXPANSION` times the bytes on the disk, but
-at least `MIN_LIMIT_BYTES` and at most `MAX_LIMIT_BYTES`. For comparison: an hour of nine channels at 10 kHz in float64
-has 2.6 GB. Called by `hdf5_contents` and the readers in `study.importing.arrays`.
+at least `MIN_LIMIT_BYTES` and at most `MAX_LIMIT_BYTES`.
 """
 
 MIN_LIMIT_BYTES = 2**27
-"""Declared bytes that every file may have (128 MiB). Chosen: 1.8 million samples of nine channels in float64."""
+"""Least limit (128 MiB). Chosen: 1.8 million samples of nine channels in float64."""
 MAX_EXPANSION = 100
-"""Largest accepted ratio of declared bytes to bytes on the disk. Chosen: compressed measurements stay below it."""
+"""Limit of the ratio of declared bytes to bytes on the disk. Chosen: compressed measurements stay below it."""
 MAX_LIMIT_BYTES = 2**32
-"""Largest number of declared bytes of any file (4 GiB). Chosen: more than the hour of recording above."""
+"""Greatest limit (4 GiB). Chosen: more than an hour of nine channels at 10 kHz in float64 (2.6 GB)."""
 
 
 class DeclaredSizeError(ValueError):
-    """A file declares more bytes than its limit. The message is a clause without a full stop, for `UnusableFileError`
-    and `ImportRefusedError`."""
+    """A file declares more bytes than its limit. The message is a clause without a full stop."""
 
 
 class SizeLimit:
-    """Sum and limit of the declared bytes of one file. file_bytes: its size on the disk; `limit_bytes`: the limit."""
+    """Sum and limit of the declared bytes of one file. file_bytes: its size on the disk."""
 
     def __init__(self, file_bytes: int) -> None:
         self.limit_bytes = min(MAX_LIMIT_BYTES, max(MIN_LIMIT_BYTES, MAX_EXPANSION * file_bytes))

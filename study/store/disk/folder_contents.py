@@ -1,9 +1,5 @@
 """Read the files of a folder into memory, and write them to another folder: transfer between processes without a
-common disk.
-
-Called where work on many folders is distributed over processes: `study.evaluation.bank.ask_engine`,
-`study.evaluation.real.real_recordings`, `study.workflows.session.rehearse_study`.
-"""
+common disk."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +12,7 @@ FileContents = dict[str, bytes]
 
 
 def read_files(folder: Path) -> FileContents:
-    """Read all files below the folder; empty for a folder that is empty or missing. Links to files are followed, links
+    """Read the files below the folder; empty for a folder that is empty or missing. Links to files are followed, links
     to folders are not; subfolders without read permission are skipped. Raises CannotReadError where a file cannot be
     read."""
     try:
@@ -27,7 +23,7 @@ def read_files(folder: Path) -> FileContents:
 
 
 def read_file(path: Path) -> FileContents:
-    """Read a single file; its key is its name without folders. Raises CannotReadError where it cannot be read."""
+    """Read a single file; its key is its name without folders. Raises CannotReadError."""
     try:
         return {path.name: path.read_bytes()}
     except OSError as problem:

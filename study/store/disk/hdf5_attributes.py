@@ -1,8 +1,7 @@
 """Attributes of HDF5 files as Python values, independent of whether they are stored as scalars or as arrays.
 
 Values of another type or number, empty attributes (null dataspace) and those with more than `_MAX_ENTRIES` entries are
-refused with a message that names the attribute and its object. Called by `hdf5_file` and the HDF5 formats in
-`study.store.formats`. `owner` is the file, group or dataset with the attribute.
+refused with an `AttributeProblemError`. `owner` is the file, group or dataset with the attribute.
 """
 
 import math
@@ -14,17 +13,15 @@ import numpy as np
 _MAX_ENTRIES = 1000
 """Largest number of entries of an attribute that is read. Chosen: bounds the memory of a damaged file."""
 _MAX_SHOWN_CHARACTERS = 100
-"""Largest number of characters of a value that a message shows. Chosen: about a line."""
+"""Largest number of characters of a value in a message. Chosen: about a line."""
 
 
 class AttributeProblemError(ValueError):
-    """An attribute is missing, too large, or of another type. The message is a sentence fragment for
-    `UnusableFileError`."""
+    """An attribute is missing, empty, too large, or of another type. The message is a sentence fragment."""
 
 
 def read_text_attribute(owner: Any, name: str, default: str | None = None) -> str:
-    """Read a single text. Raises AttributeProblemError if it is missing and has no default, or is not exactly one
-    text."""
+    """Read a single text. Raises AttributeProblemError if it is missing and has no default, or is not one text."""
     texts = read_texts_attribute(owner, name, None if default is None else (default,))
     if len(texts) != 1:
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} holds {len(texts)} texts; it must be one")
@@ -33,7 +30,7 @@ def read_text_attribute(owner: Any, name: str, default: str | None = None) -> st
 
 def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
     """Read one text or a list of texts, as a tuple. Raises AttributeProblemError if it is missing and has no default,
-    or is not text in UTF-8."""
+    is empty or too large, or is not text in UTF-8."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
@@ -55,8 +52,8 @@ def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None 
 def read_numbers_attribute(
     owner: Any, name: str, count: int, default: tuple[float, ...] | None = None
 ) -> tuple[float, ...]:
-    """Read `count` numbers as floats; a single number may be a scalar or a list of length 1. Raises
-    AttributeProblemError if it is missing and has no default, or holds another number of values or other types."""
+    """Read `count` numbers as floats. Raises AttributeProblemError if they are missing and have no default, or the
+    attribute holds another number of values or another type."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
@@ -78,7 +75,7 @@ def collapse_single_text(texts: tuple[str, ...]) -> str | tuple[str, ...]:
 
 
 def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
-    """Write an attribute of an HDF5 object: a text, or a list of texts; an existing one is replaced."""
+    """Write an attribute: a text, or a list of texts; an existing one is replaced."""
     if isinstance(texts, str):
         owner.attrs[name] = texts
     else:
@@ -86,7 +83,7 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
 
 
 def _read_value(owner: Any, name: str) -> Any:
-    """Read the value as h5py gives it. Raises AttributeProblemError, before memory is allocated, if it is too large."""
+    """Read the value as h5py gives it, unless it is empty or too large; that raises AttributeProblemError."""
     shape = owner.attrs.get_id(name).shape
     if shape is None or math.prod(shape) > _MAX_ENTRIES:
         raise AttributeProblemError(
@@ -102,6 +99,6 @@ def _shorten_value(value: Any) -> str:
 
 
 def _describe_attribute(owner: Any, name: str) -> str:
-    """Name the attribute and its object, for messages."""
+    """Name the attribute, and its object unless that is the file, for messages."""
     owner_name = owner.name.strip("/")
     return f"the attribute '{name}' of {owner_name}" if owner_name else f"the attribute '{name}'"

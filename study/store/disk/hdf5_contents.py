@@ -2,7 +2,7 @@
 
 A file from another person may refer to other files on this computer (external links, external storage, virtual
 datasets), or declare datasets that exceed the memory when they are decompressed; both are refused. `declared_size`
-states the size limit. Called by `hdf5_file` for every HDF5 file, and by `study.importing.arrays.npz_hdf5_arrays`.
+states the size limit.
 """
 
 import math
@@ -17,7 +17,7 @@ from study.store.disk.declared_size import MIN_LIMIT_BYTES, DeclaredSizeError, S
 MAX_OBJECTS = 100_000
 """Largest accepted number of groups and datasets in a file. Chosen: bounds time and memory of the checks."""
 _COMPRESSION_FILTERS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
-"""HDF5 filters that compress, so that data in memory exceed those on the disk. At most one per dataset is accepted."""
+"""HDF5 filters that compress. At most one per dataset is accepted."""
 _PYTHON_OBJECT_BYTES = 1024
 """Size (bytes) that is assumed for an element read as a Python object: a variable-length text, a reference or a row of
 a table. Chosen as an upper estimate for short texts."""
@@ -26,9 +26,9 @@ _MAX_DEFLATE_RATIO = 1032
 
 
 def check_contents(file: Any) -> None:
-    """Check all datasets of an open file (`h5py.File`). Raises ValueError where a dataset or link lies in another file,
-    a dataset is compressed more than once, or the file has more than `MAX_OBJECTS` objects; DeclaredSizeError, a
-    ValueError, where the declared sizes exceed the limit. The messages are sentence fragments."""
+    """Check the datasets of an open file (`h5py.File`). Raises ValueError where a dataset or the target of a link lies
+    in another file, a dataset is compressed more than once, or the file has more than `MAX_OBJECTS` objects;
+    DeclaredSizeError, a ValueError, where sizes exceed the limit. The messages are sentence fragments."""
     size_limit = SizeLimit(file.id.get_filesize())
     for name, dataset in iterate_datasets(file):
         _check_dataset(name, dataset, size_limit)
@@ -63,8 +63,8 @@ def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
 
 def _check_dataset(name: str, dataset: Any, size_limit: SizeLimit) -> None:
     """Raise ValueError where the samples lie in other files or are compressed more than once, DeclaredSizeError where
-    the declared sizes with this dataset, or one of its chunks alone, exceed the limit. size_limit: the size of the
-    dataset is added to it."""
+    the declared sizes with this dataset, or one of its chunks alone, exceed the limit (see also `_check_chunks`).
+    size_limit: the size of the dataset is added to it."""
     properties = dataset.id.get_create_plist()
     if properties.get_layout() == h5py.h5d.VIRTUAL or properties.get_external_count():
         raise ValueError(f"the samples of {name} lie in other files; copy them into this one")
@@ -86,9 +86,9 @@ def _check_dataset(name: str, dataset: Any, size_limit: SizeLimit) -> None:
 
 
 def _check_chunks(name: str, dataset: Any, chunk_bytes: int) -> None:
-    """Raise DeclaredSizeError where a chunk of a deflated dataset decompresses to at least twice `chunk_bytes`, its
-    declared size. The HDF5 library decompresses a chunk completely, independent of its declared size; chunks that may
-    exceed `MIN_LIMIT_BYTES` are therefore decompressed here first, up to twice the declared size."""
+    """Raise DeclaredSizeError where a chunk of a deflated dataset decompresses to at least twice `chunk_bytes`, the
+    memory for its declared size. The HDF5 library decompresses a chunk completely, independent of its declared size;
+    chunks that may exceed `MIN_LIMIT_BYTES` are therefore decompressed here first, up to that bound."""
 
     large_chunk_offsets: list[tuple[int, ...]] = []
 

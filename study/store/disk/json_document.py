@@ -1,7 +1,6 @@
 """Read and write the JSON documents of hapteq: objects with `format`, `version` and, for results, `provenance`.
 
-Documents are written atomically; numbers are finite (`strict_json`). Called by the JSON formats of
-`study.store.formats` and `study.store.sessions`, and by workflows and evaluations that write results.
+Documents are written atomically; numbers are finite (`strict_json`).
 """
 
 import json
@@ -25,8 +24,8 @@ def write_json(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Write a document. payload: JSON values, in addition to format, version and provenance. Its keys "format" and
-    "version" replace the arguments; its "provenance" is replaced by the argument, unless that is None.
+    """Write a document. payload: JSON values. Its keys "format" and "version" replace the arguments; its "provenance"
+    is replaced by the argument, unless that is None.
 
     Raises ValueError for NaN and infinity, which JSON does not have (write null), AlreadyExistsError where the file
     exists unless `overwrite`, CannotWriteError where it cannot be written.

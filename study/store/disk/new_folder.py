@@ -1,8 +1,6 @@
 """Create a result folder atomically: it appears complete or not at all, and is never mixed with existing files.
 
-The results are written into a hidden temporary folder in the same parent folder, which is synced to disk and renamed at
-the end. Called by commands that write a folder of results (diagnosis, export, played contacts, rehearsed sessions,
-answers of evaluations).
+The results are written into a hidden temporary folder in the same parent folder, which is renamed at the end.
 """
 
 import errno
@@ -55,8 +53,8 @@ def require_new_folder(folder: Path) -> None:
 @contextmanager
 def create_new_folder(folder: Path) -> Iterator[Path]:
     """Yield a temporary folder for the results, which is renamed to `folder` at the end of the context; after an
-    exception it is removed. Raises StudyError as `require_new_folder` does, at the beginning and before renaming, and
-    CannotWriteError where a folder cannot be created, synced or renamed."""
+    exception in the context it is removed. Raises StudyError as `require_new_folder` does, at the beginning and before
+    renaming, and CannotWriteError where a folder cannot be created, synced or renamed."""
     require_new_folder(folder)
     temporary_folder = folder.absolute().with_name(f".{folder.absolute().name}.{secrets.token_hex(4)}.part")
     try:

@@ -1,7 +1,6 @@
 """Provenance of a result: versions, command, protocol, seeds, settings, and input files with their checksums.
 
-It contains no paths of the computer and no dates, so that the same work gives the same file. Gathered by every command
-that writes a result.
+It contains neither folders of the computer nor the time of the work, so that repeated work gives the same file.
 """
 
 import hashlib
@@ -33,23 +32,22 @@ class InputFile:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Origin of a result, as it is written into the result's file."""
+    """Origin of a result."""
 
     versions: Mapping[str, str]
-    """Version of Python and of each of `PACKAGES`."""
+    """As in `list_versions`."""
     command: tuple[str, ...]
     """Command line, with paths reduced to file names."""
     protocol_hash: str | None = None
     """Hash of the protocol; None where none was used."""
     seeds: Mapping[str, int] | None = None
-    """Seeds of random numbers, by their use."""
+    """By their use."""
     settings: Mapping[str, float | None] | None = None
     """Values of the options on which the result depends, in the unit that the name of the option states."""
     parents: tuple[InputFile, ...] = ()
-    """Input files of the result."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert to plain values for JSON, TOML and HDF5; fields that are None are left out."""
+        """Convert to JSON values; fields that are None are left out."""
         values = asdict(self)
         values["command"] = list(self.command)
         values["parents"] = list(values["parents"])
@@ -102,8 +100,7 @@ def compute_sha256(path: Path) -> str:
 
 @cache
 def _find_version(package: str) -> str:
-    """Find the version of a package; "not installed" without it. Cached, because it does not change while the program
-    runs."""
+    """Find the version of a package; "not installed" without it."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -111,7 +108,7 @@ def _find_version(package: str) -> str:
 
 
 def _remove_folders(argument: str) -> str:
-    """Reduce a path in an argument, also one after `--option=`, to its last part; other arguments are unchanged."""
+    """Reduce a path in an argument, also one after `--option=`, to its last part; replace invalid bytes."""
     option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
     value_name = PurePath(value).name if "/" in value or "\\" in value else value
     return replace_invalid_bytes(option + equals + value_name)

@@ -2,8 +2,7 @@
 
 Entries are addressed relative to the descriptor; a symbolic link that another program puts in place of a folder in the
 meantime cannot redirect the erasure. On systems without such calls (Windows) paths are used, and links are only
-checked beforehand. Called by `privacy`, which restricts access rights, by the withdrawal of a participant, and by
-readers that accept no links.
+checked beforehand.
 """
 
 import os
@@ -27,7 +26,7 @@ def is_real_file(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class OpenedFolder:
-    """An open folder; its entries are addressed relative to its descriptor, where the system can."""
+    """An open folder."""
 
     path: Path
     descriptor: int | None
@@ -38,8 +37,8 @@ class OpenedFolder:
         return sorted(os.listdir(self.path if self.descriptor is None else self.descriptor))  # noqa: PTH208
 
     def erase(self, name: str) -> None:
-        """Erase an entry: a file, a link (not its target), or a folder with its contents. No error if it does not
-        exist; raises OSError otherwise."""
+        """Erase an entry: a file, a link (not its target), or a folder with its contents. Raises OSError, but not if it
+        does not exist."""
         with suppress(FileNotFoundError):
             if stat.S_ISDIR(
                 os.stat(self._format_entry_path(name), dir_fd=self.descriptor, follow_symlinks=False).st_mode
@@ -69,11 +68,8 @@ class OpenedFolder:
 
 @contextmanager
 def open_folder(start_folder: Path | OpenedFolder, *names: str) -> Iterator[OpenedFolder]:
-    """Open the folder `start_folder`, or the one reached from it by `names`, level by level, for the context.
-
-    Folders opened here are closed at the end. Raises OSError: NotADirectoryError where a level is a link or no folder,
-    FileNotFoundError where it is missing.
-    """
+    """Open the folder `start_folder`, or the one reached from it by `names`, level by level, for the context. Raises
+    OSError: NotADirectoryError where a level is a link or no folder, FileNotFoundError where it is missing."""
     folder = _open_without_links(start_folder, None) if isinstance(start_folder, Path) else start_folder
     opened_folders = [] if folder is start_folder else [folder]
     try:
@@ -88,8 +84,8 @@ def open_folder(start_folder: Path | OpenedFolder, *names: str) -> Iterator[Open
 
 
 def _open_without_links(path: Path, parent_descriptor: int | None) -> OpenedFolder:
-    """Open a folder that is no link. parent_descriptor: of the folder that contains it; None: by its path. Raises
-    OSError, NotADirectoryError for a link or no folder."""
+    """Open a folder that is no link. parent_descriptor: of the folder that contains it; None: by its path. Raises as
+    `open_folder`."""
     if os.open not in os.supports_dir_fd:
         if not is_real_folder(path):
             raise NotADirectoryError(f"{path.name} is a link or no folder")

@@ -1,8 +1,6 @@
 """Parse JSON strictly: NaN, infinity, duplicate keys, lone surrogates, deep nesting and huge numbers are refused.
 
-The JSON module of Python accepts most of them; they would fail later, in other code or in other programs. Called by the
-readers of JSON files (such as `json_document` and `live_file`), of JSON texts in files of other formats, and of
-imported JSON data.
+The JSON module of Python accepts most of them; they would fail later, in other code or in other programs.
 """
 
 import json
@@ -16,8 +14,8 @@ _MAX_DIGITS = 40
 
 
 def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
-    """Parse a JSON document. with_nan: accept NaN, Infinity and -Infinity. Raises ValueError, with a sentence fragment,
-    for invalid JSON, bytes that are no Unicode text, and everything that the module refuses; no other exception."""
+    """Parse a JSON document. with_nan: accept NaN, Infinity and -Infinity. Raises ValueError for invalid JSON, bytes
+    that are no Unicode text, and what the module refuses."""
     try:
         document = json.loads(
             text,
@@ -33,8 +31,8 @@ def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
 
 
 def _check_document(document: Any) -> None:
-    """Raise ValueError for a value deeper than `MAX_DEPTH` and for a text or key with a lone surrogate. Iterative, so
-    that deep nesting cannot exceed the recursion limit."""
+    """Raise ValueError for a value or key deeper than `MAX_DEPTH`, or with a lone surrogate. Iterative, so that deep
+    nesting cannot exceed the recursion limit."""
     pending_values = [(document, 0)]
     while pending_values:
         value, depth = pending_values.pop()

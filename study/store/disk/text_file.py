@@ -1,5 +1,4 @@
-"""Read and write UTF-8 text files; errors are `StudyError`s with advice for the user. Called by the readers and writers
-of text formats in `study.store`, `study.workflows`, `study.evaluation` and `study.importing`.
+"""Read and write UTF-8 text files; errors are `StudyError`s with advice for the user.
 
 TOML files are limited in size and in the number of parts of a dotted key before they are parsed: the parser's time
 grows with the square of that number, so that a small hostile file could block the program.
@@ -48,9 +47,9 @@ overlap, so that the time of the search is linear in the length of the file."""
 
 
 def read_toml_text(path: Path, kind: str) -> str:
-    """Read the text of a TOML file and check its keys; it is not parsed. kind: name of such files in messages. Raises
-    CannotReadError where the file cannot be read as text or exceeds `MAX_TOML_BYTES`, UnusableFileError where a dotted
-    key has more than `MAX_KEY_PARTS` parts."""
+    """Read the text of a TOML file, without parsing it. kind: name of such files in messages. Raises CannotReadError
+    where the file cannot be read as text or exceeds `MAX_TOML_BYTES`, UnusableFileError where a dotted key has more
+    than `MAX_KEY_PARTS` parts."""
     text = read_text(path, MAX_TOML_BYTES)
     if problem := find_long_key(text):
         raise UnusableFileError(path, kind, (problem,))

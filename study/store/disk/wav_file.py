@@ -1,4 +1,4 @@
-"""Write WAV audio files: mono, 16-bit PCM. Called by `study.workflows.session.write_masking_noise`."""
+"""Write WAV audio files: mono, 16-bit PCM."""
 
 import io
 import wave

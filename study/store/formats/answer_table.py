@@ -1,8 +1,4 @@
-"""Table of the answers to a protocol's questionnaires, for exported data: a row per session, a column per question.
-
-`study.workflows.results.export_study` makes the table; the exports `tidy_csv`, `psych_ds`, `bids_behaviour` and
-`trials_mat` write it, and describe the columns by the text of the questions.
-"""
+"""Table of the answers to a protocol's questionnaires, for exported data: a row per session, a column per question."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +13,13 @@ FORM_NAMES = {"before": "questionnaire", "debrief": "debrief"}
 
 @dataclass(frozen=True, slots=True)
 class FilledForm:
-    """A filled form as logged: one event of the session log."""
+    """A filled form, as in the session log."""
 
     subject: str
     """Code of the participant."""
     session: str
-    """Name of the session."""
     form: str
-    """Name of the form, as in `FORM_NAMES`."""
+    """Name of the form, such as a value of `FORM_NAMES`."""
     answers: Mapping[str, str]
     """Logged answer by the key of the question."""
 
@@ -36,7 +31,6 @@ class AnswerColumn:
     table: str
     """The protocol's table with this question: a key of `FORM_NAMES`."""
     question: Question
-    """The question as the protocol defines it."""
 
     @property
     def name(self) -> str:
@@ -62,7 +56,7 @@ class AnswerColumn:
 
 @dataclass(frozen=True, slots=True)
 class AnswerTable:
-    """Answers to the protocol's questions: a row per session, a column per question."""
+    """Answers to the protocol's questions."""
 
     columns: tuple[AnswerColumn, ...] = ()
     rows: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
@@ -70,7 +64,6 @@ class AnswerTable:
 
     @property
     def header(self) -> tuple[str, ...]:
-        """Names of the columns: subject, session, and those of the questions."""
         return ("subject", "session", *(column.name for column in self.columns))
 
     def as_csv(self) -> str:
@@ -80,7 +73,7 @@ class AnswerTable:
 
 
 def make_answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], include_free_text: bool) -> AnswerTable:
-    """Make the table of all sessions with a filled form of `FORM_NAMES`; without rows where it has no columns.
+    """Make the table of the sessions with a filled form of `FORM_NAMES`; without rows where it has no columns.
 
     forms: in the order of logging; of two answers to the same question in a session, the later one counts.
     include_free_text: whether to include free-text answers, which may contain health data or names of persons.

@@ -1,8 +1,7 @@
 """Calibrations of a linkage as HDF5: the format `hapteq-calibration`, version 1.
 
 A calibration is the device's own kinematics and dynamics over a grid of handle positions: joint angles, Jacobian,
-inertia and gravity force, in SI units. `LAYOUT` lists the contents with shapes and units. Written by
-`hapteq calibrate`; read by `study.devices.rigs_by_name` for simulated devices, `hapteq twin` and `hapteq validate`.
+inertia and gravity force, in SI units. `LAYOUT` lists the contents with shapes and units.
 """
 
 import json
@@ -50,16 +49,16 @@ LAYOUT = (
     Entry("difference", "attribute, number", "largest relative difference of J from finite differences"),
     Entry("provenance", "attribute, JSON text", "versions, command", False),
 )
-"""Contents of the file: checked by tests, and listed in docs/formats.md."""
+"""Contents of the file, as docs/formats.md lists them."""
 
 ARRAY_NAMES = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n", "filled")
 """Datasets of the file, in the order in which they are written."""
 ARRAY_SHAPES = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)", "filled": "(positions)"}
-"""Shapes in words, for messages; all other arrays are (positions, 3)."""
+"""Shapes in words, for messages; the other arrays are (positions, 3)."""
 
 
 def read_calibration(path: Path) -> LinkageCalibration:
-    """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems of the file."""
+    """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with the problems of the file."""
     problems = ProblemCollector()
     with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
         fields = _read_fields(file, problems)
@@ -76,7 +75,7 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
     CannotWriteError."""
 
     def fill_file(file: Any) -> None:
-        """Write attributes and datasets (with Fletcher-32 checksums) into the open HDF5 file."""
+        """Write attributes and datasets into the open HDF5 file."""
         file.attrs.update({"format": FORMAT, "version": VERSION, "difference": calibration.difference})
         for name in ("device", "details", "read_on", "line_deg", "asymmetry"):
             file.attrs[name] = getattr(calibration, name)
@@ -88,11 +87,11 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
 
 
 def _read_fields(file: Any, problems: ProblemCollector) -> dict[str, Any]:
-    """Read the fields of `LinkageCalibration`; where a part is missing or wrong, the problem is recorded and a
-    placeholder returned."""
+    """Read the fields of `LinkageCalibration`, with a placeholder where a part is missing or wrong; the problem is
+    recorded."""
 
     def read_array(name: str) -> FloatArray:
-        """Read a dataset of the shape in `ARRAY_SHAPES`; an empty array where it is wrong."""
+        """Read a dataset; an empty array where it is wrong."""
         shape = ARRAY_SHAPES.get(name, "(positions, 3)")
         return problems.attempt(lambda: read_float_dataset(file, name, shape), np.empty(0))
 

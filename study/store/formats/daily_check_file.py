@@ -1,7 +1,7 @@
 """Result of a daily check of a device: the format `hapteq-daily-check`, version 1 (JSON).
 
 A daily check compares the friction, gain, response and noise in a recording of today with those in an accepted earlier
-recording (the baseline). Called by `study.workflows.checks.daily_check`, and by `hapteq validate` and `hapteq show`.
+recording (the baseline).
 """
 
 import json
@@ -29,21 +29,19 @@ class DailyCheck:
     details: str
     """Serial number, firmware and SDK version of the device, in words."""
     utc: str
-    """Time of the check (UTC, ISO 8601)."""
+    """Time at which the check ended (UTC, ISO 8601)."""
     passed: bool
-    """Whether no quantity changed beyond its limit."""
+    """Whether each quantity was measured accurately enough, and none changed beyond its limit."""
     sentences: tuple[str, ...]
-    """One sentence for each kind of change, as shown to the user; or why the check was aborted."""
+    """On each kind of change, in words; or why the check was aborted."""
     changes: tuple[dict[str, Any], ...]
-    """The compared quantities: kind, axis, value of the baseline and of today, standard error, limit, unit, whether it
-    changed, and band."""
+    """The compared quantities (`analysis.device_change.compare_measurements.Change`); empty for an aborted check."""
     recording: str
-    """Name of today's recording, in the same folder; empty where the check was aborted before the recording was
-    written."""
+    """Name of today's recording, in the same folder; empty where there is none."""
     recording_sha256: str
-    """SHA-256 of that file, hexadecimal; empty where `recording` is empty."""
+    """Hexadecimal; empty where `recording` is empty."""
     baseline_sha256: str
-    """SHA-256 of the accepted recording, hexadecimal."""
+    """Of the accepted recording, hexadecimal."""
 
 
 def write_daily_check(path: Path, check: DailyCheck) -> None:

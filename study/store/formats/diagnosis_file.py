@@ -1,7 +1,6 @@
 """Result of a diagnosis of missing physics, `diagnosis.json`: the format `hapteq-diagnosis`, version 1.
 
-This module reads and writes the file; `analysis.diagnosis.document` defines and checks its content. Called by the
-diagnosis (`study.workflows.diagnosis`), by its views and `hapteq validate`, and by the evaluations of the diagnosis.
+This module reads and writes the file; `analysis.diagnosis.document` defines and checks its content.
 """
 
 from pathlib import Path
@@ -25,7 +24,7 @@ DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "repo
 
 def read_diagnosis(path: Path) -> Diagnosis:
     """Read a diagnosis, without its provenance. Raises CannotReadError where the file cannot be read, UnusableFileError
-    where it has another format or version, or with all problems of its content."""
+    where it has another format or version, or invalid content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:

@@ -1,7 +1,6 @@
 """Read and write mechanical models as TOML files: mass, damping and stiffness matrices, sensor, actuator, effects.
 
-This module handles the file and describes its keys; `equalizer.plant.mechanical_model_toml` converts the text. Called
-by the workflows of diagnosis and equalization, by the evaluation of the diagnosis, and by `hapteq validate`.
+This module handles the file and describes its keys; `equalizer.plant.mechanical_model_toml` converts the text.
 """
 
 from pathlib import Path
@@ -57,7 +56,7 @@ LAYOUT = (
 
 
 def read_mechanical_model(path: Path | str) -> MechanicalModel:
-    """Read a model. Raises CannotReadError where the file cannot be read as text, and UnusableFileError with all
+    """Read a model. Raises CannotReadError where the file cannot be read as text, and UnusableFileError with the
     problems of its content."""
     path = Path(path)
     try:

@@ -1,9 +1,8 @@
 """Read and print tables of the texts that participants see: one TOML file per language, with a text for every key of
 `ENGLISH`.
 
-A protocol selects a shipped language by its code ("de"), or a laboratory's own table by the path of a file. The texts
-are copied into the protocol, so that its hash and every log contain them. Called by `protocol_files` when a protocol is
-read, by `recognisers` to validate one, and by `study.cli.protocol` to print a table for translation.
+A protocol selects a shipped language by its code ("de"), or a laboratory's own table by the path of a file. Texts other
+than the English ones are copied into the protocol, so that its hash and the logs depend on them.
 """
 
 import json
@@ -33,7 +32,7 @@ KIND = "table of texts"
 def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:
     """Read a language's name (code, or name of the file without suffix), and its texts by key. language: a code such as
     "de", or the path of a .toml file, relative to folder (None: the current one). Raises WrongUseError (neither of
-    these), CannotReadError, and UnusableFileError (not TOML, or texts that are missing or wrong; all are listed)."""
+    these), CannotReadError, and UnusableFileError (not TOML, or texts that are missing or wrong)."""
     if language == "en":
         return language, dict(ENGLISH)
     if language in LANGUAGES:

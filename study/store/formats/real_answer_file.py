@@ -2,7 +2,6 @@
 version 1.
 
 This module reads and writes the file; `analysis.diagnosis.real_answer.real_answer` defines and checks its content.
-Called by `study.evaluation.real` and `hapteq validate`.
 """
 
 from pathlib import Path
@@ -28,7 +27,7 @@ def read_real_answer(path: Path) -> RealAnswer:
 
 def read_answer_and_provenance(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
     """Read an answer and its provenance (empty where the file has none). Raises CannotReadError where the file cannot
-    be read, UnusableFileError where it has another format or version, or with all problems of its content."""
+    be read, UnusableFileError where it has another format or version, or invalid content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     provenance = document.pop("provenance", None)
     try:

@@ -1,7 +1,7 @@
 """Layout of the file of a recording: the format `hapteq-recording`, version 1 (HDF5).
 
-`recording_file` reads and writes the file; `study.workflows.files.format_docs` makes tables of docs/formats.md from the
-constants. Sample k is taken at time t_k; all datasets have the same rate and number n of samples.
+`recording_file` reads and writes the file; docs/formats.md contains the constants. Sample k is taken at time t_k; the
+datasets of samples have the same rate and number n of samples.
 """
 
 from equalizer.signals.recording import SEGMENT_KINDS, Hold

@@ -1,9 +1,7 @@
 """Record of iterative learning control on a device, `*.repeats.json`: the format `hapteq-repeats`, version 1.
 
 It is stored beside the table of learned forces, and contains the error of each play, and the trajectory, model and
-device for which the forces were learned. A later run continues from these forces only for the same trajectory and
-model. Called by `study.workflows.equalizer` (`repeat_results`, `repeat_trajectory`, `repeat_playback`)
-and `hapteq validate`.
+device for which the forces were learned.
 """
 
 from dataclasses import asdict, dataclass
@@ -17,7 +15,7 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
 FORMAT, VERSION = "hapteq-repeats", 1
-"""Name and version of the format, written into every document."""
+"""Name and version of the format."""
 SUFFIX = ".repeats.json"
 """Suffix of the document, in place of that of the table of forces."""
 KIND = "document of repeats"
@@ -30,13 +28,12 @@ class Repeats:
     trajectory. A play is one repetition of the whole trajectory; between two plays the forces are corrected."""
 
     trajectory_sha256: str
-    """SHA-256 of the samples of the reference trajectory and their rate."""
+    """Of the samples of the reference trajectory and their rate."""
     model_sha256: str
-    """SHA-256 of the model file, or of all model files together."""
+    """Of the model file, or of the model files together."""
     forces_sha256: str
-    """SHA-256 of the table of forces beside this document."""
+    """Of the table of forces beside this document."""
     device: str
-    """Name of the device."""
     place_m: tuple[float, float, float]
     """Position of the handle in device coordinates at which the trajectory is played (m)."""
     band_hz: tuple[float, float]
@@ -70,8 +67,7 @@ def get_repeats_path(forces_path: Path) -> Path:
 
 def read_repeats(path: Path) -> Repeats:
     """Read the document, without its provenance. Raises CannotReadError where the file cannot be read,
-    UnusableFileError where it has another format or version, with all wrong types, or where `kept` is no index of
-    `errors`."""
+    UnusableFileError where it has another format or version, a wrong type, or a `kept` that is no index of `errors`."""
     document = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:

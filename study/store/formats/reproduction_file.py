@@ -1,7 +1,7 @@
 """Read and write `reproduction.json`: published results and their reproduction (format `hapteq-reproduction`).
 
 `analysis.evaluation.reproduction.document` defines and checks the content; this module adds the file, with format,
-version and provenance. Called by `study.evaluation.reproduction.write_reproduction` and `hapteq validate`.
+version and provenance.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ REPRODUCTION_NAME = "reproduction.json"
 
 def read_reproduction(path: Path) -> Reproduction:
     """Read the document, without its provenance. Raises CannotReadError where the file cannot be read,
-    UnusableFileError where it has another format or version, or with all problems of its content."""
+    UnusableFileError where it has another format or version, or invalid content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:

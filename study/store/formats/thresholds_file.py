@@ -1,7 +1,5 @@
 """Read and write tables of thresholds: `thresholds.csv`, and `detection.csv` for detection runs.
 
-Called by `session_results` (tables of a session), `analyze_data` (of a study) and `recognisers` (to identify a file).
-
 One row per run. The columns are the fields of `analysis.psychophysics.thresholds.Threshold`, which states how each is
 computed; units are part of the names (`_n`: newtons, `_db`: dB re 1 N).
 """

@@ -1,8 +1,8 @@
 """Export of a study's trials as tidy CSV: one table with a row per presentation, a data dictionary, protocol and facts.
 
-Files of the folder: `trials.csv`, `dictionary.csv` (meaning and unit of every column), `protocol.toml` (the study's own
-text), `facts.json` (study, program, hashes), and `answers.csv` where the protocol asks questions. Tidy: one variable a
-column, one observation a row (Wickham, Journal of Statistical Software 59 (2014), 10). Called by `export_study`.
+Files of the folder: `trials.csv`, `dictionary.csv` (meaning and unit of the columns), `protocol.toml` (the study's own
+text), `facts.json` (study, program, hashes), and `answers.csv` (`ANSWERS_NAME`). Tidy: one variable a column, one
+observation a row (Wickham, Journal of Statistical Software 59 (2014), 10).
 """
 
 import json
@@ -22,7 +22,7 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "dictionary.csv", "protocol.toml", "facts.json"
 """Names of the files of every export."""
 ANSWERS_NAME = "answers.csv"
-"""Answers to questionnaires; written only where the protocol asks questions."""
+"""Answers to questionnaires; written only where their table has columns."""
 KIND = "table of exported trials"
 """Name of the exported files in messages."""
 
@@ -40,10 +40,9 @@ def write_tidy_csv(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write the export and return the paths of its files. folder: an existing, empty folder; name: name of the study;
-    protocol_text: the protocol in TOML; facts: JSON values about the study and the program; answers: written only if
-    the table has columns. Raises AlreadyExistsError where a file exists, CannotWriteError where one cannot be
-    written."""
+    """Write the export and return the paths of its files. folder: an existing folder; name: name of the study;
+    protocol_text: the protocol in TOML; facts: JSON values about the study and the program. Raises AlreadyExistsError
+    where a file exists, CannotWriteError where one cannot be written."""
     dictionary_rows = [
         ["column", "description", "unit"],
         *([column, *TRIAL_COLUMNS[column]] for column in list_columns(Trial)),
@@ -64,7 +63,7 @@ def write_tidy_csv(
 
 def read_tidy_csv(folder: Path) -> ExportedTrials:
     """Read the trials, protocol and facts of an export by `write_tidy_csv`. Raises CannotReadError where a file cannot
-    be opened, UnusableFileError where its content is not valid."""
+    be read as text, UnusableFileError where trials or facts are not valid."""
     facts_path = folder / FACTS_NAME
     try:
         facts = load_json(read_text(facts_path))

@@ -1,7 +1,6 @@
 """Read and write trajectories as CSV files: desired accelerations (m/s²) or commanded forces (N) over time (s).
 
-`equalizer.tracking.feedforward.trajectory` defines and parses the tables; this module adds the file access. Called by
-the workflows that compute, export or play trajectories (`study.workflows.equalizer`), and by `hapteq validate`.
+`equalizer.tracking.feedforward.trajectory` defines and parses the tables; this module adds the file access.
 """
 
 from pathlib import Path

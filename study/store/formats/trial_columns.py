@@ -1,7 +1,6 @@
 """Data dictionary of exported trials: meaning and unit of each column of `trials.csv`, one row per presentation.
 
-The exports `tidy_csv`, `psych_ds`, `bids_behaviour` and `trials_mat` write this dictionary with the table, so that a
-reader needs no other document.
+The exports write this dictionary with the table, so that a reader needs no other document.
 """
 
 TRIAL_COLUMNS: dict[str, tuple[str, str]] = {

@@ -1,8 +1,7 @@
 """Read and write `trials.csv`: one row per presentation of a stimulus, derived from the session log.
 
 The columns are the fields of `protocols.trial.Trial`; `trial_columns` states their meaning and unit. A table that is
-read is also checked for values that no session can produce, because it may have been edited by hand. Called by
-`session_results`, and by `recognisers` for a file given by the user; `psych_ds` uses the check alone.
+read is also checked for values that no session can produce, because it may have been edited by hand.
 """
 
 import math
@@ -23,7 +22,7 @@ KIND = "table of trials"
 
 
 def write_trials(path: Path, trials: Iterable[Trial]) -> None:
-    """Write the table, and replace an existing one, because it can be derived again. Raises CannotWriteError."""
+    """Write the table; an existing one is replaced. Raises CannotWriteError."""
     write_text(path, format_csv_table(trials, Trial), overwrite=True)
 
 
@@ -41,8 +40,7 @@ def read_trials(path: Path | str) -> tuple[Trial, ...]:
 
 
 def _find_non_finite_columns(trial: Trial) -> list[str]:
-    """Find the names of the columns with an infinity or NaN. A session writes neither: a missing value is an empty
-    field."""
+    """Find the names of the columns with an infinity or NaN, neither of which a session writes."""
     values = ((name, getattr(trial, name)) for name in TRIALS_HEADER)
     return [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
 

@@ -1,8 +1,7 @@
 """Export the trials of a study as a MATLAB file (MAT-file version 5), for analysis in MATLAB or Octave.
 
 The file contains a structure `trials` with one field per column, structures `units` and `descriptions` with the same
-fields, the answers to questionnaires, the study's name, the protocol as text, and the provenance as JSON text. Called
-by `study.workflows.results.export_study` for the form "mat".
+fields, the answers to questionnaires, the study's name, the protocol as text, and the provenance as JSON text.
 """
 
 import io

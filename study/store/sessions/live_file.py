@@ -1,7 +1,6 @@
 """Read and write `live.json`: the present state of a running session, for programs that display it.
 
-`study.workflows.session.conduct_session` replaces the file atomically several times a second, so that a reader never
-sees an incomplete one; `study.workflows.views` (`watch_session`, `stream_signals`) reads it. The fields are those of
+The file is replaced atomically, so that a reader never sees an incomplete one. Its fields are those of
 `study.session.watching.live_state.LiveState`. No result depends on the file: errors of reading and writing are ignored.
 """
 
@@ -21,14 +20,11 @@ from study.store.disk.strict_json import load_json
 LIVE_NAME = "live.json"
 """Name of the file in the session's folder."""
 LIVE_FORMAT = "hapteq-live"
-"""Name of the format, written into every file."""
 LIVE_VERSION = 1
-"""Version of the format, written into every file."""
 
 _ACTIVITIES = get_args(Activity)
-"""Values of the field `activity` that a reader accepts."""
 _MAX_FILE_BYTES = 1 << 16
-"""Largest file that is read (bytes). Chosen: a file written by hapteq has about 1 kB."""
+"""Largest file that is read (bytes). Chosen, far above the size of a live state."""
 
 
 def write_live(folder: Path, live_state: LiveState) -> None:
@@ -52,7 +48,7 @@ def remove_live(folder: Path) -> None:
 
 def read_live(folder: Path) -> LiveState | None:
     """Read the live state from a session's folder; None if the file is missing, unreadable, larger than
-    `_MAX_FILE_BYTES`, of another format or version, or has an invalid field. Never raises."""
+    `_MAX_FILE_BYTES`, of another format or version, or has an invalid field."""
     try:
         document = load_json(read_regular(folder / LIVE_NAME, _MAX_FILE_BYTES))
     except (OSError, ValueError):
@@ -65,8 +61,7 @@ def read_live(folder: Path) -> LiveState | None:
 
 
 def _has_valid_fields(values: dict[str, Any]) -> bool:
-    """Whether the values have exactly the fields of `LiveState`, of which the last two may be missing, with valid
-    types, times and activity."""
+    """Whether the values have the fields of `LiveState` and no others, with valid types, times and activity."""
     # Files of older versions lack these two fields, which then have their defaults.
     values = {"monotonic_s": None, "telemetry": "", **values}
     number_types = (int, float)
@@ -102,5 +97,5 @@ def _is_utc_time(text: str) -> bool:
 
 
 def _replace_nonfinite(value: Any) -> Any:
-    """Replace NaN and infinity, which JSON does not have, by None; other values are returned unchanged."""
+    """Replace NaN and infinity, which JSON does not have, by None."""
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,7 +1,7 @@
 """Detect whether a process is writing a session's log, by the lock (flock) that the writer holds on the file.
 
 `event_log` sets the lock. The operating system releases it when the process ends, so that a crashed program does not
-count as a writer. Called by `study.workflows.views` (`watch_session`, `send_request`, `take_note`, `session_line`).
+count as a writer.
 """
 
 from pathlib import Path
@@ -10,9 +10,9 @@ from study.regular_file import open_regular
 
 
 def is_log_locked(log_path: Path) -> bool | None:
-    """Whether a process holds the exclusive lock of the log; None where this cannot be determined: on a system without
-    flock (Windows), or for a log that is missing or unreadable. The test itself holds a shared lock for an instant,
-    during which a new writer would be refused; therefore call it rarely."""
+    """Whether a process holds the exclusive lock of the log; None where this cannot be determined: on a system or file
+    system without flock, or for a log that is missing or unreadable. The test itself holds a shared lock for an
+    instant, during which a new writer would be refused; therefore call it rarely."""
     try:
         import fcntl
     except ImportError:  # Windows

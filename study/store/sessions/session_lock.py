@@ -1,8 +1,7 @@
 """File locks: a session has a single writer, and participant numbers are assigned by one program at a time.
 
 Both are locks of the operating system on a file, which it releases when the process that holds them ends: after a crash
-no lock must be removed by hand. Called by the workflows that write to a session (`study.workflows.session`,
-`study.workflows.results.session_results`, `study.workflows.views.take_note`).
+no lock must be removed by hand.
 """
 
 from collections.abc import Iterator
@@ -19,14 +18,14 @@ SESSION_LOCK_NAME = "session.lock"
 PLACES_LOCK_NAME = ".places.lock"
 """Lock file in the data folder, held while a participant number (a place in the counterbalanced order) is assigned."""
 PLACES_LOCK_TIMEOUT_S = 20.0
-"""Longest wait for the lock `PLACES_LOCK_NAME` (s). Chosen far above the duration of an assignment, which reads the
-first lines of all sessions in the folder."""
+"""Longest wait for the lock `PLACES_LOCK_NAME` (s). Chosen far above the duration of an assignment, which reads logs of
+the folder."""
 
 
 @contextmanager
 def hold_session_lock(folder: Path) -> Iterator[None]:
-    """Hold the lock of the session in `folder` within the context. Raises StudyError, without waiting, where another
-    program holds it or the folder is not writable."""
+    """Hold the lock of the session in `folder` within the context. Raises StudyError, without waiting, where it is held
+    already or the folder is not writable."""
     lock = FileLock(folder / SESSION_LOCK_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=0)

@@ -1,7 +1,7 @@
 """Read `session.json`, the summary of a session, without evaluating the whole log.
 
 The summary is derived from the log and states what the log contained when it was written; a comparison with it shows
-whether the end of the log was lost later. Called by `fold_session` and `session_results`, which also writes the file.
+whether the end of the log was lost later.
 """
 
 from pathlib import Path
@@ -17,7 +17,7 @@ SUMMARY_FORMAT, SUMMARY_VERSION = "hapteq-session-summary", 1
 
 
 def read_summary(folder: Path) -> dict[str, Any] | None:
-    """Read the summary without its provenance; None if the file is missing, unreadable or of another format."""
+    """Read the summary without its provenance; None without a readable file of this format and version."""
     try:
         summary = read_json(folder / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION)
     except StudyError:

@@ -1,8 +1,7 @@
 """Save and find the recordings of trials and probes: one HDF5 file for each, in the session's folder.
 
 A file is written once, before its name and hash are logged; its name states run, trial and attempt, or the number of
-the probe. After a crash, a recording that is not logged yet is therefore found again. Called by `trial_events`,
-`play_probe` and `resume_session`.
+the probe. After a crash, a recording that is not logged yet is therefore found again.
 """
 
 from collections.abc import Mapping
@@ -21,12 +20,12 @@ PROBE_PREFIX = "probe-"
 
 @dataclass(frozen=True, slots=True)
 class SavedRecording:
-    """Name and hash of a recording in a session's folder, as they are logged."""
+    """A recording in a session's folder, as it is logged."""
 
     name: str
     """Path relative to the session's folder."""
     sha256: str
-    """SHA-256 of the file, in hexadecimal."""
+    """Of the file, in hexadecimal."""
 
 
 def name_recording(run: int, trial: int, attempt: int) -> str:
@@ -35,8 +34,7 @@ def name_recording(run: int, trial: int, attempt: int) -> str:
 
 
 def name_probe_recording(number: int) -> str:
-    """Return the path of a probe's recording, relative to the session's folder. number: number of the probe in the
-    session, from 0."""
+    """Return the path of a probe's recording, relative to the session's folder. number: index from 0."""
     return f"recordings/{PROBE_PREFIX}{number:03d}.h5"
 
 

@@ -1,8 +1,7 @@
 """List of folders with results of a study that a withdrawal does not search, so that it can name them to the user.
 
-Analyses and exports may be written to any folder (`--out`). A withdrawal erases only within the data folder; each other
-folder is added to a text file there when it is written. `diagnose_recordings`, `analyze_data` and `export_study` of
-`study.workflows` add to the list; `withdraw_participant` reads it.
+Analyses, diagnoses and exports may be written to any folder (`--out`), but a withdrawal erases only within the data
+folder, where the list is stored.
 """
 
 import os
@@ -26,8 +25,8 @@ def note_written_folder(source: Path, folder: Path, even_if_searched: bool = Fal
     data folder, a folder directly in it, or any folder within a session. Errors of writing the list are ignored; a
     list that cannot be read is left as it is, so that its folders are not lost.
 
-    source: the data folder, or a session folder in it. even_if_searched: add `folder` wherever it is, such as for an
-    export, which a withdrawal does not recognise.
+    source: the data folder, or a session folder in it. even_if_searched: add `folder` wherever it is, for content that
+    a withdrawal does not recognise.
     """
     folder, source = folder.resolve(), source.resolve()
     data_folder = source.parent if FOLDER_PATTERN.fullmatch(source.name) else source

@@ -1,8 +1,7 @@
-"""Entries of the command palette: the actions of the current screen, each with its key and, where there is one, the
-equivalent command line.
+"""Entries of Textual's command palette: the current actions, each with its key and, where there is one, the equivalent
+command line.
 
-Users find an action by its name, and learn the shell command that does the same. Called by `app` when Textual opens the
-palette.
+Users find an action by its name, and learn the shell command that does the same.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ hides the action."""
 
 
 def generate_commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
-    """Generate the entries of the palette: the enabled actions of a screen and of the application, each once."""
+    """Generate the entries of the palette, each action once: enabled ones that the footer shows or `TITLES` names."""
     listed_actions = set()
     for active_binding in screen.active_bindings.values():
         binding = active_binding.binding

@@ -1,4 +1,4 @@
-"""Connection of the application to the engine process; made by `app`.
+"""Connection of the application to the engine process.
 
 It sends commands and a regular heartbeat, and delivers the engine's messages as events of Textual, so that they are
 handled by the event loop. Without a heartbeat the engine ends a running trial (`remote_display`).
@@ -29,8 +29,7 @@ class EngineMessage(Message):
 
 
 class EngineConnection:
-    """Connection that sends commands and heartbeats to the engine, and posts its messages to the application as
-    `EngineMessage`."""
+    """Connection to the engine; posts its messages to the application as `EngineMessage`."""
 
     def __init__(self, app: App[Any]) -> None:
         self._app = app
@@ -41,7 +40,6 @@ class EngineConnection:
 
     @property
     def pid(self) -> int | None:
-        """Process identifier of the engine; None before it has started."""
         return self._engine.pid
 
     def start(self) -> None:
@@ -51,7 +49,7 @@ class EngineConnection:
         self._app.set_interval(HEARTBEAT_INTERVAL_S, self._send_heartbeat)
 
     def send(self, message: ToEngine) -> None:
-        """Send a message and return at once. Starts a new engine first if the present engine has died."""
+        """Send a message and return at once. Starts a new engine first if the present one has failed."""
         if self._engine.has_failed:
             self._engine = EngineClient(self._deliver)
             self._engine.start()
@@ -60,7 +58,7 @@ class EngineConnection:
         self._engine.send(message)
 
     def close(self) -> None:
-        """Close the pipe and wait until the engine has released the force and ended."""
+        """Close the pipe, and wait until the engine has released the force and ended, or was killed."""
         self._engine.close()
 
     def _send_heartbeat(self) -> None:
@@ -69,8 +67,7 @@ class EngineConnection:
             self._engine.send(Heartbeat())
 
     def _deliver(self, message: FromEngine) -> None:
-        """Post a message of the engine to the application. Called in a thread of the client, in which `post_message` is
-        permitted."""
+        """Post a message of the engine to the application. Called in a thread of the client."""
         if isinstance(message, Finished | Failed):
             self.last_end = message
         self._app.post_message(EngineMessage(message))

@@ -1,7 +1,4 @@
-"""Import further screens in a background thread. Called by `app.HapteqApp` after the first frame is shown.
-
-The first frame thus appears without their import time, and later screens open without a delay.
-"""
+"""Import further screens in a background thread, so that they open without delay but do not delay the first frame."""
 
 import gc
 import threading

@@ -1,4 +1,4 @@
-"""Texts of the panel that is shown after a session, a stop or a failure; used by `study.tui.app.app`."""
+"""Texts of the panel that is shown after a session, a stop or a failure."""
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.engine.from_engine import Failed, Finished

@@ -1,7 +1,4 @@
-"""Start options of the application: `study.cli` (`study`, `resume`, `screen`) passes them to `app.HapteqApp`.
-
-The module imports no slow module, so that the first frame appears soon.
-"""
+"""Start options of the application, as the command line passes them to `app.HapteqApp`."""
 
 from dataclasses import dataclass
 
@@ -11,11 +8,9 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 
 @dataclass(frozen=True, slots=True)
 class StartOptions:
-    """Options of the command line: data folder, device, answer keys, a sitting to begin at once, and defaults of the
-    start screen."""
+    """Data folder, device, answer keys, a sitting to begin at once, and defaults of the start screen."""
 
     data: str
-    """Path of the data folder."""
     device: str
     """Name of the device, as `study.devices.opening.open_device` takes it."""
     keys: AnswerKeys = DIGITS

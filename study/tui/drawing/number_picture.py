@@ -1,7 +1,4 @@
-"""Draw a large digit 1 or 2 with braille characters, for trials whose answer is an interval instead of a direction.
-
-Called by `study.tui.widgets.direction_panel`.
-"""
+"""Draw a large digit 1 or 2 with braille characters, for trials whose answer is an interval instead of a direction."""
 
 from functools import lru_cache
 from itertools import pairwise

@@ -1,8 +1,5 @@
-"""Draw the channels of a recording with braille characters: time series and amplitude spectra.
-
-Each channel takes two lines of text, so that a recording can be judged in a terminal before any plot is made; `hapteq
-look` prints them.
-"""
+"""Draw the channels of a recording with braille characters, in two lines of text each: time series and amplitude
+spectra, so that a recording can be judged in a terminal."""
 
 import itertools
 from collections.abc import Iterable
@@ -22,8 +19,8 @@ _SHOWN_DECADES = 4.0
 
 def draw_time_series(channel: Channel) -> Iterable[str]:
     """Draw a channel over time, as two lines: each column of dots spans the lowest to the highest of its samples. The
-    extremes of the whole channel are written at the right, with their unit. Missing samples leave gaps; a channel
-    without finite samples gives one line."""
+    extremes of the whole channel are written at the right, with their unit. A column without finite samples stays
+    empty; a channel without any gives one line."""
     finite_samples = channel.finite_samples
     if not finite_samples.size:
         yield f"{_format_channel_label(channel)} {'':{DRAWING_COLUMNS}} no samples"

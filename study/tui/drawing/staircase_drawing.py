@@ -1,8 +1,7 @@
 """Draw an adaptive staircase as lines of text: force level (N, logarithmic scale) over the trial number.
 
-Braille dots draw the level, the cap (dashed) and the threshold (dotted); a mark at each trial shows whether the answer
-was right, and whether the staircase reversed there. Called by the widget `staircase_plot` and by `hapteq show`; the
-marks are also those of `watch.level_history`.
+Braille dots draw the level, the cap (dashed) and the threshold (dotted); the mark of a trial shows whether the answer
+was right, and whether the staircase reversed there.
 """
 
 import itertools
@@ -17,7 +16,7 @@ LEGEND = f"{RIGHT_MARK} right  {WRONG_MARK} wrong  {PEAK_MARK} peak  {VALLEY_MAR
 """Meaning of the marks, in one line."""
 
 LABEL_COLUMNS = 8
-"""Width of the labels of the level axis in characters, including the space after them."""
+"""Width for the labels of the level axis in characters, including the space after them."""
 _MIN_AXIS_RATIO = 4.0
 """Smallest ratio of the cap to the lowest level of the axis, so that small changes of the level do not look large.
 Chosen."""
@@ -31,9 +30,8 @@ _MARKS_BY_PRIORITY = (RIGHT_MARK, WRONG_MARK, VALLEY_MARK, PEAK_MARK)
 
 
 def draw_staircase(staircase: Staircase, columns: int, rows: int) -> tuple[str, ...]:
-    """Draw the staircase in `rows` lines of at most `columns` characters; the last line is the trial axis. A single
-    sentence, which may be wider, if there are fewer than 8 columns beside the labels, fewer than 4 rows, or no
-    answer."""
+    """Draw the staircase in `rows` lines for a width of `columns` characters; the last line is the trial axis. A single
+    sentence if there are fewer than 8 columns beside the labels, fewer than 4 rows, or no answer."""
     if columns < LABEL_COLUMNS + 8 or rows < 4:
         return ("No room to draw.",)
     if not staircase.levels_n:

@@ -1,4 +1,4 @@
-"""Start a child process of the terminal interface, connected by a pipe. Called by `client` and `watch_feed`.
+"""Start a child process of the terminal interface, connected by a pipe.
 
 `multiprocessing` is not used to start it: its child would inherit the terminal, and it cannot start a process while
 Textual has replaced stdout and stderr.
@@ -20,8 +20,8 @@ def start_child(
     function are given by name, so that the module is not imported here. output: receives what the child prints.
 
     The child has its own POSIX session: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write to the
-    screen. It uses this process's import path. When this process ends for any reason, the pipe closes, which the child
-    reads as end of file. Raises OSError where the process cannot be started.
+    screen. It uses this process's import path. When this process ends, the pipe closes, which the child reads as end
+    of file. Raises OSError where the process cannot be started.
     """
     parent_end, child_end = socket.socketpair()
     with child_end:

@@ -1,7 +1,7 @@
 """Source of the views of a running session, for the experimenter's screen.
 
-A child process reads the session's log at short intervals and sends a view each time; the screen takes the latest view
-without waiting for the disk. Made by `hapteq watch` (`study.cli.watch`) and by `watch_controller`.
+A child process reads the session's log at short intervals and sends views; the screen takes the latest view without
+waiting for the disk.
 """
 
 import contextlib
@@ -40,7 +40,6 @@ class WatchFeed:
 
     @property
     def child_pid(self) -> int:
-        """Process identifier of the child process."""
         return self._child.pid
 
     def close(self) -> None:
@@ -74,10 +73,10 @@ class WatchFeed:
 
 
 def feed(descriptor: int, session_path: str) -> None:
-    """Send a view of the session every `LOG_POLL_INTERVAL_S`, nothing while its log has no complete line, or the
-    problem if the log cannot be read, until the pipe is closed: main function of the child process. descriptor: file
-    descriptor of its end of the pipe. The imports are inside the function, because the screen's process, which imports
-    this module too, must not load them."""
+    """Main function of the child process: send a view of the session at intervals of `LOG_POLL_INTERVAL_S`, nothing
+    while its log has no complete line, or the problem if the log cannot be read, until the parent ends it. descriptor:
+    of its end of the pipe. The imports are inside, because the screen's process, which imports this module, must not
+    load them."""
     from pathlib import Path
 
     from study.devices.clock import RealClock

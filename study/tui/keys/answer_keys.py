@@ -1,8 +1,4 @@
-"""Keyboard keys for the answers 1 and 2 in addition to the digits, as chosen by the option `--keys f,j`.
-
-The commands of `study.cli` parse the option; `sitting_screens` and line mode use the keys for prompts and to parse
-answers.
-"""
+"""Keyboard keys for the answers 1 and 2 in addition to the digits, as chosen by the option `--keys f,j`."""
 
 from dataclasses import dataclass
 
@@ -10,7 +6,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import WrongUseError
 
 RESERVED_KEYS = "pqrn?"
-"""Keys with another meaning in every trial: p pause, q leave, r repeat, n note, ? help."""
+"""Keys with another meaning in a session: p pause, q leave, r repeat, n note, ? help."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,7 @@
-"""Serialise keys, clicks and pastes: each is handled only when the effects of the previous one are complete.
+"""Serialise keys, clicks and pastes: each waits until the effects of the previous one are complete or time out.
 
 Textual delivers a key to the widget that has the focus when the key is handled. Tab, or Enter in a field, moves the
-focus only some messages later, so that of keys that arrive together, the later ones would reach the previous field. The
-applications `app` and `watch_app` pass all their events to the queue.
+focus only some messages later, so that of keys that arrive together, the later ones would reach the previous field.
 """
 
 import asyncio
@@ -18,7 +17,7 @@ from textual.message_pump import MessagePump
 from study.tui.keys.key_presses import get_arrival_time_s
 
 IMMEDIATE_KEYS = ("ctrl+c", "ctrl+q", "ctrl+z")
-"""Keys that are never queued or ignored: Ctrl-C and Ctrl-Q switch the force off, Ctrl-Z suspends the program."""
+"""Keys that are never queued or ignored: in a sitting, Ctrl-C and Ctrl-Q switch the force off."""
 SETTLE_PASSES = 3
 """Number of passes through the message queues until the effects of a key are complete: one each for the key, for the
 message that it causes, and for the messages that the handler of that message posts."""
@@ -39,12 +38,12 @@ class InputQueue:
 
     @property
     def is_settling(self) -> bool:
-        """Whether the effects of an event are still incomplete."""
+        """Whether the effects of an event are still awaited."""
         return self._settle_task is not None
 
     def discard_earlier_keys(self) -> None:
-        """Ignore keys that arrived before this call: they were typed for the previous screen. `IMMEDIATE_KEYS` are
-        still handled."""
+        """Ignore keys, except `IMMEDIATE_KEYS`, that arrived before this call: they were typed for the previous
+        screen."""
         self._ignored_until_s = time.monotonic()
 
     async def handle_event(self, event: Event) -> None:

@@ -1,5 +1,4 @@
-"""Names of keys as printed on a keyboard, such as F5 and Esc. The applications (`app`, `watch_app`) show them in the
-footer."""
+"""Names of keys as printed on a keyboard, such as F5 and Esc."""
 
 import re
 

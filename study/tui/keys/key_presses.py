@@ -1,8 +1,7 @@
 """Detect presses of the answer keys among the key events of a terminal: reject the auto-repeat of a held key.
 
 A terminal reports no release, and a held key gives a series of equal events. A key that is held since before a question
-must not answer it; its repetitions are recognised by the time between events. Called by the trial screen
-(`study.tui.screens.trial`); `input_queue` uses the arrival times.
+must not answer it; its repetitions are recognised by the time between events.
 """
 
 import sys
@@ -40,8 +39,7 @@ class KeyPressDetector:
 
 def get_arrival_time_s(event: Key) -> float:
     """Get the time at which the key was read from the terminal (s), on the clock of `time.monotonic`. Textual's reading
-    thread stores it, so that a delay of the event loop does not change it; on Windows the present time is returned
-    instead."""
+    thread stores it, so that a delay of the event loop does not change it. The present time where the stored one is
+    later, and on Windows, where Textual takes it from another clock."""
     now_s = time.monotonic()
-    # On Windows, Textual takes the event's time from another clock.
     return event.time if sys.platform != "win32" and event.time <= now_s else now_s

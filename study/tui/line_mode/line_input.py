@@ -1,7 +1,6 @@
 """Read lines from a terminal or a pipe with a timeout, so that the waiting program can serve the device's watchdog.
 
-The file descriptor is read directly (`select`, `os.read`), because Python's buffered input has no timeout. Called by
-the line mode (`conversation`, `plain_display`) and `study.cli.conduct`.
+The file descriptor is read directly (`select`, `os.read`), because Python's buffered input has no timeout.
 """
 
 import os

@@ -1,7 +1,4 @@
-"""Line mode: enforced rests, and pauses with the choices to continue, to leave, to withdraw or to write a note.
-
-No stimulus is played meanwhile. Called by `PlainDisplay`.
-"""
+"""Line mode: enforced rests, and pauses with the choices to continue, to leave, to withdraw or to write a note."""
 
 from collections.abc import Callable
 
@@ -17,8 +14,8 @@ COUNTDOWN_INTERVAL_S = 10.0
 
 
 def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignOfLife) -> float:
-    """Count down an enforced rest, then wait for Enter. Returns the time rested (s). Raises KeyboardInterrupt when the
-    participant leaves, or at the end of the input."""
+    """Count down an enforced rest, then wait for Enter, unless the sign of life ends it. Returns the time rested (s).
+    Raises KeyboardInterrupt where the line after the countdown is "q" or the input has ended."""
     words = conversation.words
     rest_text = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
     conversation.say("", f"{rest_text} {words.fill_count('runs_left', notice.runs_left)}")
@@ -71,7 +68,7 @@ def run_pause(
 
 
 def _list_pause_keys(has_notes: bool, words: Words) -> str:
-    """List the keys of a pause as text. has_notes: whether notes are offered."""
+    """List the keys of a pause as text."""
     return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if has_notes else [])))
 
 

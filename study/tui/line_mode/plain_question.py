@@ -1,7 +1,5 @@
-"""Line mode: the instructions, the question of a trial and its reply, and the result of a practice.
-
-Texts are in the language of the protocol (`Words`). Called by `PlainDisplay` (`plain_display`).
-"""
+"""Line mode: the instructions, the question of a trial and its reply, and the result of a practice, in the language of
+the protocol (`Words`)."""
 
 from protocols.trial import VoidCause
 from protocols.wording.words import Words
@@ -32,13 +30,13 @@ def describe_answer_keys(keys: AnswerKeys, words: Words) -> str:
 
 
 def draw_direction_picture(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
-    """Draw the two directions as lines of text, followed by a sentence on each."""
+    """Draw the two directions as lines of text, followed by a description of each."""
     return (*draw_directions(picture), describe_direction(picture, 1, words), describe_direction(picture, 2, words))
 
 
 def show_instructions(welcome: Welcome, conversation: Conversation, keys: AnswerKeys) -> None:
-    """Write title, instructions and plan of a sitting, and wait for a line. Raises KeyboardInterrupt for "q" and at the
-    end of the input."""
+    """Write the instructions of a sitting, and wait for a line. Raises KeyboardInterrupt for "q" and at the end of the
+    input."""
     words = conversation.words
     conversation.discard_early_lines()
     conversation.say(welcome.title, "")
@@ -61,9 +59,9 @@ def show_instructions(welcome: Welcome, conversation: Conversation, keys: Answer
 
 def ask_question(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
     """Ask the question of a trial until there is a reply. It is an answer, or `Unanswered`: for a line that leaves,
-    pauses or repeats (`parse_reply`), where the time limit (none if 0 s) is over, where the sign of life reports that
-    the stimulus ended early, and at the end of the input, which ends the sitting. "?" explains the question; other
-    lines, and "r" without repeats left, are refused; then the question is asked again."""
+    pauses or repeats (`parse_reply`), where the time limit (none if 0 s) is over, where the sign of life ends the wait,
+    and at the end of the input, which ends the sitting. "?" explains the question; other lines, and "r" without repeats
+    left, are refused; then the question is asked again."""
     words, key_placeholders = conversation.words, {"keys": keys.describe_keys(conversation.words)}
     conversation.discard_early_lines()
     conversation.say("", format_heading(question, words))

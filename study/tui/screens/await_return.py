@@ -1,5 +1,4 @@
-"""Screen after a void trial: it gives the reason, and no stimulus is played until the participant presses Enter. Opened
-by `study.tui.app.sitting_screens`."""
+"""Screen after a void trial: it gives the reason, and no stimulus is played until the participant presses Enter."""
 
 from typing import ClassVar
 
@@ -16,8 +15,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class AwaitReturnScreen(TranslatedScreen[None]):
-    """Shows why the trial is void and that no answer is lost; Enter continues. reason: cause of the void trial, as in
-    the log."""
+    """Shows why the trial is void; Enter continues. reason: cause of the void trial, as in the log."""
 
     PAGE = "help_void"
     DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"

@@ -1,5 +1,4 @@
-"""File dialog that opens a session or a diagnosis from any folder, also outside the data folder. Opened by the start
-screen (`home`)."""
+"""File dialog that opens a session or a diagnosis from any folder, also outside the data folder."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,8 +17,8 @@ from study.tui.home_messages import CommandRequested
 from study.tui.screens.help import HelpScreen
 
 LOG_NAME, DIAGNOSIS_NAME = "events.jsonl", "diagnosis.json"
-"""Names of the files to open: the log of a session (`event_log.LOG_NAME`), and the document of a diagnosis
-(`diagnosis_file.DIAGNOSIS_NAME`); the screens import no storage modules."""
+"""Names of the files to open, equal to `event_log.LOG_NAME` and `diagnosis_file.DIAGNOSIS_NAME`; this module imports no
+storage modules."""
 
 HELP = """\
 # Open
@@ -34,11 +33,9 @@ In a terminal: `hapteq show PATH`.
 
 
 class HapteqFiles(DirectoryTree):
-    """Tree of folders that shows only folders, session logs and documents of diagnoses, by name; hidden ones are left
-    out."""
+    """Tree that shows only folders, session logs and documents of diagnoses, by name; hidden ones are left out."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
-        """Select the paths that the tree shows; called by Textual for the entries of a folder."""
         return [path for path in paths if not path.name.startswith(".") and (_is_openable(path) or path.is_dir())]
 
 
@@ -83,8 +80,7 @@ class BrowseScreen(ModalScreen[None]):
 
     @on(Input.Submitted, "#path")
     def _go_to_path(self, event: Input.Submitted) -> None:
-        """Open a typed session folder or file; make any other folder the root of the tree; report a path without
-        either."""
+        """Open a typed session folder or file; make any other folder the root of the tree; report a missing path."""
         path = Path(event.value).expanduser()
         if path.is_dir() and (path / LOG_NAME).exists():
             self._open_path(path / LOG_NAME)
@@ -99,7 +95,6 @@ class BrowseScreen(ModalScreen[None]):
 
     @on(DirectoryTree.FileSelected)
     def _open_selected(self, event: DirectoryTree.FileSelected) -> None:
-        """Open the file selected in the tree."""
         self._open_path(event.path)
 
     def action_help(self) -> None:
@@ -115,5 +110,4 @@ class BrowseScreen(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _show_message(self, text: str) -> None:
-        """Show a message below the tree, in place of the previous one."""
         self.query_one("#message", Static).update(text)

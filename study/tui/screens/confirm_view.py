@@ -1,8 +1,7 @@
 """Confirmation before the experimenter's view opens on a screen that the participant may see.
 
 The view shows levels and which answers were right; a participant who has seen these is no longer naive.
-Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view. Called by
-`study.tui.watch.watch_controller` and `study.tui.app.archive_screens`.
+Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from study.tui.widgets.literal_text import LiteralText
 VIEW_SHOWN_NOTE = (
     "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
 )
-"""Note that is written to the log if the screen of the participant showed the view."""
+"""Note for the log if the screen of the participant shows the view."""
 
 
 class ConfirmView(ModalScreen[bool]):
@@ -67,7 +66,6 @@ class ConfirmView(ModalScreen[bool]):
 
     @on(Input.Submitted)
     def _check_input(self, event: Input.Submitted) -> None:
-        """Close the dialog if the name was typed; otherwise say that nothing is opened."""
         if event.value.strip() == self._session_name:
             dismiss_screen(self, True)
         else:
@@ -81,10 +79,9 @@ class ConfirmView(ModalScreen[bool]):
 
 
 def confirm_view(app: App[Any], session: str, on_confirmed: Callable[[], object]) -> None:
-    """Open the dialog. session: name to be typed. on_confirmed: called once after the confirmation, not otherwise."""
+    """Open the dialog. session: name to be typed. on_confirmed: called after the confirmation, not otherwise."""
 
     def act_on_decision(confirmed: bool | None) -> None:
-        """Act on the dialog's result; None where it was closed without one."""
         if confirmed:
             on_confirmed()
 

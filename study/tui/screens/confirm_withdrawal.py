@@ -1,7 +1,6 @@
-"""Confirmation of a withdrawal of consent during a sitting, which erases all data of the participant.
+"""Confirmation of a withdrawal of consent during a sitting, which erases the participant's data.
 
-A word must be typed, in the language of the protocol, so that no single key erases data. Opened by the pause screen
-(`pause`).
+A word must be typed, in the language of the protocol, so that no single key erases data.
 """
 
 from typing import ClassVar
@@ -46,7 +45,6 @@ class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
 
     @on(Input.Submitted)
     def _check_input(self, event: Input.Submitted) -> None:
-        """Return True if the word was typed; otherwise state the expected word."""
         word = self.words["withdraw_word"]
         if event.value.strip().casefold() == word.casefold():
             dismiss_screen(self, True)

@@ -1,7 +1,4 @@
-"""Screen with the findings of the device check, which measures before a session whether the device is in order.
-
-Opened by `study.tui.app.sitting_screens` on request of the engine, which makes the check.
-"""
+"""Screen with the findings of the device check, which measures before the trials whether the device is in order."""
 
 from typing import ClassVar
 
@@ -34,12 +31,10 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
     ]
 
     def __init__(self, report: DeviceReport, words: Words = ENGLISH_WORDS) -> None:
-        """report: findings of the check; words: texts in the language of the screen."""
         super().__init__(words)
         self._report = report
 
     def compose(self) -> ComposeResult:
-        """Title, a line per finding with advice where its value is out of order, and the conclusion."""
         report, words = self._report, self.words
         name_width = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
@@ -62,15 +57,12 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
         return {"go_on": usable, "go_on_anyway": not usable}.get(action, True)
 
     def action_go_on(self) -> None:
-        """Continue with a usable device."""
         dismiss_screen(self, True)
 
     def action_go_on_anyway(self) -> None:
-        """Continue although the device is not usable."""
         dismiss_screen(self, True)
 
     def action_check_again(self) -> None:
-        """Close the screen, so that the device is checked again."""
         dismiss_screen(self, False)
 
 
@@ -82,6 +74,6 @@ def _format_conclusion(report: DeviceReport, words: Words) -> str:
 
 
 def _format_finding(finding: DeviceFinding, name_width: int) -> str:
-    """Format a finding: verdict (LOOK where a value is out of order, padded to 4 characters), name padded to
-    `name_width` characters, measured value."""
+    """Format a finding: verdict (LOOK where it is wrong, padded to 4 characters), name padded to `name_width`
+    characters, result."""
     return f"{'LOOK' if finding.wrong else finding.verdict:<4}  {finding.name:<{name_width}}  {finding.value}"

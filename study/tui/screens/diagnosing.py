@@ -1,4 +1,4 @@
-"""Screen that shows the progress of a running diagnosis, and lets the user stop it; opened by `archive_screens`."""
+"""Screen that shows the progress of a running diagnosis, and lets the user stop it."""
 
 import time
 from collections.abc import Callable
@@ -49,7 +49,6 @@ class DiagnosingScreen(Screen[bool]):
         self._started_s = now_s()
 
     def compose(self) -> ComposeResult:
-        """Step, progress bar and elapsed time in a panel."""
         with Vertical() as panel:
             panel.border_title = "Diagnosing"
             yield Static(self._step, id="what", markup=False)
@@ -68,9 +67,7 @@ class DiagnosingScreen(Screen[bool]):
             self.query_one(ProgressBar).update(progress=share)
 
     def action_stop(self) -> None:
-        """Leave the screen with True: the diagnosis is to be stopped."""
         dismiss_screen(self, True)
 
     def _update_elapsed_time(self) -> None:
-        """Draw the elapsed time; called every `UPDATE_INTERVAL_S`."""
         self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._started_s))

@@ -1,4 +1,4 @@
-"""Last screen of a sitting: how it ended, and how many answers are saved. Opened by `study.tui.app.sitting_screens`."""
+"""Last screen of a sitting: how it ended, and how many answers are saved."""
 
 from typing import ClassVar
 
@@ -16,8 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class GoodbyeScreen(TranslatedScreen[None]):
-    """Shows that the session is finished, that the sitting stopped and can be resumed, or that the person does not take
-    part; and the number of saved answers. Enter closes the screen."""
+    """Shows that the session is finished, that the sitting stopped, or that the person does not take part; and the
+    number of saved answers, if there are any. Enter closes the screen."""
 
     PAGE = "help_goodbye"
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"

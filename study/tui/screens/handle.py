@@ -1,5 +1,4 @@
-"""Screen before a trial: it shows where the handle is, and where the participant must move it. Opened and updated by
-`study.tui.app.sitting_screens`."""
+"""Screen before a trial: it shows where the handle is, and where the participant must move it."""
 
 from typing import ClassVar
 
@@ -17,8 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class HandleScreen(TranslatedScreen[Unanswered | None]):
-    """Draws the position of the handle and its target. p pauses, q leaves; the application closes the screen when the
-    handle is in its place."""
+    """Draws the position of the handle and its target. p pauses, q leaves; otherwise the application closes the screen
+    when the wait for the handle ends."""
 
     PAGE = "help_handle"
     DEFAULT_CSS = """
@@ -46,8 +45,7 @@ class HandleScreen(TranslatedScreen[Unanswered | None]):
         self.update_view(self._view)
 
     def update_view(self, view: HandleView) -> None:
-        """Draw a new position of the handle. May be called before the first frame; the position is then drawn with
-        it."""
+        """Draw a new position of the handle; before the first frame, with that."""
         self._view = view
         if self.query(HandleTarget):  # False before the first frame
             self.query_one(HandleTarget).view = view

@@ -1,5 +1,4 @@
-"""Help on a screen, as a dialog above it. The applications and modal screens open it for the key F1, with the text of
-the screen's attribute `HELP`."""
+"""Help on a screen, as a dialog above it."""
 
 from typing import ClassVar
 

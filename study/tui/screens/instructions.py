@@ -1,5 +1,4 @@
-"""Screen of the instructions that a participant reads before the first trial of a sitting; opened by
-`sitting_screens`."""
+"""Screen of the instructions that a participant reads before the first trial of a sitting."""
 
 from typing import ClassVar
 
@@ -32,8 +31,6 @@ class InstructionsScreen(TranslatedScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "begin", "Begin", key_display="Enter")]
 
     def __init__(self, welcome: Welcome, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
-        """welcome: facts about the sitting; keys: keys for the two answers; words: texts in the
-        language of the sitting."""
         super().__init__(words)
         self._welcome = welcome
         self._keys = keys

@@ -1,7 +1,6 @@
 """Dialog to write a note into the session's log, or to report an adverse event such as pain.
 
-Each note states its writer (participant or experimenter); a report of an adverse event is marked as such. Opened by the
-application (`study.tui.app.app`, for the experimenter) and by the pause screen (`pause`, for the participant).
+A note states its writer (participant or experimenter); a report of an adverse event is marked as such.
 """
 
 from typing import ClassVar
@@ -91,13 +90,10 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
             )
 
     def action_leave(self) -> None:
-        """Dismiss without a note."""
         dismiss_screen(self, None)
 
     def action_help(self) -> None:
-        """Open the help page of this dialog."""
         self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def _refuse(self, sentence: str) -> None:
-        """Show the reason why the note cannot be written."""
         self.query_one("#message", LiteralText).update(sentence)

@@ -1,5 +1,4 @@
-"""Prompt for a note of the experimenter for the session log, typed while the session continues. Opened by the
-experimenter's view (`study.tui.watch.watch_screen`)."""
+"""Prompt for a note of the experimenter for the session log, typed while the session continues."""
 
 from collections.abc import Callable
 from typing import ClassVar
@@ -53,7 +52,6 @@ class NotePrompt(ModalScreen[str | None]):
         dismiss_screen(self, event.value.strip() or None)
 
     def action_stop(self) -> None:
-        """Stop the session; the dialog stays open."""
         self._stop()
 
     def action_leave(self) -> None:

@@ -1,6 +1,6 @@
 """Screen of a pause: no stimulus is played until the participant decides to continue, to leave or to withdraw.
 
-A note or an adverse event can be written into the log from here. Made by `study.tui.app.sitting_screens`.
+A note or an adverse event can be written into the log from here.
 """
 
 from dataclasses import dataclass

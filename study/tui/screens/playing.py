@@ -1,6 +1,6 @@
 """Screen while a stimulus of fixed duration plays without a question: an interval, a demonstration, or a probe.
 
-A probe is a stimulus that measures the device, to which the participant does not respond. Called by `sitting_screens`.
+A probe is a stimulus that measures the device, to which the participant does not respond.
 """
 
 from typing import ClassVar
@@ -57,9 +57,7 @@ class PlayingScreen(TranslatedScreen[Unanswered | None]):
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:
-        """Dismiss the screen with the request to pause."""
         dismiss_screen(self, PAUSE)
 
     def action_leave(self) -> None:
-        """Dismiss the screen with the request to leave the session."""
         dismiss_screen(self, LEAVING)

@@ -1,5 +1,4 @@
-"""Screen after a practice run: number of correct answers, and whether the criterion of the practice was met. Opened by
-`study.tui.app.sitting_screens`."""
+"""Screen after a practice run: number of correct answers, and whether the criterion of the practice was met."""
 
 from typing import ClassVar
 

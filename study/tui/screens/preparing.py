@@ -1,5 +1,5 @@
-"""Screen that is shown while the device is prepared: current step and elapsed time. It has no progress bar, because the
-duration is unknown. Shown by `study.tui.app.sitting_screens`; the screen `diagnosing` uses `describe_elapsed`."""
+"""Screen that is shown during a slow step, such as the preparation of the device: current step and elapsed time. It has
+no progress bar, because the duration is unknown."""
 
 import time
 from collections.abc import Callable
@@ -14,12 +14,11 @@ from study.tui.translated_screen import TranslatedScreen
 UPDATE_INTERVAL_S = 0.5
 """Interval (s) at which the elapsed time is drawn. Chosen: half of its resolution, a second."""
 PLACEHOLDER_TEXT = "…"
-"""Text that is shown as long as there is no sentence."""
 
 
 class PreparingScreen(TranslatedScreen[None]):
-    """Shows the current step of a preparation and the elapsed time; no keys. Without a sentence it shows only
-    `PLACEHOLDER_TEXT`, because the participant's language is not known before the protocol was read."""
+    """Shows the current step and the elapsed time. Without a sentence it shows only `PLACEHOLDER_TEXT`, because the
+    participant's language is not known before the protocol was read."""
 
     PAGE = "help_preparing"
     CSS = """
@@ -63,18 +62,15 @@ class PreparingScreen(TranslatedScreen[None]):
             self._set_box_title()
 
     def set_language(self, words: Words) -> None:
-        """Show the texts in this language from now on."""
         self.words = words
         self._set_box_title()
         self.refresh_bindings()
 
     def _set_box_title(self) -> None:
-        """Set the title of the box; none without a sentence."""
         for box in self.query(Vertical):
             box.border_title = self._sentence and self.words["preparing_title"]
 
     def _update_elapsed(self) -> None:
-        """Draw the elapsed time; called every `UPDATE_INTERVAL_S`."""
         self.query_one("#elapsed", Static).update(self._describe_wait())
 
     def _describe_wait(self) -> str:

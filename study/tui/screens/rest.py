@@ -1,7 +1,6 @@
 """Screen of an enforced rest between runs or trials: remaining time, remaining runs, and progress of the session.
 
-The rest cannot be shortened: Enter has no effect before its end. Opened by `study.tui.app.sitting_screens`; the engine
-enforces the duration as well (`remote_display`).
+The participant cannot shorten the rest: Enter has no effect before its end.
 """
 
 import math
@@ -58,7 +57,7 @@ class RestScreen(TranslatedScreen[float]):
         self._update_countdown()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        # Enter has no effect before the end of the rest; the footer does not list it until then.
+        # The footer does not list Enter before the end of the rest.
         return action != "go_on" or self._has_ended()
 
     def action_go_on(self) -> None:

@@ -1,7 +1,6 @@
 """Dialog that confirms a participant's withdrawal of consent before data are erased.
 
-The participant's code must be typed, so that no single key erases data. Shown by `study.tui.screens.session`, which
-requests the erasure if the dialog returns True; the dialog itself erases nothing.
+The participant's code must be typed, so that no single key erases data. The dialog itself erases nothing.
 """
 
 from typing import ClassVar
@@ -31,9 +30,8 @@ In a terminal: `hapteq withdraw SESSION`.
 
 
 class WithdrawPrompt(ModalScreen[bool]):
-    """Dialog that asks for the participant's code before all sessions with that code are erased. Enter returns True if
-    the typed text without surrounding blanks is the code, and else shows a message; Esc returns False. subject: the
-    participant's code."""
+    """Dialog that asks for the participant's code. Enter returns True if the typed text without surrounding blanks is
+    the code, and else shows a message; Esc returns False. subject: the participant's code."""
 
     HELP = HELP
     CSS = """
@@ -68,7 +66,6 @@ class WithdrawPrompt(ModalScreen[bool]):
 
     @on(Input.Submitted)
     def _check_input(self, event: Input.Submitted) -> None:
-        """Close the dialog with True if the code was typed; otherwise show that nothing was erased."""
         if event.value.strip() == self._subject:
             dismiss_screen(self, True)
         else:

@@ -1,6 +1,6 @@
 """Plot of the adaptive staircase of the current run: level (N, logarithmic) over trials, drawn in braille dots.
 
-Used by `watch_screen`, the experimenter's view, only: levels and correctness must not be shown to the participant.
+For the experimenter's view only: levels and correctness must not be shown to the participant.
 """
 
 import itertools
@@ -24,7 +24,6 @@ MAX_DOTS_PER_TRIAL = 4.0
 MUTED = "$foreground 65%"
 """Style of labels and legend."""
 NEXT_MARK = "?"
-"""Mark of the next level."""
 LEGEND = f"{RIGHT_MARK} right {WRONG_MARK} wrong {PEAK_MARK}{VALLEY_MARK} reversal {NEXT_MARK}next ┄cap"
 """Meaning of the marks, on a single line."""
 
@@ -35,7 +34,6 @@ _MARK_STYLES = {
     VALLEY_MARK: "bold $text-error",
     NEXT_MARK: "bold",
 }
-"""Style of each mark."""
 _MARK_PRIORITY = {WRONG_MARK: 1, RIGHT_MARK: 0, PEAK_MARK: 2, VALLEY_MARK: 2, NEXT_MARK: 3}
 """Priority of each mark: if several marks share a character cell, that with the highest number is drawn."""
 

@@ -1,7 +1,7 @@
 """Application of `hapteq watch` (`study.cli.watch`): the experimenter's view of a running session in a second terminal.
 
 The view itself is `watch_screen.WatchScreen`; this application adds themes, the queue of user input, and the exit on
-signals.
+signals or without a terminal.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from study.tui.watch.watch_source import WatchSource
 
 
 class WatchApp(App[None]):
-    """Application with the experimenter's view as its only screen. The key t changes the theme; the screen handles all
-    other keys."""
+    """Application that shows the experimenter's view and ends with it. The key t changes the theme."""
 
     TITLE = "hapteq watch"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]

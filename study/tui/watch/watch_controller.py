@@ -31,8 +31,7 @@ class WatchController:
 
     def toggle_view(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
         """Close the view if it is on top. Otherwise open it on the screen of the running session, after the user has
-        typed the name of the session as confirmation; before the view opens, a note in the log records that it was
-        shown."""
+        typed the name of the session as confirmation; a note for the log, that it was shown, is sent before."""
         if self._screen is not None and self._app.screen is self._screen:
             self.close()
             return
@@ -45,8 +44,7 @@ class WatchController:
         confirm_view(self._app, Path(session_folder).name, open_confirmed)
 
     def open_after_confirmation(self, session_folder: str, send_request: Callable[[Request], object]) -> None:
-        """Open the view of a session that another program runs, after the user has typed the name of the session as
-        confirmation; nothing is logged."""
+        """Open the view of a session that another program runs, after the same confirmation; nothing is logged."""
         from study.tui.screens.confirm_view import confirm_view
 
         confirm_view(self._app, Path(session_folder).name, lambda: self.open_view(session_folder, send_request))
@@ -84,7 +82,6 @@ class WatchController:
             threading.Thread(target=feed.close, name="watch-end", daemon=True).start()
 
     def _report_start_failure(self, error: OSError) -> None:
-        """Notify the user that the reading process could not be started."""
         self._is_starting = False
         self._app.notify(f"The view cannot be opened: {error.strerror or error}.", severity="error", markup=False)
 

@@ -85,7 +85,7 @@ def format_trials(view: WatchView, rows: int, columns: int) -> Content:
     follows where a trial was not measured and there is room for it. rows, columns: available space, in cells."""
     header = "trial     N shown said           s m/s²  off"
     # 10 columns: two blanks and the 8 columns from which `_format_trial` writes a remark.
-    lines = [Content.styled(f"{header}  remark" if columns > len(header) + 10 else header, MUTED)]
+    lines = [Content.styled(f"{header}  remark" if columns >= len(header) + 10 else header, MUTED)]
     open_trial = view.open_trial
     if open_trial is not None:
         lines.append(Content(f"{open_trial.trial + 1:>5} {open_trial.level_n:5.3g}  hidden until it is answered"))

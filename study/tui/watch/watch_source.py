@@ -12,8 +12,8 @@ class WatchSource(Protocol):
     """Source of views of a session; implemented by `study.tui.engine.watch_feed.WatchFeed`."""
 
     def latest(self) -> WatchView | None:
-        """The latest view; None before the first. Must not block: the screen's event loop calls it ten times per second
-        (`watch_screen.POLL_EVERY_S`)."""
+        """The latest view; None before the first. Must not block: the screen's event loop calls it every
+        `watch_screen.POLL_EVERY_S`."""
         ...
 
     @property

@@ -5,8 +5,8 @@ from textual.containers import Vertical, VerticalScroll
 
 
 class Card(Vertical):
-    """Framed box with a title, as high as its content and at most as high as the screen. The screen's `align` style
-    places it. CSS classes of its widgets: `strong` (bold), `gap` (an empty line above)."""
+    """Framed box with a title, as high as its content and at most as its container. CSS classes of its widgets:
+    `strong` (bold), `gap` (an empty line above)."""
 
     DEFAULT_CSS = """
     Card {

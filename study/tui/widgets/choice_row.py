@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from rich.cells import cell_len
 from rich.text import Text
 from textual.binding import Binding, BindingType
 from textual.events import Click, Key
@@ -83,7 +84,7 @@ class ChoiceRow(Widget, can_focus=True):
     def find_choice_at(self, x: int, y: int) -> int | None:
         """Find the index of the choice drawn in the cell at column x and row y; None where there is none."""
         for index, (column, row) in enumerate(self._place_choices(self.size.width)):
-            if row == y and column <= x < column + len(self._format_label(index)):
+            if row == y and column <= x < column + cell_len(self._format_label(index)):
                 return index
         return None
 
@@ -116,7 +117,7 @@ class ChoiceRow(Widget, can_focus=True):
                 text_column, text_row = 0, choice_position[1]
             text.append(" " * (choice_position[0] - text_column))
             text.append(self._format_label(index), self._get_label_style(index))
-            text_column = choice_position[0] + len(self._format_label(index))
+            text_column = choice_position[0] + cell_len(self._format_label(index))
         return text
 
     def _get_label_style(self, index: int) -> str:
@@ -133,7 +134,7 @@ class ChoiceRow(Widget, can_focus=True):
     def _place_choices(self, width: int) -> list[tuple[int, int]]:
         """Compute column and row of each choice (character cells, from 0) at this width: side by side if all fit,
         otherwise one below the other."""
-        label_widths = [len(self._format_label(index)) for index in range(len(self._choices))]
+        label_widths = [cell_len(self._format_label(index)) for index in range(len(self._choices))]
         if sum(label_widths) + CHOICE_GAP_CELLS * (len(label_widths) - 1) > width:
             return [(0, index) for index in range(len(label_widths))]
         return [(sum(label_widths[:index]) + CHOICE_GAP_CELLS * index, 0) for index in range(len(label_widths))]

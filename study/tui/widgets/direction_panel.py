@@ -1,7 +1,6 @@
 """Panel for one of the two answers of a trial: its number, its direction as a thick line, and its description in words.
 
-Number, words and the heavier frame carry the same information as the colour, so that colour is not needed. Used by the
-screens `trial`, `playing`, `instructions` and `demo`.
+Number, words and the heavier frame carry the same information as the colour, so that colour is not needed.
 """
 
 import textwrap
@@ -95,8 +94,8 @@ class DirectionPanel(Widget):
         return drawing, (self.size.width - drawing_size.width) // 2
 
     def _wrap_description(self) -> list[str]:
-        """Wrap the description into as many lines as it needs: it is never cut, because the missing word could be
-        the one in which the two directions differ."""
+        """Wrap the description into as many lines as it needs, because a missing word could be the one in which the two
+        directions differ."""
         return textwrap.wrap(self._describe_answer(), max(1, self.size.width), break_on_hyphens=False) or [""]
 
     def _describe_answer(self) -> str:

@@ -1,5 +1,5 @@
-"""Widget of one field of a form: the question and its answer. Used by the form's screen (`study.tui.screens.form`),
-which handles the keys; this widget only displays."""
+"""Widget of one field of a form: the question and its answer. It only displays; the form's screen
+(`study.tui.screens.form`) handles the keys."""
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -61,8 +61,8 @@ class FormQuestion(Vertical):
             self.query_one(".written", Static).update(self._format_answer(entry, is_current))
 
     def _format_answer(self, entry: FieldEntry, is_current: bool) -> Text:
-        """Format the entered text, or a hint (with the range of a number) while nothing is entered. is_current: whether
-        the cursor of the form is on this question, so that the text cursor is shown."""
+        """Format the entered text, or a hint (with the range of a number) while nothing is entered; the text cursor is
+        shown if `is_current`."""
         if not entry.answer:
             hint = self._words["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:

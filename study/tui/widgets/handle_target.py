@@ -1,7 +1,7 @@
 """Widget that shows the position of the handle relative to the circle within which a trial may start.
 
 The circle is drawn with 40 % of the available radius, so that a handle outside it is shown to scale up to almost 2.5
-times the radius. Used by `screens.handle`.
+times the radius.
 """
 
 import math
@@ -37,7 +37,6 @@ class HandleTarget(Widget):
 
 
 BOLD = Style(bold=True)
-"""Style of the drawing."""
 
 
 def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:

@@ -1,5 +1,4 @@
-"""Scrolling view of many lines of text: only visible lines are drawn, and long lines are wrapped between words. Used by
-the screen of a session (`study.tui.screens.session`) for its log."""
+"""Scrolling view of many lines of text: only visible lines are drawn, and long lines are wrapped."""
 
 import re
 import textwrap
@@ -15,8 +14,7 @@ indented by its length."""
 
 
 class LongText(ScrollView, can_focus=True):
-    """Widget for lines of text, wrapped at its width and drawn when they scroll into view; arrow and page keys
-    scroll."""
+    """Widget for lines of text, wrapped at its width; arrow and page keys scroll."""
 
     DEFAULT_CSS = "LongText { background: $background; }"
 

@@ -32,10 +32,10 @@ class SessionBar(Widget):
         self._words = words
 
     def render_line(self, y: int) -> Strip:
-        """Draw the line. The heading is cut only where the shortest bar, 8 characters, leaves too little room."""
+        """Draw the line. The heading is cut where the shortest bar, 8 characters, leaves too little room."""
         width = self.size.width
-        # The bar has at most 40 characters and a quarter of the width (chosen: longer shows no more detail). It shrinks
-        # to 8, the shortest bar that shows progress, so that the heading is not cut.
+        # The bar has up to 40 characters and a quarter of the width (chosen: longer shows no more detail). It shrinks
+        # to 8, the shortest bar that shows progress, before the heading is cut.
         available_bar_width = width - len(self.heading) - 1 - len(self._format_progress(0))
         right_text = self._format_progress(max(8, min(40, width // 4, available_bar_width)))
         left_text = self.heading[: max(0, width - len(right_text) - 1)]

@@ -1,8 +1,4 @@
-"""Widget with the staircase of a run of a past session: title, plot, and a sentence that summarises the run. Used by
-`study.tui.screens.session`.
-
-The staircase of a running session is drawn by `study.tui.watch.level_history`.
-"""
+"""Widget with the staircase of a run of a past session: title, plot, and a sentence that summarises the run."""
 
 import itertools
 
@@ -26,7 +22,6 @@ _STYLES = {
     PEAK_MARK: "bold",
     VALLEY_MARK: "bold $text-error",
 }
-"""Style of each mark of a trial."""
 MUTED_STYLE = "$foreground 65%"
 """Style of labels and of the summary."""
 _TEXT_LINES = 2

@@ -1,5 +1,4 @@
-"""Table widget as text: bold header, aligned columns, as wide as its content; the container must scroll. Used by the
-screens `diagnosis` and `session`."""
+"""Table widget as text: bold header, aligned columns, as wide as its content; the container must scroll."""
 
 from textual.content import Content
 from textual.widgets import Static

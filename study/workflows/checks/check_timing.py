@@ -60,8 +60,8 @@ def check_timing(
     on_progress: Callable[[float], None],
     load_per_processor: float | None = None,
 ) -> Timing:
-    """Hold zero force for duration_s, and judge the timing. The device's limit of a hold (`Limits.longest_hold_s`) must
-    not be shorter.
+    """Hold zero force for duration_s (s, above 0), and judge the timing. The device's limit of a hold
+    (`Limits.longest_hold_s`) must not be shorter.
 
     on_progress: called with the seconds done. load_per_processor: measured before; None if unknown. The force is zero
     only if the device was opened without a centring spring. Raises DeviceError for a lost device.

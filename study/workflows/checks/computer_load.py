@@ -1,8 +1,4 @@
-"""Load average of this computer: a busy computer delays the control loop of the device.
-
-Called by the checks before a sitting (`prepare_sitting`, `examine_setup`), and by `study.tui.engine.remote_display` to
-explain a screen that does not respond.
-"""
+"""Load average of this computer: a busy computer delays the control loop of the device."""
 
 import os
 
@@ -12,7 +8,7 @@ def get_load_per_processor() -> float | None:
     busy. None where the system has no load average (Windows)."""
     try:
         load_average = os.getloadavg()[0]
-    except (AttributeError, OSError):  # Windows has no load average
+    except (AttributeError, OSError):
         return None
     processor_count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return load_average / max(processor_count or 1, 1)

@@ -1,5 +1,4 @@
-"""Format the changes of a device since its acceptance as findings, with values, limits and advice. Called by
-`daily_check`."""
+"""Format the changes of a device since its acceptance as findings, with values, limits and advice."""
 
 import math
 from collections.abc import Sequence
@@ -37,7 +36,7 @@ def make_change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ..
 
 def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
     """Make the finding on one kind of change, over all axes: wrong where an axis changed, a warning where noise hides
-    whether one changed. friction_changed: whether the friction changed too, which also changes gain and response."""
+    whether one changed. friction_changed: whether the friction changed, which may also change gain and response."""
     change_text = f"{'; '.join(_format_change(change) for change in changes)} ({_format_limit(changes[0])})"
     changed_axes_text = ", ".join(change.axis for change in changes if change.changed)
     cause_text = (
@@ -56,7 +55,7 @@ def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool
 
 
 def _format_change(change: "Change") -> str:
-    """Format axis and size of a change: percent for gain and response, else the present and the accepted value."""
+    """Format axis and size: percent for gain and a measured response, else the present and the accepted value."""
     match change.kind:
         case "gain":
             return f"{change.axis} {format_signed(100 * (change.today - 1), 1)} %"

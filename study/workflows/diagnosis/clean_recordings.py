@@ -1,6 +1,6 @@
 """Read clean recordings (`--clean`), made when the device was intact, as the reference for those to be diagnosed.
 
-Both must have the same channels, units and rate; the same file cannot be both. Called by `diagnose_recordings`.
+Both must have the same channels of command and response, units and rate; the same file cannot be both.
 """
 
 from collections.abc import Sequence
@@ -20,8 +20,8 @@ INCOMPARABLE_ADVICE = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputWithReference:
-    """Input of a diagnosis and its clean reference. Positions and conditions that are not the same in all recordings
-    are removed, with a remark in `diagnosed`."""
+    """Input of a diagnosis and its clean reference. Positions, or conditions, whose channels or units differ between
+    recordings are removed, with a remark in `diagnosed`."""
 
     diagnosed: DiagnosisInput
     clean: DiagnosisInput

@@ -1,7 +1,4 @@
-"""Run a diagnosis that was started from a screen of the application, and choose the folder of its results.
-
-Called by the engine process (`study.tui.engine.engine_commands`).
-"""
+"""Run a diagnosis that was started from a screen of the application, and choose the folder of its results."""
 
 from collections.abc import Callable
 from itertools import count

@@ -29,8 +29,7 @@ def format_answer(findings: Findings) -> tuple[str, ...]:
 
 
 def list_new_remarks(final_findings: Findings, printed_findings: Findings) -> tuple[str, ...]:
-    """List the remarks that were added while the report was written, after the answer had been printed.
-    printed_findings: the findings as printed."""
+    """List the remarks that were added after the findings had been printed (`printed_findings`)."""
     return tuple(remark for remark in final_findings.remarks if remark not in printed_findings.remarks)
 
 

@@ -1,7 +1,7 @@
 """Fit of a first mechanical model to the recordings of a diagnosis to which no model was given.
 
 Runs the fits of `analysis.diagnosis.first_model` and converts their error for unsuitable recordings into a StudyError
-with a remedy. Called by `diagnose_recordings` and `study.evaluation.real.diagnose_real`.
+with a remedy.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -29,15 +29,14 @@ def fit_first_model(
     on_progress: Progress,
     discovery: bool = True,
 ) -> FirstModel:
-    """Fit a first model by force balance or, if that crashes or gives no model, a linear one to the spectra.
-    excluded_effects: names of effects that are left out. on_progress: called with the step's name and its completed
-    share, 0 to 1. discovery: whether laws outside the catalogue are tried. Raises StudyError for unsuitable
+    """Fit a first model (`analysis.diagnosis.first_model.fit_without_model.fit_first_model`) or, if that crashes, a
+    linear one. excluded_effects: names of effects that are left out. on_progress: called with the step's name and its
+    completed share, 0 to 1. discovery: whether laws outside the catalogue are tried. Raises StudyError for unsuitable
     recordings."""
     has_time_left, guard = time_budget_and_guard  # the time limit of the search, and the guard that catches crashes
     excluded_names = list_excluded_laws(excluded_effects, discovery)
 
     def fit_by_balance() -> FirstModel | None:
-        """Fit by force balance; None where this gives no model."""
         return fit_without_model.fit_first_model(
             diagnosis_input.recordings, excluded_names, has_time_left, on_progress, map_forked
         )
@@ -52,8 +51,8 @@ def fit_first_model(
 def fit_linear_model(
     diagnosis_input: DiagnosisInput, on_progress: Callable[[float], None], origin: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """Fit a linear model to the spectra. Returns the model and remarks. on_progress: called with the completed share, 0
-    to 1. origin: origin of the recordings, for the model's name. Raises StudyError for unsuitable recordings."""
+    """Fit a linear model to forces or spectra. Returns the model and remarks. on_progress: called with the completed
+    share, 0 to 1. origin: of the recordings, for the model's name. Raises StudyError for unsuitable recordings."""
     with _translate_refusals():
         return fit_without_model.fit_first_linear_model(diagnosis_input.recordings, on_progress, origin)
 

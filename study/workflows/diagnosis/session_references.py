@@ -1,8 +1,8 @@
 """Find the reference probes of a session, played without a hand on the handle, as recordings for a diagnosis.
 
-Trials are single frequencies with a hand on the handle, from which no effect can be named. A reference is a multisine
-on the free handle, like the recordings of `hapteq record`, and is diagnosed in place of the trials. A remark states
-which changes of the device all probes of the session show. Called by `diagnosis_input`.
+Trials are single frequencies with a hand on the handle. A reference is a multisine on the free handle, like the
+recordings of `hapteq record`, and is diagnosed in place of the trials. A remark states which changes of the device the
+probes of the session show.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from study.workflows.results.session_drift import DriftReader
 
 @dataclass(frozen=True, slots=True)
 class SessionReferences:
-    """Recordings of a session's references, to be diagnosed in place of its trials."""
+    """Recordings of a session's references."""
 
     log: Path
     """Event log of the session."""
     paths: tuple[Path, ...]
     """Recordings, in the order of the log; at least one."""
     remarks: tuple[str, ...]
-    """Sentences for the report: which recordings are diagnosed, and the drift of the device over all probes."""
+    """Sentences for the report: which recordings are diagnosed, and the drift of the device over the probes."""
 
 
 def find_references(session: Path) -> SessionReferences | None:

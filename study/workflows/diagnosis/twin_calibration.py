@@ -1,8 +1,8 @@
 """Change of a device's inertia with the position of the handle, added to its identified mechanical model.
 
-`write_twin` (`hapteq twin --calibration`) calls it. The model is identified at the centre, where its masses are known
-from recordings. The calibration of the linkage gives the inertia matrix M(x) (kg) at the handle, from which the slope
-dM_aa/dx_a (kg/m) along each axis a follows.
+The model of `hapteq twin` is identified at the centre, where its masses are known from recordings. The calibration of
+the linkage gives the inertia matrix M(x) (kg) at the handle, from which the slope dM_aa/dx_a (kg/m) along each axis a
+follows.
 """
 
 import numpy as np
@@ -32,8 +32,7 @@ def check_same_device(calibration: LinkageCalibration, device: str, title: str) 
 
 def make_inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
     """Make the change of inertia along each axis at the centre, as effects `pose_dependent_inertia` with the parameter
-    per_m = (dM_aa/dx_a) / (a' M a) in 1/m for the driven axis a. An axis with a slope of at most `MIN_SLOPE_PER_M` has
-    no effect.
+    per_m = (dM_aa/dx_a) / (a' M a) in 1/m for the driven axis a; none where its magnitude is at most `MIN_SLOPE_PER_M`.
 
     a' M a is the mass at the actuator's end of the transmission alone; per_m is therefore larger than the slope
     relative to the total mass.

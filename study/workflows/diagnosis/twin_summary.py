@@ -1,7 +1,6 @@
 """Summary of the mechanical model that `hapteq twin` wrote: its parameters and its prediction error.
 
-`study.cli.twin` prints it, as lines of text or as plain values in JSON. Errors are rms errors relative to the rms of
-the measured channel.
+Errors are rms errors relative to the rms of the measured channel.
 """
 
 from dataclasses import asdict
@@ -39,8 +38,8 @@ def summarise_twin(twin: WrittenTwin) -> dict[str, Any]:
 
 
 def format_twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
-    """Format the written model as lines of text for the terminal: the rigid body, the modes of its bodies, and the
-    error of each channel (%)."""
+    """Format the written model as lines of text for the terminal: the rigid body, the modes of further bodies if there
+    are any, and the error of each channel (%)."""
     model, fit, tolerance = twin.model, twin.fit, twin.model.tolerance
     rigid_body, mass_tolerance_text = twin.rigid_body, _format_deviation(tolerance, "mass_kg")
     lines = [

@@ -1,7 +1,7 @@
 """Write the result folder of a diagnosis: document (JSON), improved model, figures and report (HTML), in this order.
 
 A `Picture` is a figure with title and caption; a drawing makes one or more. Drawings run in parallel; one that crashes
-is left out, with a remark in the report. Called by `diagnose_recordings` and `study.evaluation.real.real_recordings`.
+is left out, with a remark in the report (`crash_guard`).
 """
 
 from collections.abc import Callable, Sequence
@@ -24,8 +24,8 @@ from study.workflows.picture_files import DrawnPicture, draw_picture, write_draw
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
-    """Write all files into an existing `folder`. parents: input files, for the provenance. Returns the findings with a
-    remark for each drawing that crashed. Raises StudyError where a file exists or cannot be written."""
+    """Write the files into an existing empty `folder`. parents: input files, for the provenance. Returns the findings
+    with a remark for each drawing that crashed. Raises StudyError where a file cannot be written."""
     provenance = gather_provenance(parents=parents)
     write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, provenance)
     improved_model = replace(findings.improved, provenance=provenance.as_dict())
@@ -48,7 +48,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
 
 
 def _draw_pictures(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
-    """Make the pictures of a drawing and render them, in a worker process."""
+    """Make the pictures of a drawing and render them."""
     return [draw_picture(picture) for picture in draw()]
 
 

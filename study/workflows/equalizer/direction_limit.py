@@ -1,9 +1,7 @@
-"""Reads the direction limit of a study from `anova.json`, as the upper end of the band of an identified model.
+"""Read the direction limit of a study from `anova.json`, as the upper end of the band of an identified model.
 
 The direction limit is the frequency (Hz) at which the median threshold for telling directions apart reaches the force
-cap (docs/statistics.md). Above it, most participants cannot tell directions apart at forces below the cap: a model
-identified up to this limit renders strength and direction, and a second model with a wider band renders the strength
-alone. Called by `hapteq identify`.
+cap (docs/statistics.md). Above it, most participants cannot tell directions apart at forces below the cap.
 """
 
 import json
@@ -30,7 +28,7 @@ class StudyBand:
 
     band_hz: tuple[float, float]
     origin: str
-    """Source of the upper end, with its confidence interval: a sentence, and another for simulated participants."""
+    """Source of the upper end, with its interval, in words."""
 
 
 def read_study_band(path: Path, lowest_hz: float) -> StudyBand:

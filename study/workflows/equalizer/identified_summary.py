@@ -1,5 +1,4 @@
-"""Summary of an identified device for `hapteq identify` and its report (`report_identification`): lines of text for the
-terminal, plain values for JSON."""
+"""Summary of an identified device for `hapteq identify` and its report: lines of text, plain values for JSON."""
 
 from typing import Any
 
@@ -31,8 +30,8 @@ def summarise_model(device: IdentifiedDevice) -> dict[str, Any]:
 
 
 def format_summary(device: IdentifiedDevice) -> tuple[str, ...]:
-    """Format quality, order, band (Hz) and errors (%) as lines for the terminal, and the effects that were subtracted
-    from the recordings if there are any."""
+    """Format quality, order, band (Hz) and errors (%) as lines of text, and the effects that were subtracted from the
+    recordings if there are any."""
     summary = summarise_model(device)
     lowest_hz, highest_hz = summary["band_hz"]
     lines = [

@@ -2,7 +2,7 @@
 
 Effects that act on the command are applied to it, and the forces of other effects along the measured motion are
 subtracted from it (`equalizer.tracking.compensation.subtract_effects`). Effects that cannot be removed stay in the
-recordings. Called by `identify_model`.
+recordings.
 """
 
 from collections.abc import Sequence
@@ -22,8 +22,7 @@ TAIL_SHARE = 0.005
 
 def remove_effects(recordings: Sequence[Recording], physics: MechanicalModel, path: Path) -> tuple[Recording, ...]:
     """Remove the effects of `physics` from the recordings. path: file of the mechanical model, for messages. Raises
-    StudyError if no effect can be removed, or a recording has no excitation, missing samples, or a response that is not
-    the acceleration of each command."""
+    StudyError if no effect can be removed, a recording has no excitation, or `subtract_effects` refuses one."""
     if not list_removable_effects(physics):
         reasons = " ".join(explain_unremovable_effects(physics))
         raise _make_not_removable_error(

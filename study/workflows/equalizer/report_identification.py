@@ -1,7 +1,7 @@
 """Write the report of an identified device: an HTML page and its figures, in the folder of the results.
 
 The page shows estimate and model, resonances, the frequency above which the axes couple, the frequency bands with their
-control methods, and a comparison of model orders (`compare_orders`). Called by `hapteq identify`.
+control methods, and a comparison of model orders (`compare_orders`).
 """
 
 from collections.abc import Callable
@@ -34,8 +34,8 @@ PAGE_NAME = "report.html"
 
 
 def report_identification(device: IdentifiedDevice, folder: Path, on_progress: Callable[[float], None]) -> Path:
-    """Write report.html and figures/ into `folder`; returns the path of the page. on_progress: called with the share
-    done, 0 to 1. Raises CannotWriteError."""
+    """Write report.html and figures/ into `folder`, replacing earlier files; returns the path of the page. on_progress:
+    called with the share done, 0 to 1. Raises CannotWriteError."""
     # The shares 0.8 and 0.95 are chosen: the comparison of orders takes most of the time, then the figures.
     report_findings = collect_findings(device, lambda share: on_progress(0.8 * share))
     pictures = make_identification_pictures(report_findings)
@@ -48,8 +48,7 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
 
 
 def collect_findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> IdentificationFindings:
-    """Collect the content of the page. on_progress: called with the share done, 0 to 1, of the comparison of orders,
-    which takes most of the time."""
+    """Collect the content of the page. on_progress: called with the share done, 0 to 1, of the comparison of orders."""
     coupling_onset = find_coupling_onset(device.estimate)
     # Bands begin at 1 Hz or above, as by default in `compute_frequency_bands`.
     lowest_hz, highest_hz = max(1.0, float(device.estimate.frequency_hz[0])), float(device.estimate.frequency_hz[-1])

@@ -1,8 +1,7 @@
 """Virtual spring whose force must be compensated during playback, because the identified model does not contain it.
 
 A model from the excitation to the response (its provenance has `input` = "excitation") contains the virtual spring that
-held the handle while it was recorded; a model from the total force (excitation plus spring) does not. Used wherever
-forces for playback are computed: `play_forces` and `equalize_stimuli`.
+held the handle while it was recorded; a model from the total force (excitation plus spring) does not.
 """
 
 import math

@@ -1,7 +1,6 @@
 """Check mechanical models against recordings: the effects of a model against the channels of each recording.
 
-An effect may name the axes and channels on which it acts; a recording without these contradicts the model. Called by
-`hapteq validate` (`study.cli.validate`) after the files were validated one by one.
+An effect may name the axes and channels on which it acts; a recording without these contradicts the model.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,8 +16,8 @@ from study.workflows.files.validate import Validation
 
 def check_model_channels(validations: Sequence[Validation]) -> tuple[Validation, ...]:
     """Check the mechanical models against the recordings: returns the validations, in the same order, with further
-    problems of each model whose effects do not fit a recording. Only valid files are compared, and only a model and a
-    recording with the same numbers of commands and responses."""
+    problems of each model whose effects do not fit a recording. Files with problems are not compared, nor is a model
+    with a recording of another number of commands or responses."""
     recordings = [
         (validation.path, read_recording(validation.path)) for validation in _select_valid(validations, "recording, ")
     ]
@@ -47,7 +46,7 @@ def _select_valid(validations: Sequence[Validation], kind_prefix: str) -> Iterat
 
 def _find_channel_problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
     """Find effects that cannot be placed on the axes and channels of a recording; yields a sentence on the first such
-    effect of each recording. Recordings with another number of commands or responses are not compared."""
+    effect of each compared recording."""
     # Imported here: loading the catalogue of effects takes longer than checking most files.
     from equalizer.effects.placing import PlacingError, place_recorded_effects
 

@@ -1,8 +1,7 @@
 """Content of a file, read and parsed once, in the forms that the recognisers of `hapteq validate` need.
 
 A file is a folder, an HDF5 file (only its format attribute is read here), or text, which is also parsed as JSON and as
-TOML. Text above a size limit is not parsed. `validate` reads a file with `read_file_content`; `recognisers` and
-`session_recognisers` get the `FileContent`.
+TOML. Text above a size limit is not parsed.
 """
 
 import csv
@@ -28,9 +27,8 @@ class FileContent:
     hdf5_format: str | None = None
     """Format attribute of an HDF5 file; empty if it has none."""
     text: str | None = None
-    """Decoded text of a text file."""
     json: Any = None
-    """The parsed document, if the whole text is one. JSON Lines (`events.jsonl`) are not parsed here."""
+    """The parsed document, if the whole text is one."""
     toml: dict[str, Any] | None = None
     """The parsed document, if the whole text is one."""
 
@@ -52,8 +50,8 @@ class FileContent:
 
 
 def read_file_content(path: Path) -> FileContent:
-    """Read the content of a file or folder. Raises CannotReadError where it cannot be read, UnusableFileError where its
-    name ends in .h5 or .hdf5 but it is not an HDF5 file."""
+    """Read the content of a file or folder. Raises CannotReadError where it cannot be read, UnusableFileError where it
+    is unusable HDF5 (`read_format`), or its name ends in .h5 or .hdf5 and it is no HDF5."""
     try:
         if path.is_dir():
             return FileContent(path, is_folder=True)

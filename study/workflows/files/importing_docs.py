@@ -1,7 +1,7 @@
 """Compose docs/importing.md: how recordings of other programs are imported, and every key of an import map.
 
-`format_docs` writes the page. The prose is in `importing_text`; the tables of keys, functions and shipped maps come
-from the schema and the functions of the code that reads a map, so that page and code agree.
+The prose is in `importing_text`; the tables of keys, functions and shipped maps come from the schema and the functions
+of the code that reads a map, so that page and code agree.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from study.workflows.files import importing_text
 
 
 def compose_importing_page() -> str:
-    """Compose the text of docs/importing.md, in Markdown."""
+    """Compose the text of the page, in Markdown."""
     sections = [
         importing_text.INTRODUCTION,
         f"```toml\n{importing_text.EXAMPLE}```",

@@ -166,7 +166,12 @@ def recognise_daily_check(content: FileContent) -> str | None:
     if content.json_format != DAILY_CHECK_FORMAT:
         return None
     check = read_daily_check(content.path)
-    return f"daily check of {check.device} at {check.utc}: {'passed' if check.passed else 'something changed'}"
+    outcome = "passed" if check.passed else "measured too inaccurately to detect a change"
+    if not check.changes:
+        outcome = "it broke off"
+    elif any(change.get("changed") for change in check.changes):
+        outcome = "something changed"
+    return f"daily check of {check.device} at {check.utc}: {outcome}"
 
 
 def recognise_repeats(content: FileContent) -> str | None:

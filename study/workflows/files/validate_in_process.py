@@ -1,7 +1,4 @@
-"""Validate files in a separate process, because a damaged HDF5 file can crash or hang the library that reads it.
-
-Called by `hapteq validate` (`study.cli.validate`).
-"""
+"""Validate files in a separate process, because a damaged HDF5 file can crash or hang the library that reads it."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -20,9 +17,8 @@ minute."""
 
 
 def validate_files(paths: Sequence[Path], timeout_s: float = FILE_TIMEOUT_S) -> Iterator[Validation]:
-    """Validate each file, in order, and yield its result. timeout_s: longest wait for one file (s). One worker process
-    validates all files and is replaced when a file crashes it or takes too long. Raises StudyError where no worker
-    starts."""
+    """Validate each file, in order, and yield its result. timeout_s: longest wait for one file (s). The worker process
+    is replaced when a file crashes it or takes too long. Raises StudyError where no worker starts."""
     worker = _start_worker()
     try:
         for path in paths:
@@ -70,7 +66,7 @@ def _confirm_start() -> None:
 
 
 def _kill_worker(worker: ProcessPoolExecutor) -> None:
-    """End the worker process at once, even if it hangs in a library."""
+    """End the worker process at once, even if it hangs."""
     for process in list(worker._processes.values()):  # noqa: SLF001 - the executor offers no other way before 3.14
         process.kill()
     worker.shutdown(wait=False, cancel_futures=True)

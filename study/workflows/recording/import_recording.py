@@ -106,6 +106,13 @@ def read_foreign(
 ) -> ForeignRecording:
     """Import files into a single recording in memory; nothing is written. map_name: as `ImportPlan.map`. Raises
     StudyError, and MapNeededError where no map is found and headers do not suffice."""
+    if not files:
+        raise WrongUseError(
+            "There is nothing to import",
+            "No file was given.",
+            "Give files, or a folder of them.",
+            saved=NOTHING_WRITTEN,
+        )
     if map_name is not None:
         map_file = read_map(map_name)
         return _import_by_map(map_file, _expand_folders(files, map_file.map), on_progress)

@@ -1,5 +1,4 @@
-"""Inspect recordings without a model: a page with figures, lines of text, and a JSON document. Called by
-`study.cli.look` (`hapteq look`) and `study.cli.show`.
+"""Inspect recordings without a model (`hapteq look`): a page with figures, lines of text, and a JSON document.
 
 The results (levels, driven bands, coherence, repeats, consistency checks) come from `analysis.look`; this module reads
 the files and writes the results.
@@ -21,16 +20,14 @@ from study.workflows.picture_files import write_pictures
 from study.workflows.recording.read_any_recording import read_any_recording
 
 PAGE_NAME = "report.html"
-"""Page about the recordings, in the folder of results."""
 
 Progress = Callable[[float], None]
 """Callback with the share of the work that is done, 0 to 1."""
 
 
 def inspect_recordings(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
-    """Compute the overviews of hapteq recordings, and of foreign files that can be imported without a map; the remarks
-    on the import are added to their metadata. on_progress: called after each file. Raises StudyError for other
-    files."""
+    """Compute the overviews of hapteq recordings, and of foreign files that can be imported without a map; remarks on
+    the import are added to their metadata. on_progress: called after each file. Raises StudyError for other files."""
     overviews = []
     for count, path in enumerate(paths, start=1):
         recording, notes = read_any_recording(path)

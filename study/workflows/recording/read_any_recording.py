@@ -1,7 +1,7 @@
 """Read a recording from any file: hapteq's own format directly, other formats by an import in memory.
 
 A file of another program (table, MATLAB, NumPy, …) is imported without an import map, which requires that its names
-state the roles of the channels. Called by `look_at_recordings` and by the diagnosis (`diagnosis_input`).
+state the roles of the channels.
 """
 
 from pathlib import Path

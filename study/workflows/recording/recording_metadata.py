@@ -1,7 +1,6 @@
-"""Metadata of a recording's file, and warnings for the experimenter about its pieces. Called by `record_device`.
+"""Metadata of a recording's file, and warnings for the experimenter about its pieces.
 
-The metadata are the parameters of the virtual spring and a description of each played piece (`describe_segment`), that
-is of its kept take.
+The metadata are the parameters of the virtual spring and a description of the kept take of each played piece.
 """
 
 import math
@@ -26,8 +25,8 @@ def describe_spring(spring: SpringSettings, effective_mass_kg: float) -> dict[st
 
 
 def describe_segment(take: RecordedTake) -> dict[str, Any]:
-    """Describe one played piece as JSON values. Clipping is counted in ticks; amplitudes are in N. `number` counts the
-    segments of the protocol from 1, `tries` the takes."""
+    """Describe the kept take of one piece as JSON values. Clipping is counted in ticks; amplitudes are in N. `number`
+    counts the segments of the protocol from 1, `tries` the takes."""
     piece = take.piece
     return {
         "number": piece.number,
@@ -70,7 +69,7 @@ def list_warnings(take: RecordedTake) -> list[str]:
 
 
 def _describe_lost_packets(sensor: SensorFacts, piece_text: str) -> str:
-    """Format the warning about lost packets of the accelerometer. piece_text: the piece in words."""
+    """Format the warning about missing acceleration. piece_text: the piece in words."""
     lost_packets_text = f"{sensor.lost} of {sensor.lost + sensor.packets} packets of the accelerometer were lost"
     return (
         f"{lost_packets_text} ({piece_text}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is "

@@ -1,8 +1,6 @@
 """Names of the files that an analysis writes, and a search for those that exist in a folder.
 
-Separate from `analyze_data`, which is slow to import because of its statistics and plots. Called by `analyze_data`, the
-modules that write or show an analysis (`write_results`, `session_results`, `view_session`, `end_sitting`), the commands
-`analyze` and `rehearse`, and `participant_traces`.
+Separate from `analyze_data`, which is slow to import because of its statistics and plots.
 """
 
 from pathlib import Path
@@ -26,8 +24,7 @@ FIGURE_NAME_PATTERNS = (
     "ellipsoids",
     "staircases-*",
 )
-"""Name patterns of the figures of an analysis. Existing figures are removed before new ones are written, since they may
-show a participant who has withdrawn."""
+"""Name patterns of the figures of an analysis."""
 
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
 """Names of the document with the statistics and of the HTML report."""
@@ -37,7 +34,7 @@ ANALYSIS_FILE_NAMES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NA
 
 def is_analysis_of(folder: Path, log: Path) -> bool:
     """Whether the analysis in `folder` is complete (its report is written last) and was made from the present content
-    of `log`, by the SHA-256 in its provenance. Never raises for damaged files."""
+    of `log`, by the SHA-256 in its provenance; False for damaged files."""
     if not (folder / PAGE_NAME).is_file():
         return False
     try:
@@ -49,8 +46,7 @@ def is_analysis_of(folder: Path, log: Path) -> bool:
 
 
 def list_analysis_outputs(folder: Path) -> tuple[Path, ...]:
-    """List the existing files in `folder` that an analysis writes; no figures where `figures` is a link to another
-    folder."""
+    """List the existing files in `folder` that an analysis writes; no figures where `figures` is a link."""
     figure_folder = folder / "figures"
     figure_files = [
         path

@@ -154,9 +154,10 @@ def _write_files(
         make_folder(figure_folder)
         if figure_folder.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
-        # The report is removed before the figures and written last: without it, files may be of different runs.
+        # The report is removed first and written last: without it, files may be of different runs.
+        (folder / PAGE_NAME).unlink(missing_ok=True)
         for outdated_path in list_analysis_outputs(folder):
-            if outdated_path.parent == figure_folder or outdated_path.name in (DETECTION_NAME, PAGE_NAME):
+            if outdated_path.parent == figure_folder or outdated_path.name == DETECTION_NAME:
                 outdated_path.unlink()
     except OSError as error:
         raise CannotWriteError(figure_folder, error) from error

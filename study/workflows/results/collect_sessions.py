@@ -39,6 +39,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
         for folder, state in session_states
         if state.opened.protocol_hash != chosen_hash
     ]
+    exclusions += [f"{folder.name} has no trial." for folder, state in chosen_sessions if not state.trials]
     trials_by_population = split_by_population([trial for _, state in chosen_sessions for trial in state.trials])
     selected_population = next((candidate for candidate in Population if candidate in trials_by_population), None)
     exclusions += [

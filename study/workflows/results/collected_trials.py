@@ -1,7 +1,5 @@
-"""Input of one analysis (`analyze_data`) or export (`export_study`): trials and facts about their sessions.
-
-They are collected from session folders (`collect_sessions`) or from an exported dataset (`collect_exported`).
-"""
+"""Input of one analysis or export: trials and facts about their sessions, collected from session folders
+(`collect_sessions`) or from an exported dataset (`collect_exported`)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,14 +16,14 @@ class CollectedTrials:
 
     protocol: StudyProtocol
     protocol_hash: str
-    """Hash of the protocol, see `hash_protocol`."""
+    """By `hash_protocol`."""
     trials: tuple[Trial, ...]
     sessions: tuple[SessionFolder, ...]
     """Sessions of the trials; for an export, folders of these names beside its files, which need not exist."""
     seeds: tuple[int, ...]
     """Random seeds of `sessions`, in the same order; 0 where an export does not state it."""
     devices: tuple[str, ...]
-    """Names of all devices that were used, without repetition."""
+    """Names of the devices that were used, without repetition."""
     observers: tuple[str, ...]
     """Names of the simulated participants; empty for people."""
     exclusions: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Writes all results of one session, at its end or on request: seal, tables, summary, then its own analysis."""
+"""Write the results of one session, at its end or on request: seal, tables, summary, then its own analysis."""
 
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.analysis_files import ANALYSIS_NAME

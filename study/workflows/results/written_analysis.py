@@ -1,7 +1,6 @@
 """Result of an analysis and the path of its report.
 
-`analyze_data` returns it to `write_results`, the screens (`engine_commands`) and the command line. A separate module,
-so that its import loads no statistics and plots.
+A separate module, so that its import loads no statistics and plots.
 """
 
 from dataclasses import dataclass
@@ -14,13 +13,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class WrittenAnalysis:
-    """Thresholds of an analysis, and the path of the report that was written."""
+    """Result of `analyze_data`."""
 
     thresholds: "tuple[Threshold, ...]"
     """Threshold of each test run of the analysed sessions, incomplete runs included."""
     table: tuple[str, ...]
-    """Lines of text for the terminal: mean thresholds (N) by frequency, medians and the declared contrast, as
-    `analyze_data.format_threshold_lines` states them."""
+    """Lines of text for the terminal, by `analyze_data.format_threshold_lines`."""
     warnings: tuple[str, ...]
     """Sentences on excluded sessions, results written now, and warnings of the analysis."""
     report: Path

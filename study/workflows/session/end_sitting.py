@@ -1,7 +1,6 @@
 """End of a sitting, after the device was closed: write the results of a finished session, or raise an error.
 
 For an unfinished session the error states how to resume it; a withdrawal of consent erases the participant's data.
-Called by the command line (`study.cli.conduct`) and by the engine of the screens (`engine_commands`).
 """
 
 from dataclasses import replace
@@ -27,7 +26,6 @@ FAULTS_FOR_DOCTOR = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TO
 """Faults for which `hapteq doctor` is recommended: all except those caused by the program's timing or by a person."""
 
 CLOSE_PROGRAMS_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
-"""Advice in the error of a sitting that ended because the computer was too busy."""
 
 
 def end_sitting(sitting: ConductedSitting, utc: str) -> WrittenAnalysis:

@@ -1,8 +1,6 @@
 """Open a session: create its folder and its log, whose first event states everything that determines the session.
 
 These are the protocol, seed, device, equalizer and software versions: an interrupted session is resumed from its log.
-`open_session` is called by `conduct_session`; a `SessionPlan` is made by `plan_sitting`, `simulate_session` and
-`rehearse_study`.
 """
 
 import secrets
@@ -29,7 +27,7 @@ from study.workflows.session.participant_number import find_participant_number
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """Settings of a new session, apart from the device: fixed before the participant starts."""
+    """Settings of a new session, apart from the device."""
 
     protocol: StudyProtocol
     protocol_text: str
@@ -41,11 +39,11 @@ class SessionPlan:
     observer: str | None
     """Name of the simulated participant; None for a person."""
     seed: int
-    """Seed of all random draws of the session."""
+    """Seed of the session's random draws."""
     data_folder: Path
     """Folder in which the session folder is created."""
     participant_number: int | None = None
-    """Place in a balanced order of conditions; None = counted from the participants in the data folder."""
+    """Place in a balanced order of conditions, from 0; None: from the sessions in the data folder."""
     model: Path | None = None
     """Identified model that equalizes the stimuli; None where forces are commanded."""
 
@@ -68,8 +66,8 @@ def draw_seed() -> int:
 def open_session(
     plan: SessionPlan, device: DeviceInfo, session_equalizer: SessionEqualizer, clock: Clock
 ) -> Iterator[OpenedSession]:
-    """Create a session: its folder, a copy of the model, and its log with the first event. The session is locked, and
-    the log open, while the context lasts. Raises StudyError where the folder or the log cannot be created."""
+    """Create a session: its folder, a copy of the model, if any, and its log with the first event. The session is
+    locked, and the log open, while the context lasts. Raises StudyError, or OSError where the log cannot be created."""
     participant_number = plan.participant_number
     if participant_number is None:
         participant_number = find_participant_number(

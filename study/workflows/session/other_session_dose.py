@@ -1,7 +1,4 @@
-"""Vibration dose of a participant's hand from other sessions in the data folder, for the daily exposure limit.
-
-Called when a session is opened (`open_session`) or resumed (`resume_session`).
-"""
+"""Vibration dose of a participant's hand from other sessions in the data folder, for the daily exposure limit."""
 
 from study.errors import StudyError
 from study.session.facts.sitting_events import DoseElsewhere
@@ -17,7 +14,7 @@ def compute_other_session_dose(
     """Compute the dose from this participant's other sessions since the last rest of a night's length (see
     `find_dose_elsewhere`). None for a simulated participant, and where no other session counts and all could be read.
 
-    folder: of the session that begins. observer: name of the simulated participant; None: a person. simulated: whether
+    folder: of the session. observer: name of the simulated participant; None: a person. simulated: whether
     the device is simulated; only sessions on the same kind of device count. utc: present time (ISO 8601). A session
     that cannot be read is named in the result and not counted.
     """

@@ -1,7 +1,6 @@
 """Plan a sitting: read the protocol, draw the seed, check the model and the participant code, find unfinished sessions.
 
-Errors in these are raised here, before a device is opened or a session folder is created. Called by
-`study.cli.conduct` (`hapteq study` in line mode), and by the engine of the screen program.
+Errors in these are raised here, before a device is opened or a session folder is created.
 """
 
 from dataclasses import dataclass
@@ -66,13 +65,13 @@ class SittingPlan:
 
     session: SessionPlan
     notes: tuple[str, ...]
-    """Sentences to show before the session begins."""
+    """Sentences for the experimenter."""
 
 
 def plan_sitting(
     protocol_name: str, subject: str, observer: str | None, seed: int | None, data: Path, model: Path | None = None
 ) -> SittingPlan:
-    """Plan a new session, with a remark for each unfinished one. protocol_name: name or path; subject: participant
+    """Plan a new session, with a note on each unfinished one. protocol_name: name or path; subject: participant
     code; observer: name of a simulated participant, None for a person; seed: None = a new random one; data: data
     folder; model: file of the identified model for equalization. Raises StudyError if the sitting cannot begin."""
     protocol_source = read_study_protocol(protocol_name, data)

@@ -1,8 +1,6 @@
 """Prepare each sitting: consent, exclusion criteria, set-up, and the check of device and computer.
 
-The state decides which step is due (`find_next_preparation`) and each result is logged at once. Of a participant who
-refuses or is excluded, only that outcome is kept. Called by `run_session`; `end_sitting` and `resume_session` raise
-`make_ineligible_error`.
+The state decides which step is due (`find_next_preparation`) and each result is logged at once.
 """
 
 from dataclasses import replace
@@ -41,8 +39,8 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
 
 
 def present_form(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
-    """Present a form, and log the outcome. A failed form must be confirmed, and is presented again if it is not. Raises
-    ValueError for the form on the handle, which is not logged as a form."""
+    """Present a form, and log the outcome. A failed form must be confirmed, and is presented once more if it is not.
+    Raises ValueError for the form on the handle, which is not logged as a form."""
     if form.kind is FormKind.HANDLE:
         raise ValueError("whether the handle is free is logged with the reference, not as a form")
     sitting.supervisor.start_activity("form")
@@ -51,8 +49,7 @@ def present_form(state: SessionState, form: Form, sitting: Sitting) -> SessionSt
     if not outcome.passed:
         confirmation = make_confirmation(form, reply, make_words(state.protocol))
         if not is_confirmed(confirmation, sitting.display.fill_in(confirmation)):
-            # The answer may have been a slip: the form is presented once more and the second answer counts. The first
-            # is not stored.
+            # The answer may have been a slip: only the second one counts and is stored.
             outcome = judge_form(state.protocol, form, sitting.display.fill_in(form))
     event = FormFilled(
         utc=sitting.clock.utc(),
@@ -77,7 +74,7 @@ def close_ineligible_session(state: SessionState, sitting: Sitting) -> SessionSt
 
 
 def make_ineligible_error(state: SessionState) -> StudyError:
-    """Make the error for a person who refused or was excluded: at the end of the sitting, and on resuming it."""
+    """Make the error for a person who refused or was excluded."""
     return StudyError(
         "This person does not take part",
         f"{state.opened.session} is over: {INELIGIBILITY_REASONS[state.sitting.ineligibility or 'refused']}.",

@@ -1,8 +1,5 @@
-"""Simulate one complete session: a simulated participant on the simulated device, in virtual time.
-
-A function of the Python interface (`study.simulate_session`); no other module calls it. `rehearse_study` simulates the
-sessions of a complete study.
-"""
+"""Simulate one session: a simulated participant on the simulated device, in virtual time (Python interface:
+`study.simulate_session`). `rehearse_study` simulates the sessions of a complete study."""
 
 from pathlib import Path
 
@@ -28,8 +25,8 @@ def simulate_session(
     """Run a session in virtual time and write its log and tables below `data`; returns the session folder.
 
     observer: name of a simulated observer, as for `hapteq study --observer`; subject: participant code of the session;
-    model: file of an identified model that equalizes the stimuli. The same seed gives the same answers. Raises
-    StudyError where the session cannot be begun or the simulated participant does not finish it.
+    model: file of an identified model that equalizes the stimuli. The same seed and participant number give the same
+    answers. Raises StudyError where the session cannot be begun or the simulated participant does not finish it.
     """
     plan = SessionPlan(
         protocol=protocol.protocol,

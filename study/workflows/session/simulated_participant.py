@@ -1,7 +1,7 @@
 """Make a simulated participant of a sitting: an observer model that implements the ports for display and hand.
 
 An observer that depends on the delivered acceleration (`DeliveredFeeler`) also gets a `StimulusSampler`, which measures
-that acceleration. Called by `simulate_session`, `rehearse_study` and `study.cli.conduct`.
+that acceleration.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,7 @@
 """Measure the stimulus that a simulated participant feels: the acceleration that the device delivers before the answer.
 
-The accelerometer is sampled at every tick over the last periods of the held stimulus; `measure_delivered` gives the
-amplitudes along and across the direction and of the harmonics. `simulated_participant` makes a sampler for observers
-that depend on the delivered acceleration, and `simulated_display` calls it.
+The accelerometer is sampled at every tick over some periods of the held stimulus; `measure_delivered` gives the
+amplitudes along and across the direction and of the harmonics.
 """
 
 import numpy as np
@@ -21,15 +20,15 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.trial.display import SignOfLife
 
 MEASURED_PERIODS = 2.0
-"""Number of periods of the stimulus before the answer that are measured: more than one, because friction and sensor
-noise vary from period to period. Chosen."""
+"""Number of periods that are measured: more than one, because friction and sensor noise vary from period to period.
+Chosen."""
 TICKS_PER_KEEP_ALIVE = 50
 """Number of ticks between keep-alive calls: 50 ms at a sample rate of 1 kHz, half of the longest interval that
 `SignOfLife` allows."""
 
 
 class StimulusSampler:
-    """Samples the accelerometer of the device of a session, in the time of a clock. Measures nothing until
+    """Samples the accelerometer of a session's device, in the time of a clock. Measures nothing until
     `on_session_opened` is called."""
 
     def __init__(self, clock: Clock) -> None:
@@ -42,7 +41,7 @@ class StimulusSampler:
         self._device, self._directions = device, fold_session(folder).state.protocol.directions
 
     def compute_duration_s(self, stimulus: PresentTrial) -> float:
-        """Compute the duration of the measurement (s): `MEASURED_PERIODS` periods of the stimulus."""
+        """Compute the duration of the measurement (s)."""
         return MEASURED_PERIODS / stimulus.frequency_hz
 
     def measure_stimulus(self, stimulus: PresentTrial, sign_of_life: SignOfLife) -> DeliveredMotion | None:

@@ -1,9 +1,5 @@
-"""Write masking noise as a WAV file, to be played during a sitting so that the participant cannot hear the device.
-Called by `study.cli.noise` (`hapteq noise`).
-
-The samples are those of `equalizer.signals.masking_noise`: pink noise between two corner frequencies that can be
-repeated without a discontinuity.
-"""
+"""Write masking noise as a WAV file (`hapteq noise`), to be played during a sitting so that the participant cannot hear
+the device: pink noise between two corner frequencies, which can be repeated without a discontinuity."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +20,7 @@ PLAYBACK_INSTRUCTIONS = (
     "Keep it below 80 dB(A), the lower action value of directive 2003/10/EC for a working day. If the device is heard "
     "through that, add ear protection rather than level.",
 )
-"""Instructions for the experimenter, shown after the file was written."""
+"""Instructions for the experimenter."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,5 @@
 """Result of an action of the session (a trial, a demonstration, a probe, a rest): new state, and how the sitting
-continues.
-
-Made by `present_trial`, `demonstrate` and `play_probe`; `run_session` decides by it whether to pause or end the
-sitting."""
+continues."""
 
 from __future__ import annotations
 
@@ -28,11 +25,11 @@ class ActionResult:
     end_reason: str = ""
     """Why the sitting ends here; empty if it continues."""
     void: str = ""
-    """Why the trial is void; empty if it counts, or if the participant asked for its repetition."""
+    """Why the trial is void; empty if it counts, or if its end was requested (a repetition, a pause, a stop)."""
     pause: str = ""
     """Reason for a pause that was requested; empty without a request."""
     fault: Fault = Fault.NONE
-    """Fault of the device during the action."""
+    """Fault of the device during the action; NONE also where a requested stop caused it."""
 
 
 def make_early_end_result(state: SessionState, reply: Unanswered) -> ActionResult:

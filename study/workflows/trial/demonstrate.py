@@ -1,6 +1,6 @@
 """Labelled demonstration before the trials: the participant chooses directions and frequencies and feels the stimuli.
 
-The number of stimuli is not limited. Every stimulus is logged before it is played. Called by `run_session`.
+The number of stimuli is not limited. A stimulus is logged before it is played.
 """
 
 from protocols.procedure.schedule import draw_demo_level_n, label_direction

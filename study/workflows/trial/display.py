@@ -1,9 +1,8 @@
 """Interfaces from a session to the participant: display (notices, forms, questions) and hand (receives the stimulus).
 
-Called by `study.workflows.trial` and `study.workflows.session` during a sitting. The display is implemented by line
-mode (`study.tui.line_mode`), by the screen (`study.tui.engine.remote_display`) and by a simulated participant
-(`workflows.session.simulated_display`). Any method of a display may raise KeyboardInterrupt to leave: the force is
-released at once, and the session can be resumed.
+The display is implemented by line mode (`study.tui.line_mode`), by the screen (`study.tui.engine.remote_display`) and
+by a simulated participant (`workflows.session.simulated_display`). A method of a display may raise KeyboardInterrupt to
+leave: the force is released at once.
 """
 
 from __future__ import annotations
@@ -64,8 +63,8 @@ class Display(Protocol):
         ...
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait until the handle is in position: `look().ready`, checked about every 100 ms. Returns None then, else the
-        reason for the early end."""
+        """Wait until the handle is in position: `look().ready`. Returns None then, else the reason for the early
+        end."""
         ...
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
@@ -108,13 +107,13 @@ class Hand(Protocol):
     device."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
-        """Receive the stimulus: called as soon as it is held; in a detection trial before the first interval.
+        """Receive the stimulus: called after it began to be held; in a detection trial before the first interval.
         answers_before: number of answers of the session so far, training included."""
         ...
 
 
 class HumanHand:
-    """Hand of a person, who feels the device: `feel` does nothing."""
+    """Hand of a person, who feels the device."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         return None

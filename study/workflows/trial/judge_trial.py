@@ -1,8 +1,8 @@
-"""Judge from the device's counters whether an answered trial counts. Called by `present_trial` and `resume_session`.
+"""Judge from the device's counters whether an answered trial counts.
 
-A trial is void if the participant did not feel the stimulus as planned (a fault of the device, or missed or late ticks
-of its control loop), or if a measurement that the protocol requires is missing. A void trial is repeated; its answer
-stays in the log but is not used. The limits are those of the protocol (`MeasurementSettings`).
+A trial is void if the participant did not feel the stimulus as planned (a fault of the device, or too many missed or
+late ticks of its control loop), or if a measurement that the protocol requires is missing. A void trial is repeated;
+its answer stays in the log but is not used. The limits are those of the protocol (`MeasurementSettings`).
 """
 
 from dataclasses import dataclass

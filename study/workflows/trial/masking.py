@@ -1,10 +1,7 @@
 """Masking noise during a sitting, so that the participant cannot hear the device.
 
-Order: `conduct_session` opens the sound output; `run_session` starts the noise, checks it before every trial, and stops
-it in pauses and at the end; `present_trial` checks it at every answer. Starts, stops, and a failure that is found
-before a trial are logged; a start that fails raises DeviceError without an event. A trial during which the noise
-stopped is void. The sound is a loop of pink noise (`make_masking_noise`) from the protocol's seed, so that other
-sessions use the same sound.
+The noise is checked before a trial and at its answer; a trial during which it stopped is void. The sound is a loop of
+pink noise (`make_masking_noise`) from the protocol's seed, so that other sessions use the same sound.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
 """Port of requests (stop, pause, note) to a running session, from the screens of the program or from other programs.
 
-`session_supervisor` takes the requests. Implementations: `QueuedRequests` within the program,
-`study.store.sessions.request_inbox.RequestInbox` from other programs; `conduct_session` combines them.
+Implementations: `QueuedRequests` within the program, `study.store.sessions.request_inbox.RequestInbox` from other
+programs.
 """
 
 from queue import Empty, SimpleQueue
@@ -14,8 +14,8 @@ class RequestPort(Protocol):
     """Source of requests to a running session."""
 
     def take(self) -> tuple[Request, ...]:
-        """Return the new requests since the last call, oldest first; empty without any. Must be fast, because it is
-        called about twenty times a second, and must not raise."""
+        """Return the new requests since the last call. Must be fast, because it is called at each sign of life of a
+        wait, and must not raise."""
         ...
 
 

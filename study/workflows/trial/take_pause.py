@@ -1,5 +1,4 @@
-"""Pause a sitting: nothing is played until the participant decides to continue, to leave or to withdraw. Called by
-`run_session`."""
+"""Pause a sitting: nothing is played until the participant decides to continue, to leave or to withdraw."""
 
 from dataclasses import dataclass
 
@@ -17,7 +16,7 @@ class PauseOutcome:
     end_reason: str
     """Why the sitting ends here; empty if it continues."""
     withdrawn: bool
-    """Whether the participant withdrew, so that all data are to be erased."""
+    """Whether the participant withdrew, so that the data are to be erased."""
 
 
 END_REASONS = {AfterPause.END_SITTING: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
@@ -25,8 +24,8 @@ END_REASONS = {AfterPause.END_SITTING: "the participant left", AfterPause.WITHDR
 
 
 def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutcome:
-    """Show the pause until the participant decides, and log it with its duration (s). Notes that are taken during the
-    pause are logged at once. reason: shown to the participant."""
+    """Show the pause until the participant decides or a stop is requested, and log it with its duration (s). Notes that
+    are taken during the pause are logged at once. reason: shown to the participant."""
     supervisor = sitting.supervisor
     requester = supervisor.pause_requester or "participant"
     supervisor.start_activity("pause")

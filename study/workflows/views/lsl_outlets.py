@@ -1,5 +1,4 @@
-"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session. Made by `study.cli.stream`
-(`hapteq stream`); `stream_session` and `stream_signals` send through them.
+"""Outlets of the lab streaming layer (LSL) for the markers and signals of a session (`hapteq stream`).
 
 The optional library pylsl is imported only when an outlet is made. Times of samples are on LSL's own clock, in s.
 """

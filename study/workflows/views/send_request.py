@@ -1,7 +1,6 @@
 """Send a request (stop, pause or note) to a running session in another process, and wait until it is received.
 
-A request is a file in the session's folder (`RequestInbox`); the session removes it when it takes the request. Called
-by `hapteq watch` (`study.cli.watch`), the screens (`study.tui.engine.engine_commands`) and `take_note`.
+A request is a file in the session's folder (`RequestInbox`); the session removes it when it takes the request.
 """
 
 from study.devices.clock import Clock
@@ -12,8 +11,8 @@ from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 
 RECEIVE_TIMEOUT_S = 3.0
-"""Longest time (s) until the session receives the request. It reads its inbox about twenty times a second, except while
-it shows a form or a notice. Chosen."""
+"""Longest wait (s) until the session receives the request. Chosen: it reads its inbox several times a second, except
+while it shows a form or a notice."""
 POLL_INTERVAL_S = 0.02
 """Interval (s) at which the sender checks whether the request was received. Chosen below the session's interval."""
 

@@ -1,8 +1,7 @@
 """Stream the signals of a running session's device over the lab streaming layer (LSL): force, acceleration, motion and
-status of the control loop at every tick, in addition to the session's markers.
+status of the control loop at every tick.
 
-A separate program (`hapteq stream`, `study.cli.stream`) makes the `SignalStreams`, and `stream_session` calls `push`
-repeatedly. It reads the telemetry ring buffer of the loop, so that streaming never delays the loop.
+`hapteq stream`, a separate program, reads the telemetry ring buffer of the loop, so that streaming never delays it.
 """
 
 from collections.abc import Callable
@@ -82,8 +81,7 @@ class SignalStreams:
             self._outlets = tuple(self._open_outlet(stream, self._reader.rate_hz) for stream in STREAMS)
 
     def _push_new_rows(self, offset_s: float) -> int:
-        """Send the rows (ticks) written into the ring buffer since the last call. Returns the number of rows lost
-        since."""
+        """Send the rows (ticks) written into the ring buffer since the last call. Returns the number lost since."""
         if self._reader is None:
             return 0
         earlier_lost_count = self._reader.lost

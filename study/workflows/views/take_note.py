@@ -1,4 +1,4 @@
-"""Write an experimenter's or participant's note into the log of a session. Called by `hapteq note` (`study.cli.note`).
+"""Write a note into the log of a session (`hapteq note`).
 
 A log has a single writer. While a session runs, its program is that writer, and the note is sent to it as a request;
 otherwise the note is appended directly, with the session's lock held.
@@ -54,5 +54,5 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
 
 
 def _make_program_note(text: str, clock: Clock) -> NoteTaken:
-    """Make a note of the program, as `hapteq resume` logs it for a removed last line."""
+    """Make a note of the program."""
     return NoteTaken(utc=clock.utc(), who="program", text=text)

@@ -4,6 +4,7 @@ Nothing is changed. Damaged files are listed with a remark or left out.
 """
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 from equalizer.plant.model_quality import write_quality_brief
@@ -102,13 +103,13 @@ def _is_identified_model(path: Path) -> bool:
 
 def make_home_view(data: Path) -> HomeView:
     """Make the content of the start screen. A missing data folder is shown as empty. Control characters are replaced,
-    except in the paths of models, by which the files are opened."""
+    except in the paths of sessions, protocols and models, by which the files are opened."""
     model_paths = list_model_files(data)
     qualities = tuple((model_path, describe_model_quality(model_path)) for model_path in model_paths)
     return HomeView(
         replace_unprintable(str(data)),
         list_session_lines(data),
-        make_printable(list_protocol_lines(data)),
+        tuple(replace(make_printable(line), name=line.name) for line in list_protocol_lines(data)),
         DEVICES,
         model_paths,
         qualities,
@@ -122,5 +123,5 @@ def list_session_lines(data: Path) -> tuple[SessionLine, ...]:
         folders = list_session_folders(data)
     except OSError:
         return ()
-    lines = make_printable(tuple(map(make_session_line, folders)))
+    lines = (replace(make_printable(make_session_line(folder)), path=str(folder.path)) for folder in folders)
     return tuple(sorted(lines, key=lambda line: (line.begun_utc, line.name), reverse=True))

@@ -3,6 +3,7 @@
 Nothing is changed. A damaged session is shown as far as it can be read, with warnings, not raised as a StudyError.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,16 +35,20 @@ THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "tri
 def make_session_view(path: Path, zone: Zone = to_utc) -> SessionView:
     """Make the view of the session in the folder `path`. zone: time zone of the displayed times, UTC by default; a
     screen for a person takes `study.local_clock.convert_to_machine_zone`."""
-    folder = SessionFolder(path.absolute())
+    view = _make_view(SessionFolder(path.absolute()), zone)
+    # The session is resumed, analysed or withdrawn by its path, which is not shown.
+    return replace(make_printable(view), line=replace(make_printable(view.line), path=view.line.path))
+
+
+def _make_view(folder: SessionFolder, zone: Zone) -> SessionView:
+    """Make the view of a session, in which unprintable characters are not replaced yet."""
     try:
         folded_session = None if folder.withdrawn else fold_session(folder)
     except StudyError as error:
-        return make_printable(_make_damaged_view(folder, error, zone))
-    return make_printable(
-        _make_minimal_view(folder, make_session_line(folder))
-        if folded_session is None
-        else _make_full_view(folder, folded_session, zone)
-    )
+        return _make_damaged_view(folder, error, zone)
+    if folded_session is None:
+        return _make_minimal_view(folder, make_session_line(folder))
+    return _make_full_view(folder, folded_session, zone)
 
 
 def _make_full_view(folder: SessionFolder, folded_session: FoldedSession, zone: Zone) -> SessionView:

@@ -111,3 +111,18 @@ def test_a_recording_without_a_whole_period_is_refused(drifting_device):
     torn = np.where(np.arange(len(played))[:, None] == 5, np.nan, played.response.samples)
     with pytest.raises(ValueError, match="missing"):
         compute_probe_lines(with_response(played, torn), 1.0)
+
+
+def test_a_gap_in_the_excitation_is_refused(drifting_device):
+    (played,) = drifting_device.play(WAVE, [drifting_device.Truth()], (0.8,), seed=1)
+    samples = np.where(np.arange(len(played))[:, None] == 5, np.nan, played.command.samples)
+    with pytest.raises(ValueError, match="missing"):
+        compute_probe_lines(replace(played, excitation=replace(played.command, samples=samples)), 1.0)
+
+
+def test_an_axis_that_no_line_drives_hides_no_change_of_the_others(session):
+    probes = session(1, gain=0.9)
+    for probe in probes:
+        probe.lines.driven[:, 2] = False
+    found = find_drifts(probes, 1000)
+    assert {(each.cause, each.axis) for each in found} == {("gain", "x"), ("gain", "y")}

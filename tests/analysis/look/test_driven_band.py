@@ -78,3 +78,12 @@ def test_a_segment_in_which_no_command_moves_is_named(make_recording, make_noise
     assert find_silent_segments(make_recording(command, command, segments=segments)) == (
         "Segment 2 is a sweep of amplitude 1.5, but no command moves in it.",
     )
+
+
+def test_a_response_without_power_in_any_window_is_not_fine(make_recording, make_noise):
+    """Its only change lies in the last sample, beyond the last window."""
+    response = np.append(np.zeros(19_999), 1.0)
+    still = make_recording(make_noise(), response, segments=(Segment(0, 20_000, "noise", 1.0),))
+    _, found, _ = analyse_drive(still)
+    assert (found[0].share, found[0].lowest) == (0.0, 0.0)
+    assert [check.level for check in check_coherences(found, still)] == ["wrong"]

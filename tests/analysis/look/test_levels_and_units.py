@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,7 @@ from analysis.look.channels import list_channels
 from analysis.look.levels import check_proportionality, compute_segment_levels
 from analysis.look.overview import check_resolution
 from analysis.look.plausibility import check_offsets, check_units
-from equalizer.signals.recording import Segment
+from equalizer.signals.recording import SEGMENT_KINDS, Segment
 
 TWO = (Segment(0, 10_000, "noise", 1.0), Segment(10_000, 20_000, "noise", 2.0))
 
@@ -83,3 +85,15 @@ def test_the_step_of_a_converter_is_found(make_recording, make_noise, steps, lev
 def test_an_analog_channel_has_no_step(make_recording, make_noise):
     (check,) = check_resolution(list_channels(make_recording(make_noise(), make_noise(seed=2))))
     assert (check.level, check.finding) == ("fine", "No sensor is limited by the resolution of its converter.")
+
+
+def test_of_two_kinds_as_frequent_the_first_is_compared(make_recording, two_levels):
+    """A set of names has another order in every process."""
+    kinds = [kind for pair in itertools.permutations(SEGMENT_KINDS[:5], 2) for kind in pair]
+    for first, second in zip(kinds[::2], kinds[1::2], strict=True):
+        segments = tuple(
+            Segment(5000 * k, 5000 * (k + 1), kind) for k, kind in enumerate((first, second, first, second))
+        )
+        signal = np.repeat([1.0, 1.0, 2.0, 2.0], 5000) * np.tile(two_levels[:5000], 4)
+        (check,) = check_levels(make_recording(signal, 3 * signal, segments=segments))
+        assert f"the strongest {first} (" in check.finding

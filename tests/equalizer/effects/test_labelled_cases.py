@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit, gather_evidence
@@ -36,7 +36,7 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     model = read_mechanical_model(shared / "cases" / f"{case}.toml")
     (truth,) = json.loads((shared / "cases" / f"{case}.truth.json").read_text())
     effect = EFFECTS[truth["effect"]]
-    record = observe(recording, model.outputs)
+    record = observe_parts([recording], model.outputs)[0]
     measure = FreeSimulation((record,), NOISE, NOISE)
     tuning = make_tuning(model, recording.command.channels)
     nominal = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)

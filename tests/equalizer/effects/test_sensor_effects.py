@@ -7,6 +7,7 @@ import pytest
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.simulator import Measurement, simulate_mechanism
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import SensorLimits
 
 ALL = (0, 1, 2)
@@ -128,6 +129,18 @@ def test_a_tone_that_is_commanded_throughout_is_no_hum(bench, command):
     for driven, hums in ((command, True), (np.tile(steady[:, None], (1, command.shape[1])), False)):
         seen = bench.measured(model, bench.placed("mains_hum", tone, 0), driven, seed=2)
         assert bool(EFFECTS["mains_hum"].starts(bench.evidence(model, seen), 0)) is hums
+
+
+def test_a_commanded_tone_is_no_hum_where_samples_are_missing(bench):
+    """Blocks with gaps counted the command of the gaps, so that its tone did not look steady."""
+    tone = np.sin(2 * np.pi * 50.0 * np.arange(12_000) / 1000.0)[:, None]
+    still = np.zeros_like(tone)
+    used = np.ones(12_000)
+    used[1000:].reshape(11, 1000)[::2, 100:] = 0.0
+    evidence = Evidence(
+        bench.one_axis(), 1000.0, tone, still, still, still, tone, 0.9 * tone, np.full(1, bench.NOISE_MPS2), used
+    )
+    assert EFFECTS["mains_hum"].starts(evidence, 0) == ()
 
 
 def test_what_friction_adds_to_a_driven_line_is_no_tone(bench, command):

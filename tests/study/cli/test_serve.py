@@ -192,6 +192,14 @@ def test_without_the_token_nothing_is_served(server, path):
     assert said == "The study is only at the whole address that hapteq serve printed."
 
 
+def test_an_address_that_is_no_path_is_refused_like_any_other(server):
+    with socket.create_connection(("127.0.0.1", server[0]), timeout=10) as visitor:
+        visitor.sendall(b"OPTIONS * HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        answer = b"".join(iter(lambda: visitor.recv(4096), b""))
+    assert answer.startswith(b"HTTP/1.1 404 ")
+    assert answer.endswith(b"The study is only at the whole address that hapteq serve printed.")
+
+
 @pytest.mark.parametrize("path", ["/", "/static/js/textual.js", "/nothing", None])
 def test_no_other_page_may_frame_or_be_told_of_this_one(server, path):
     async def visit(session, url):

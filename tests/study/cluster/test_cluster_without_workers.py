@@ -203,11 +203,20 @@ def test_workers_that_leave_while_they_are_asked_are_no_workers(monkeypatch):
         cluster._require_workers(None, "tcp://s", one_thread=True)
 
 
-def test_a_question_that_fails_by_a_time_limit_of_its_own_is_no_silence(monkeypatch):
+@pytest.mark.parametrize(
+    "error",
+    [
+        TimeoutError("Timed out during handshake"),
+        OSError("Timed out trying to connect"),
+        distributed.comm.CommClosedError("ConnectionPool closing."),
+        distributed.client.ClosedClientError("Client is closed"),
+    ],
+)
+def test_a_question_that_fails_before_the_time_limit_is_no_silence(monkeypatch, error):
     def fail(_):
-        raise TimeoutError("Timed out during handshake")
+        raise error
 
     monkeypatch.setattr(cluster, "_request_worker_setup", fail)
-    with pytest.raises(StudyError, match="asking its workers failed: Timed out during handshake") as ended:
+    with pytest.raises(StudyError, match=f"asking its workers failed: {error}") as ended:
         cluster._require_workers(None, "tcp://s", one_thread=False)
     assert "said nothing more" not in str(ended.value) and ended.value.saved == "Nothing was begun."

@@ -69,3 +69,9 @@ def test_progress_grows_to_the_whole(files):
     seen: list[float] = []
     build_recording(parse_map(map_text(), Path("m.toml")), [files("a.npz"), files("b.npz")], seen.append)
     assert seen == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_a_channel_that_is_evaluated_for_the_number_of_samples_is_named(files):
+    """The single number before it is repeated as often as the other channel has samples."""
+    text = map_text().replace('value = "u"', 'value = "0"').replace('value = "y"', 'value = "yy"')
+    assert "Channel 'ax': there is no array 'yy'" in refusal(text, files())

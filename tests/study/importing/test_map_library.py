@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 
 from study.errors import WrongUseError
-from study.importing.map_library import find_map_for_files, find_maps_for_folder, list_shipped_maps, read_map
+from study.importing.map_library import (
+    find_map_for_files,
+    find_maps_for_folder,
+    list_shipped_maps,
+    make_map_from_headers,
+    read_map,
+)
 from study.store.disk.file_errors import UnusableFileError
 
 OWN = """
@@ -89,3 +95,10 @@ def test_some_files_of_a_map_or_one_more_name_none(tmp_path):
     files = emps_like(tmp_path, "estimation.npz", "validation.npz", "other.npz")
     assert find_map_for_files(files[:1]) is None
     assert find_map_for_files(files) is None
+
+
+def test_a_raised_digit_in_a_file_name_is_no_number(tmp_path):
+    rows = "".join(f"{k / 100},{k},{k * k}\n" for k in range(50))
+    for name in ("²10.csv", "²9.csv"):
+        (tmp_path / name).write_text(f"time [s],fx [N],ax [m/s^2]\n{rows}")
+    assert [path.name for path in make_map_from_headers(tmp_path).files] == ["²9.csv", "²10.csv"]

@@ -6,8 +6,8 @@ of one axis, the force that resists the motion is
     friction  (w1 + w2 c) tanh(v / width)      damping  w c v      stiffness  w c q      force  w c
 
 with the weights w, w1, w2 fitted by `regression`. The catalogue has no such effects; simulations use the formulas of
-these laws, with sgn(v) for tanh. `laws` adds the laws to its candidates. In callables, m is the motion, n the nonlinear
-parameters and w the weights, as in `law`.
+these laws, with sgn(v) for tanh and friction of at least 0. In callables, m is the motion, n the nonlinear parameters
+and w the weights, as in `law`.
 """
 
 import math
@@ -82,8 +82,8 @@ def _make_formula(condition: Condition, *factors: str) -> Callable[[dict[str, fl
 
 def _format_deviation(condition: Condition) -> str:
     """Format a condition's deviation from its mean, in standard deviations, as a formula. Its numbers are integers,
-    because integers in a formula are constants that are not fitted. The standard deviation, above 0, is rounded to
-    about four digits, fewer where the mean would exceed 15 digits, and the mean to the same decimal place."""
+    because integers in a formula are constants that are not fitted. The standard deviation, above 0, is rounded to an
+    integer from 1000 on, else to about four digits (fewer where the mean would exceed 15), the mean likewise."""
     factor = 10 ** max(
         0, min(3 - math.floor(math.log10(condition.standard_deviation)), 15 - _count_integer_digits(condition.mean))
     )

@@ -1,8 +1,7 @@
 """Compute bin means of a signal over a variable, with standard errors that allow for correlated samples.
 
 Samples of one bin within a block of `_BLOCK_S` count as one observation: with the means y_b of w_b samples per block,
-and the bin's mean y, the standard error is sqrt(sum of w_b² (y_b - y)²) / sum of w_b. Called by `signature_curves`,
-`law_curves` and `state_maps`.
+and the bin's mean y, the standard error is sqrt(sum of w_b² (y_b - y)²) / sum of w_b.
 """
 
 import numpy as np
@@ -84,9 +83,9 @@ def compute_running_rms(
 
 
 def _compute_edges(abscissa: FloatArray, bin_count: int) -> FloatArray:
-    """Compute the edges of fewer than bin_count bins, rising: half at quantiles, half at equal widths between the 0.1 %
-    and 99.9 % quantiles, so that both the middle and the ends are covered. Callers add values beyond the ends to the
-    outer bins. abscissa: (n,), n >= 1."""
+    """Compute the edges of fewer than bin_count bins, rising: half at quantiles (of the samples that are not at rest),
+    half at equal widths between the 0.1 % and 99.9 % quantiles, so that both the middle and the ends are covered.
+    Callers add values beyond the ends to the outer bins. abscissa: (n,), n >= 1."""
     low_quantile, high_quantile = np.quantile(abscissa, [0.001, 0.999])
     # A channel that rests most of the time would have all its bins at rest.
     moving_samples = abscissa[np.abs(abscissa - np.median(abscissa)) > _REST_SHARE * (high_quantile - low_quantile)]

@@ -1,9 +1,8 @@
 """Run a bank of concealed laws, a blind test of the diagnosis: seal, diagnose in separate processes, reveal, score.
 
 Each case is a simulated device with a law of motion or signals outside the catalogue of effects, or without one. The
-labels, which state the true laws, are hashed before any diagnosis and checked when they are revealed. A found law is
-compared with the true one on fresh test motions that were no input of the diagnosis (`compute_law_error`). Called by
-`study.cli.prove`; `write_law_proof` writes the result.
+labels, which state the true laws, are hashed before their cases are diagnosed, and checked when they are revealed. A
+found law is compared with the true one on fresh test motions that were no input of the diagnosis (`compute_law_error`).
 """
 
 from collections.abc import Mapping
@@ -40,7 +39,7 @@ class LawBlindTest:
     folder: ProofFolder
     plan: BankPlan
     seal: str
-    """SHA-256 of labels.sha256, taken before any diagnosis."""
+    """SHA-256 of labels.sha256, taken before the diagnoses of this run."""
     outcomes: tuple[LawOutcome, ...]
     """One per answered case."""
     score: LawScore
@@ -80,14 +79,13 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
 
 def reveal_laws(folder: ProofFolder, case_count: int) -> tuple[LawOutcome, ...]:
     """Reveal the answered cases among the numbers below `case_count`, and return their outcomes. Raises StudyError
-    where a label or a fresh test motion differs from its seal."""
+    where a label or a fresh test motion differs from its seal, or an answer was given to other files."""
 
     def is_unchanged(label: Mapping[str, Any]) -> bool:
         """Whether the file of the fresh test motions has the hash that is stated in the label."""
         return compute_sha256(get_fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
 
     def make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
-        """Make the outcome of a case from its label and answer."""
         return _make_law_outcome(label, answer, get_fresh_motions_path(folder, label["number"]))
 
     return reveal_bank(folder, case_count, make_outcome, is_unchanged)

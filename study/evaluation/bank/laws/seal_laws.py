@@ -1,8 +1,8 @@
 """Bank of blind-test cases with laws outside the catalogue, written as files.
 
-Each case has open inputs for the diagnosis (recording, model, settings), and a sealed label with the true law and fresh
-test motions. Sealed means that the SHA-256 of each label is written, and can be published, before any case is
-diagnosed. Called by `prove_laws`.
+Each case has open inputs for the diagnosis (recording, model, settings), fresh test motions, and a sealed label with
+the true law and the hashes of the files. Sealed means that the SHA-256 of the label is written, and can be published,
+before the case is diagnosed.
 """
 
 import json
@@ -28,9 +28,8 @@ from study.store.formats.recording_file import write_recording
 
 
 def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
-    """Draw, write and seal the missing cases in `workers` processes, calling `on_sealed` with the
-    number of cases sealed so far. Returns the SHA-256 of labels.sha256. Raises StudyError where a sealed file has
-    changed."""
+    """Draw, write and seal the missing cases in `workers` processes, calling `on_sealed` with the number of cases
+    written so far. Returns the SHA-256 of labels.sha256. Raises StudyError where a sealed label has changed."""
     law_draws = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
     case_writers = {law_draw.number: partial(_write_law_case, folder, law_draw) for law_draw in law_draws}
     return seal_missing_cases(folder, case_writers, workers, on_sealed)

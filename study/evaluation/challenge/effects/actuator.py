@@ -9,7 +9,7 @@
 
 Each range goes from an effect that hardly shows in the recordings of the challenge to a gross fault; the strength (0 to
 1) interpolates geometrically. The ranges were chosen by hand for commands with peaks of 0.5 to 3 N (`LEVELS_N`).
-`draw_case` draws and builds in the effects; `actuator_kernel.drive_actuators` computes the force.
+`actuator_kernel.drive_actuators` computes the force.
 """
 
 from study.evaluation.challenge.actuator_kernel import DEAD_BAND, DELAY_S, FORCE_LIMIT, GAIN, LAG_S, SLEW_RATE
@@ -19,7 +19,7 @@ from study.evaluation.challenge.drive_plan import LEVELS_N
 
 
 def _draw_saturation(context: EffectContext) -> dict[str, float]:
-    """Draw the limit (N) that cuts 2 % to 70 % off the peak of the strongest command."""
+    """Draw the limit (N) that cuts 2 % to 70 % off the largest of `LEVELS_N`."""
     return {"limit": LEVELS_N[-1] * (1.0 - context.interpolate_log(0.02, 0.7))}
 
 

@@ -2,9 +2,8 @@
 
 Hand impedance: mass (kg), damping (N s/m) and stiffness (N/m) to the ground along x, in other proportions along y and z
 (factors `mass_y` and so on). At strength 1 they have the size of a light grip, at 0 a hundredth of it.
-Time-varying grip: the damping between handle and ground is multiplied by 1 + depth sin(2 pi rate t + phase); whether
-the stiffness varies in the same way is drawn. All ranges were chosen by hand. Called by
-`study.evaluation.challenge.draw_case`.
+Time-varying grip: the damping between handle and ground is multiplied by 1 + depth sin(2 pi rate t + phase) on each
+axis; whether the stiffness varies in the same way is drawn. All ranges were chosen by hand.
 """
 
 from dataclasses import replace

@@ -6,8 +6,8 @@
     cogging      F = amplitude sin(2 pi x / pitch + phase)       N, m, rad (random phase)
     end stop     F = -stiffness (x - position) beyond position   N/m, m; on one side or on both, which is drawn
 
-The strength interpolates the range of the main parameter geometrically. `handle_force_kernel` computes the force;
-`EFFECTS` is part of the table from which `draw_case` chooses. All ranges were chosen by hand.
+The strength interpolates the range of the main parameter geometrically. `handle_force_kernel` computes the force. All
+ranges were chosen by hand.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ def _build_hardening_stiffness(device: Device, axis: int, values: Values) -> Dev
 
 
 def _draw_asymmetric_stiffness(context: EffectContext) -> dict[str, float]:
-    """Draw k2 such that k2 x at the end of the travel is 0.5 to 30 % of the ground's stiffness."""
+    """Draw k2, of either sign, such that |k2 x| at the end of the travel is 0.5 to 30 % of the ground's stiffness."""
     # Above 50 % the tangent stiffness would be negative there.
     ground_stiffness_n_per_m = context.bench.stiffness[context.axis, context.axis]
     return {

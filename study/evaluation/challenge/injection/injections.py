@@ -257,7 +257,7 @@ def list_applicable_injections(recording: Recording) -> tuple[str, ...]:
     fault of the mechanism a measured motion along each command; a fault of the actuator in addition a motion that is
     not imposed."""
     rate_hz = recording.sample_rate_hz
-    sensor_axes = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
+    sensor_axes = 3 if sorted(name[-1:] for name in recording.response.channels) == ["x", "y", "z"] else 1
     is_hum_resolved = rate_hz > 4 * max(MAINS_HZ)
     has_two_channels = len(recording.response.channels) > 1
     sensor_effects = [
@@ -282,9 +282,10 @@ def find_place(effect: str) -> Place:
 
 def measure_response(recording: Recording) -> ResponseStatistics:
     """Measure rate, rms, peak, median frequency and duration of the response; samples with NaN in any channel are left
-    out (at least one must remain), except in the duration."""
-    samples = recording.response.samples
-    finite_rows = samples[np.isfinite(samples).all(axis=1)]
+    out (at least one must remain), except in the duration. Raises ValueError for a constant response."""
+    finite_rows = recording.response.samples[np.isfinite(recording.response.samples).all(axis=1)]
+    if not np.ptp(finite_rows, axis=0).any():
+        raise ValueError("the response is constant, so that no fault can be scaled to it; record a moving device")
     centred = finite_rows - finite_rows.mean(axis=0)
     power = np.sum(np.abs(np.fft.rfft(centred, axis=0)) ** 2, axis=1)
     rate_hz = recording.sample_rate_hz
@@ -294,5 +295,5 @@ def measure_response(recording: Recording) -> ResponseStatistics:
         float(np.sqrt(np.mean(centred**2, axis=0)).max()),
         float(np.abs(finite_rows).max()),
         max(median_hz, rate_hz / len(finite_rows)),
-        len(samples) / rate_hz,
+        len(recording) / rate_hz,
     )

@@ -1,7 +1,7 @@
 """Access to MuJoCo, the optional second physics engine of the blind test, which is imported only when a case is drawn.
 
 Its integrator, friction and contacts differ from those of hapteq's own simulation, so that cases from it show whether a
-diagnosis depends on that simulation. Called by `challenge.draw_bank` and `bank.seal_cases`.
+diagnosis depends on that simulation.
 """
 
 from collections.abc import Sequence

@@ -61,6 +61,15 @@ def test_gaps_in_the_response_are_left_out():
     assert sure is not None and sure > DRIVEN_DEVIATIONS
 
 
+@pytest.mark.parametrize("missing", [slice(0, 6000), slice(6000, 12_000)])
+def test_noise_in_one_half_without_a_response_in_the_other_is_judged_as_noise(missing):
+    rng = np.random.default_rng(1)
+    response = rng.standard_normal((12_000, 1))
+    response[missing] = np.nan
+    sure = compute_response_significance([make_recording(rng.standard_normal((12_000, 1)), response)])
+    assert sure is not None and sure < DRIVEN_DEVIATIONS
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_slow_force_beside_friction_below_the_commands_noise_is_no_noise(seed):
     """A shaft that goes to and fro under control: the current holds up dry friction, and a lot of noise."""

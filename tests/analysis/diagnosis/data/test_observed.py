@@ -9,10 +9,10 @@ from analysis.diagnosis.data.observed import (
     Span,
     compute_error_units,
     find_moving_spans,
-    observe,
     split_samples,
     stack_measured_signals,
 )
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -158,7 +158,7 @@ def test_a_recording_that_is_all_test_is_not_fitted():
 def test_lost_samples_count_for_nothing():
     samples = np.ones((1000, 2))
     samples[100:200, 1] = np.nan
-    seen = observe(make_recording(samples), 2)
+    seen = observe_parts([make_recording(samples)], 2)[0]
     assert not (seen.fit | seen.choose | seen.test)[100:200].any()
     assert (seen.fit | seen.choose | seen.test).sum() == 900
 
@@ -171,7 +171,7 @@ def test_positions_are_compared_where_they_belong_to_the_outputs():
 
 
 def test_decisions_do_not_reach_the_sealed_samples():
-    seen = observe(make_recording(np.ones((1000, 2))), 2)
+    seen = observe_parts([make_recording(np.ones((1000, 2)))], 2)[0]
     short = seen.shorten()
     assert len(short.command) == len(short.measured) == 750
     assert not short.test.any()
@@ -185,10 +185,8 @@ def test_errors_are_counted_in_noise_and_in_a_share_of_the_signal():
 
 
 def test_what_was_chosen_by_other_means_is_fitted_to_all_but_the_held_out_samples():
-    observed = observe(
-        replace(make_recording(np.zeros((1000, 2))), segments=(make_segment(0, 600), make_segment(600, 1000, "test"))),
-        2,
-    )
+    segments = (make_segment(0, 600), make_segment(600, 1000, "test"))
+    (observed,) = observe_parts([replace(make_recording(np.zeros((1000, 2))), segments=segments)], 2)
     whole = observed.join_fit_and_choose()
     assert (whole.fit == (observed.fit | observed.choose)).all()
     assert whole.fit[:600].all()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.discovery.validation import describe_held_out_kinds
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -21,7 +21,7 @@ def describe_held_out(*segments: tuple[str, float, tuple[int, ...], str]) -> tup
         told.append(Segment(start, start + SAMPLES, kind, peak, 0, role))
     force = Signal(command, 1000.0, "force", "N", ("fx", "fy"))
     position = Signal(np.cumsum(command, axis=0), 1000.0, "position", "m", ("x", "y"))
-    return describe_held_out_kinds([observe(Recording("rig", force, position, segments=tuple(told)), 2)])
+    return describe_held_out_kinds([observe_parts([Recording("rig", force, position, segments=tuple(told))], 2)[0]])
 
 
 def test_ends_of_the_same_segments_are_no_other_kind():

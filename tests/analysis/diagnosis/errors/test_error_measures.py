@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.effects.catalogue import EFFECTS
@@ -175,7 +175,7 @@ def test_what_the_models_own_file_names_is_part_of_every_prediction(which: str, 
 
 
 def test_a_shortened_simulation_keeps_the_restarts_of_the_records_that_it_keeps(drifting_recording: Recording) -> None:
-    record = observe(drifting_recording, 1)
+    record = observe_parts([drifting_recording], 1)[0]
     unused = replace(record, fit=np.zeros_like(record.fit), choose=np.zeros_like(record.choose))
     restarts = tuple(Restarts(np.array([sample]), np.zeros((1, 2))) for sample in (10, 20, 30))
     measure = FreeSimulation((record, unused, record), np.ones(1), np.ones(1), restarts=restarts)

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.data import motion_smoother
 from analysis.diagnosis.data.motion_smoother import smooth_motion
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.choose_measure import make_force_measure
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
 from equalizer.effects.catalogue import EFFECTS
@@ -126,7 +126,7 @@ def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(
     noise = 1e-4 * played.response.std()
     seen = Signal(played.response + noise * rng.standard_normal(played.response.shape), RATE_HZ, quantity, "1", ("x",))
     recording = Recording("make_body", Signal(force, RATE_HZ, "force", "N", ("x",)), seen)
-    found = smooth_motion(plant, observe(recording, 1), force, np.array([noise]))
+    found = smooth_motion(plant, observe_parts([recording], 1)[0], force, np.array([noise]))
     inside = slice(500, -100)
     assert np.std((found.missing_force - missing)[inside]) < 0.2 * np.std(missing)
     assert np.std((found.axis_velocity - played.axis_velocity)[inside]) < 0.02 * np.std(played.axis_velocity)
@@ -138,7 +138,7 @@ def test_a_smoother_of_what_is_not_finite_says_that_there_is_none(monkeypatch: p
         "make_body", *(Signal(np.ones((50, 1)), RATE_HZ, what, "1", ("x",)) for what in ("force", "position"))
     )
     with pytest.raises(np.linalg.LinAlgError):
-        smooth_motion(make_body(), observe(recording, 1), np.ones((50, 1)), np.array([1.0]))
+        smooth_motion(make_body(), observe_parts([recording], 1)[0], np.ones((50, 1)), np.array([1.0]))
 
 
 def _steps_of_nan(model: MechanicalModel, step_s: float) -> DiscreteModel:

@@ -56,6 +56,7 @@ def test_the_entry_that_made_the_residual_wins(number, seed):
     best = rank_entries(simulate_spectra(direction, seed), make_entries()).ranking[0]
     assert true.name in (best.name, *best.equivalents)
     assert best.p_value == 1.0
+    assert best.is_position_error == (best.name == "position x")
 
 
 def test_entries_with_one_direction_are_said_to_be_alike():

@@ -1,8 +1,10 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorComparison
+from analysis.diagnosis.localisation.localisation import find_state_dependences
 from analysis.diagnosis.localisation.localisation_words import (
     write_entry_sentence,
     write_localisation_sentences,
@@ -66,6 +68,16 @@ def test_a_sensor_is_said_to_be_one():
 @pytest.mark.parametrize("entry", [None, EntryPoint((), None, 0), EntryPoint((ALONG_X,), None, 39)])
 def test_where_too_little_is_there_no_entry_is_reported(entry):
     assert write_entry_sentence(entry) == ""
+
+
+def test_an_error_of_the_position_is_not_sought_in_a_response_of_the_same_name(monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.localisation.localisation.find_error_states", lambda *of: (RUBS,))
+    measure = SimpleNamespace(records=(SimpleNamespace(recording=None),))
+    for is_position_error, states in ((True, ()), (False, (RUBS,))):
+        best = replace(OF_AX, axis="x", is_position_error=is_position_error)
+        entry = EntryPoint((best, ALONG_X), None, 60)
+        cells = (SimpleNamespace(beyond_noise=True),)
+        assert find_state_dependences(measure, None, None, cells, entry, (SimpleNamespace(),)) == states
 
 
 def test_states_are_said_with_share_and_chance():

@@ -22,7 +22,7 @@ from analysis.diagnosis.settings import DISCRIMINATING_GAIN
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import compute_driven_axes
-from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tolerance
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, SensorLimits, Tolerance
 from equalizer.signals.recording import Hold
 from equalizer.signals.unit_system import UnitSystem
 
@@ -283,3 +283,17 @@ def test_a_release_ends_at_once_and_leaves_time_to_move_freely():
     assert len(ends) == 4
     assert np.sign(command[ends]).tolist() == [1, -1, 1, -1]
     assert all((command[end + 1 : end + 900] == 0).all() for end in ends)
+
+
+def test_a_step_to_a_model_that_cannot_be_is_taken_the_other_way():
+    bench, named, rival = compare_mass_and_gain(LOOSE)
+    tune = bench.tuning.tune
+
+    def tune_below(deviations):
+        if deviations[0] > rival.deviations[0]:
+            raise MechanicalModelError(("the mass is not positive definite",))
+        return tune(deviations)
+
+    limited = replace(bench, tuning=replace(bench.tuning, tune=tune_below))
+    gains, expected = (predict_menu_gains(each, named, rival) for each in (limited, bench))
+    assert [each.gain for each in gains] == pytest.approx([each.gain for each in expected], rel=0.1, abs=0.1)

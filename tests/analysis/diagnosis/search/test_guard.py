@@ -1,12 +1,17 @@
 """An effect that crashes is left out, the rest is found all the same; without the guard the crash is an error."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.search.explain import explain
 from analysis.diagnosis.search.guard import Guard, WorkPart
 from analysis.diagnosis.search.time_budget import OutOfTimeError
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
+from analysis.diagnosis.search_by_simulation import _ImpactSearch
 from equalizer.effects.catalogue import EFFECTS
 
 
@@ -59,6 +64,18 @@ def test_of_pieces_beside_each_other_the_crashed_one_is_replaced_and_said():
     assert len(guard.sentences) == 1 and guard.sentences[0].startswith("The black box was left out")
     with pytest.raises(ValueError, match="broadcast"):
         Guard().run_parts(map, pieces)
+
+
+def test_a_crash_of_the_search_for_play_is_named_and_ends_no_diagnosis(monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.search.impacts.explain_impacts", lambda *given: raise_value_error())
+    guard = Guard(enabled=True)
+    found = SimpleNamespace(steps=(), after=SimpleNamespace(fitted=SimpleNamespace(hypothesis=NO_EFFECTS)))
+    result = SearchResult(SimpleNamespace(guard=guard, certain=()), found, Judgement("unexplained", False))
+    fitting = SimpleNamespace(chosen=SimpleNamespace(floors=()))
+    search = _ImpactSearch(fitting, (), DiagnosisSettings(), ignore_progress)
+    assert search.explain_at_end(result) is result
+    (said,) = guard.sentences
+    assert said.startswith("Rattling play was left out because of a program error at its search")
 
 
 def test_a_search_that_ends_for_lack_of_time_is_no_crash():

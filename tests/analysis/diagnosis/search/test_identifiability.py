@@ -10,6 +10,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.identifiability import (
+    _is_undetermined,
     compute_final_errors,
     compute_interval_errors,
     compute_null_distance,
@@ -209,3 +210,12 @@ def test_a_jump_that_no_sample_shows_does_not_leave_a_dead_band_open(make_contex
     placed = left.after.fitted.hypothesis.list_placed_effects()[0]
     assert placed.values["jump"] == 0.0
     assert placed.values["width"] == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "values"), [("coulomb_friction", {"level": 0.2}), ("force_gain", {"gain": 0.9})])
+def test_a_number_of_unknown_error_is_not_determined_within_any_limits(name, values):
+    hypothesis = make_hypothesis(name, **values)
+    parameter = hypothesis.parameters[0]
+    limited = replace(parameter, parameter=replace(parameter.parameter, upper=1.01 * hypothesis.point[0]))
+    for each in (parameter, limited):
+        assert _is_undetermined(each, hypothesis.point[0], np.inf)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search import search, search_context
@@ -68,7 +68,7 @@ def test_the_milder_part_is_opened_only_where_the_loudest_can_confirm(sweep_reco
 
 
 def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(sweep_recording):
-    record = observe(sweep_recording, 1)
+    record = observe_parts([sweep_recording], 1)[0]
     opened = record.release_test_samples(record.mask_alternate_parts(2))
     both = opened.fit | opened.choose
     assert not (both & opened.test).any()

@@ -59,3 +59,10 @@ def test_missing_samples_and_other_devices_are_refused(plants, truth):
         validate_on_test(truth, [replace(good, response=replace(good.response, samples=holes))])
     with pytest.raises(ValueError, match="cannot test a model at 500"):
         validate_on_test(replace(truth, sample_rate_hz=500.0), [good])
+
+
+def test_a_response_of_zero_is_refused(plants, truth):
+    good = recorded(plants, periods=3, period=4000)
+    still = replace(good, response=replace(good.response, samples=np.zeros_like(good.response.samples)))
+    with pytest.raises(ValueError, match="no response between 5 and 35 Hz"):
+        validate_on_test(truth, [still])

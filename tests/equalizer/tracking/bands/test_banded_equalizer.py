@@ -1,5 +1,7 @@
 """On the synthetic device, played through a model that knows 5 to 35 Hz and is wrong above, as an identified one is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -166,6 +168,12 @@ def test_above_the_cap_is_refused_or_solved_for(band_model, high, impact):
     assert np.linalg.norm(capped.total_forces, axis=1).max() <= 0.8 * peak_n
     assert capped.loss.error_free < capped.loss.error_capped < capped.loss.error_clipped
     assert equalizer.compute_forces(impact, CapPolicy(1.01 * peak_n)).peaks.is_under_cap
+
+
+def test_without_a_spring_the_numbers_of_forces_and_of_accelerations_may_differ(device_model):
+    model = replace(device_model, C=device_model.C[:2], D=device_model.D[:2], output_channels=("ax", "ay"))
+    found = BandedEqualizer(model, LinearPhaseSplit(WHOLE, RATE_HZ)).compute_forces(np.eye(2)[np.zeros(50, int)])
+    assert np.array_equal(found.commands, found.total_forces) and found.commands.shape[1] == 3
 
 
 def test_a_stylus_takes_force_off_the_motors(band_model, high, impact):

@@ -76,3 +76,10 @@ def test_forces_above_the_cap_are_solved_under_it_with_the_loss_stated(model, no
 def test_a_table_with_nothing_in_the_band_is_refused(model):
     with pytest.raises(TrackingError, match="the reference has no content from 5 to 35 Hz"):
         compute_feedforward_forces(model, acceleration(np.zeros((500, 3))))
+
+
+def test_a_table_with_gaps_is_refused_as_such(model, noise):
+    samples = noise.samples.copy()
+    samples[700, 1] = np.nan
+    with pytest.raises(TrackingError, match="the trajectory holds values that are not finite numbers; fill the gaps"):
+        compute_feedforward_forces(model, acceleration(samples))

@@ -95,3 +95,7 @@ def test_what_has_no_answer_under_the_cap_is_refused(problem_of):
         track_under_cap(problem, wanted, cap_n, others[1:])
     with pytest.raises(TrackingError, match="after 3 rounds the forces under the cap .* are only known to be within"):
         track_under_cap(problem, wanted, cap_n, settings=CapSettings(gap=1e-9, rounds=3))
+    with pytest.raises(
+        TrackingError, match="after 0 rounds the forces under the cap .* are only known to be within inf"
+    ):
+        track_under_cap(problem, wanted, cap_n, settings=CapSettings(rounds=0))

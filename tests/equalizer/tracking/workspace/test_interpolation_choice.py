@@ -86,3 +86,9 @@ def test_a_held_out_place_that_is_a_model_s_own_is_refused(three):
 def test_a_held_out_model_needs_a_place(three):
     with pytest.raises(ValueError, match="does not say where it was identified"):
         make_held_out_place(replace(three.models[0], place_m=None), (5.0, 35.0))
+
+
+def test_a_single_model_without_a_place_is_not_at_the_origin(three):
+    anywhere = WorkspaceModels((replace(three.models[0], place_m=None),))
+    held_out = make_held_out_place(replace(three.models[1], place_m=(0.0, 0.0, 0.0)), (5.0, 35.0))
+    assert choose_interpolation(anywhere, [held_out]).reason == "there is only one model"

@@ -144,3 +144,12 @@ class BrokenClock(RealClock):
 
     def __init__(self) -> None:
         self.until_s = time.monotonic() + 0.2
+
+
+def test_a_drive_in_real_time_never_gets_a_runner_that_catches_up(rigs):
+    class OtherClock(RealClock):
+        virtual = True
+
+    device = SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, OtherClock())
+    assert not device._runner.catches_up
+    device.close()

@@ -52,6 +52,9 @@ REFUSED = {
     "slew limit is 1500 N/s": lambda s: replace(s, loop=replace(s.loop, samples=s.loop.samples[:150])),
     "cap of the stimulus": lambda s: replace(s, onset=replace(s.loop, samples=s.loop.samples * 3.01)),
     "limit is 1500 N/s": lambda s: replace(s, onset=replace(s.loop, samples=s.loop.samples * 0.0 + 1.6)),
+    "changes by 2771 N/s": lambda s: replace(
+        s, loop=replace(s.loop, samples=s.loop.samples * 0.0 + 1.6), fade_in_s=1e-4, fade_out_s=1e-4
+    ),
     "fade_in_s is nan": lambda s: replace(s, fade_in_s=float("nan")),
     "fade_out_s is -1": lambda s: replace(s, fade_out_s=-1.0),
     "fade shape is 'square'": lambda s: replace(s, fade_shape="square"),

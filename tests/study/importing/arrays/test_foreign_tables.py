@@ -98,6 +98,17 @@ def test_a_comma_that_cannot_separate_thousands_is_a_decimal_sign(tmp_path, row)
     assert list(read(tmp_path, f"t;u\n{row}").by_name.values()) == values
 
 
+@pytest.mark.parametrize("field", [".5", "5.", "-.5", "1.5"])
+def test_a_point_beside_decimal_commas_is_no_blank(tmp_path, field):
+    with pytest.raises(ImportRefusedError, match=f"Line 3, column 'u': '{field}' is not a number"):
+        read(tmp_path, f"t;u\n0,1;1,5\n0,2;{field}\n0,3;2,5", CsvMap(decimal=","))
+
+
+def test_a_missing_sample_with_points_is_missing_also_beside_decimal_commas(tmp_path):
+    found = read(tmp_path, "t;u\n0,1;1,5\n0,2; N.a. \n0,3;2,5", CsvMap(decimal=",")).by_name["u"]
+    np.testing.assert_array_equal(found, [1.5, np.nan, 2.5])
+
+
 @pytest.mark.parametrize("mark", ["#", "%"])
 def test_a_comment_below_the_header_does_not_replace_it_but_may_hold_its_units(tmp_path, mark):
     header = ",".join(NAMES)

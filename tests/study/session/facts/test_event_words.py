@@ -6,7 +6,7 @@ from datetime import timedelta, timezone
 import pytest
 
 from protocols.trial import Phase
-from study.session.facts.event_words import describe_event, describe_log
+from study.session.facts.event_words import describe_log
 from study.session.facts.events import (
     AnswerGiven,
     DemoFinished,
@@ -57,7 +57,7 @@ SENTENCES = [
     (RestTaken(UTC, 2, 0, 60.0), "Rested 60 s before trial 1 of run 3."),
     (
         SessionInterrupted(UTC, "the participant left"),
-        "The sitting ended: the participant left. The session can be resumed.",
+        "The sitting ended: the participant left.",
     ),
     (
         SessionResumed(UTC, DEVICE, {}, mended='{"utc'),
@@ -93,6 +93,11 @@ SENTENCES = [
     (NoteTaken(UTC, "experimenter", "door\nslammed"), "Note by the experimenter: door slammed"),
     (NoteTaken(UTC, "experimenter", "numb thumb", adverse=True), "Adverse event by the experimenter: numb thumb"),
 ]
+
+
+def describe_event(event: Event) -> str:
+    """The only line of a log, without its time."""
+    return describe_log((event,))[-1].removeprefix("09:30:12  ")
 
 
 @pytest.mark.parametrize(("event", "sentence"), SENTENCES, ids=lambda value: getattr(value, "event", ""))

@@ -2,11 +2,13 @@ import asyncio
 import random
 
 import pytest
+from rich.cells import cell_len
 from textual import events
 
 from study.session.views.form_entry import apply_key, make_blank_entry, make_reply
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
+from study.tui.widgets.choice_row import ChoiceRow
 from tests.slow_instances import slow_after
 
 YES_NO = ("yes", "no")
@@ -127,6 +129,22 @@ def test_the_mouse_chooses_too(on_stage):
         await stage.pilot.click(offset=(lines[row].index("○ no"), row))
         await stage.pilot.pause()
         assert "2 ● no" in stage.words
+
+    on_stage(FormScreen(THREE), story)
+
+
+def test_the_mouse_chooses_among_wide_characters(on_stage):
+    """Each takes two cells of the terminal."""
+    row = ChoiceRow(("はい、そうします", "いいえ"))
+
+    async def story(stage):
+        screen = stage.app.screen
+        await screen.mount(row)
+        await stage.pilot.pause()
+        width = cell_len(row.render().plain.rstrip())
+        assert row.find_choice_at(width - 1, 0) == 1
+        assert row.find_choice_at(cell_len(" 1 ○ はい、そうします") - 1, 0) == 0
+        assert len(row._place_choices(width + 1)) == 2 and row._place_choices(width)[1][1] == 1
 
     on_stage(FormScreen(THREE), story)
 

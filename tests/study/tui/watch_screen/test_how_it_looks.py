@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from study.tui.watch.watch_panels import format_trials
 from tests.slow_instances import slow, slow_after
 from tests.study.tui.watch_screen.watched import ALARM, view
 
@@ -44,3 +45,10 @@ def test_no_size_breaks_it(seated, size):
         assert "P01_001" in seat.text
 
     seated(story, view(alarms=(ALARM,)), size)
+
+
+@pytest.mark.parametrize("columns", [53, 54, 55])
+def test_the_header_names_the_remark_wherever_a_row_has_one(columns):
+    header, _, _, void, *_ = format_trials(view(), 20, columns).plain.splitlines()
+    assert "void" in void
+    assert ("remark" in header) == ("the han" in void)

@@ -11,6 +11,7 @@ from protocols.trial import Trial
 from study.session.facts.events import SESSION_FORMAT
 from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import write_json
+from study.store.formats.daily_check_file import DailyCheck, write_daily_check
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.participant_texts import make_language_template
 from study.store.formats.protocol_files import list_shipped_protocols
@@ -111,6 +112,21 @@ def test_an_import_map_is_described(tmp_path):
     text = 'title = "t"\ndevice = "rig"\n[[clock]]\nrate_hz = 100\n' + channel.format("command")
     (tmp_path / "m.toml").write_text(text + channel.format("response"))
     assert sound(tmp_path / "m.toml") == "import map for rig: 2 channels, 1 clock"
+
+
+@pytest.mark.parametrize(
+    ("passed", "changes", "outcome"),
+    [
+        (True, ({"changed": False},), "passed"),
+        (False, ({"changed": False}, {"changed": True}), "something changed"),
+        (False, ({"changed": False},), "measured too inaccurately to detect a change"),
+        (False, (), "it broke off"),
+    ],
+)
+def test_a_daily_check_is_described_by_its_outcome(tmp_path, passed, changes, outcome):
+    check = DailyCheck("omega.3", "serial 1", "2026-05-04T09:30:00+00:00", passed, (), changes, "", "", "0" * 64)
+    write_daily_check(tmp_path / "c.json", check)
+    assert sound(tmp_path / "c.json") == f"daily check of omega.3 at {check.utc}: {outcome}"
 
 
 def test_a_diagnosis_is_described(tmp_path):

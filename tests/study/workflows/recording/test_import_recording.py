@@ -222,3 +222,9 @@ def test_tables_whose_command_repeats_get_segments_with_period_and_level(tmp_pat
     ]  # fmt: skip
     assert found[1].amplitude == pytest.approx(3 * found[0].amplitude)
     assert done.notes[-1].startswith("The excitation repeats exactly, every 300 samples, 4 times or more in each part")
+
+
+@pytest.mark.parametrize("map_name", [None, "silverbox"])
+def test_without_a_file_nothing_is_imported(tmp_path, map_name):
+    with pytest.raises(WrongUseError, match="No file was given"):
+        import_recording(ImportPlan((), map_name, tmp_path / "r.h5"))

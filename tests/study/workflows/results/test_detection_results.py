@@ -2,13 +2,14 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
 from protocols.document.loading import load_protocol
 from study.store.formats.thresholds_file import read_thresholds
 from study.workflows.files.validate import validate_file
-from study.workflows.results.analysis_files import list_analysis_outputs
+from study.workflows.results.analysis_files import is_analysis_of, list_analysis_outputs
 from study.workflows.results.analyze_data import analyze_data
 from study.workflows.results.write_results import write_results
 
@@ -89,6 +90,21 @@ def test_a_detection_table_of_an_earlier_analysis_does_not_stay(sitter, tmp_path
     (out / "detection.csv").write_text("of a participant who withdrew since")
     analyze_data(sitter.whole().folder.path, out)
     assert not (out / "detection.csv").exists()
+
+
+def test_the_report_of_an_earlier_analysis_goes_first(session, monkeypatch):
+    """Without its report, an analysis that broke off is not taken for a whole one."""
+    out, own = session / "analysis", Path.unlink
+
+    def unlink(path, missing_ok=False):
+        if path.name != "report.html":
+            raise KeyboardInterrupt
+        own(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", unlink)
+    with pytest.raises(KeyboardInterrupt):
+        analyze_data(session, out)
+    assert not is_analysis_of(out, session / "events.jsonl")
 
 
 def test_a_withdrawal_takes_the_detection_table_of_an_analysis_too(session):

@@ -261,6 +261,14 @@ def test_a_bad_time_leaves_one_session_out_of_an_analysis_and_not_all(session, s
     assert make_session_line(SessionFolder(session)).standing == "unreadable"
 
 
+def test_a_session_that_ended_before_its_first_trial_is_named_in_an_analysis(session, session_logs):
+    other = session.parent / "P02_001"
+    shutil.copytree(session, other)
+    session_logs.unsealed(other)
+    session_logs.forged(other, lambda events: [events[0].replace(b"P01", b"P02")])
+    assert collect_sessions(session.parent).exclusions == ("P02_001 has no trial.",)
+
+
 def test_a_torn_note_after_the_end_is_mended_and_the_seal_still_holds(session):
     log = session / "events.jsonl"
     log.write_bytes(log.read_bytes() + b'{"utc":"2026')

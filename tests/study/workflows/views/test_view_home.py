@@ -11,6 +11,7 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
 from study.workflows.views.view_home import list_session_lines, make_home_view
+from study.workflows.views.view_session import make_session_view
 
 
 @pytest.fixture(scope="module")
@@ -177,3 +178,13 @@ def test_nothing_in_a_tombstone_reaches_the_terminal_as_a_command(data):
     (folder / "withdrawn.json").write_text(json.dumps(left))
     line = next(line for line in list_session_lines(data) if line.name == "P07_001")
     assert (line.standing, line.begun_utc, line.protocol) == ("withdrawn", " [2J", " ]0;x")
+
+
+def test_paths_stay_those_by_which_the_files_are_opened(data, small_text):
+    folder = Path(shutil.copytree(data, data.parent / "my\u3000data\t"))  # neither character is printable
+    (folder / "mine.toml").write_text(small_text)
+    view = make_home_view(folder)
+    assert Path(view.sessions[0].path) == folder / "P01_001"
+    assert make_session_view(Path(view.sessions[0].path)).line.path == view.sessions[0].path
+    assert str(folder / "mine.toml") in [protocol.name for protocol in view.protocols]
+    assert "\t" not in view.data

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
@@ -24,7 +24,7 @@ def make_curve(diagnosed):
         placed = PlacedEffect(make_law_effect(law, Channels(("fx",), ("ax",))), (0,), get_law_values(law))
         recording, model = diagnosed.recorded(1, (placed,) if there else ()), diagnosed.device(1)
         noise = np.array(diagnosed.NOISE)
-        measure = FreeSimulation((observe(recording, 1),), noise, noise)
+        measure = FreeSimulation((observe_parts([recording], 1)[0],), noise, noise)
         tuning = make_tuning(model, recording.command.channels)
         without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
         return compute_law_signature(gather_evidence(measure, tuning, without)[0], placed, axes, LINEAR)

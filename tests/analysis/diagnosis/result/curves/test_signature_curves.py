@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import observe
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
@@ -23,7 +23,7 @@ def make_signature(diagnosed):
         placed = PlacedEffect(BY_NAME[name], tuple(range(axes)), values)
         recording = diagnosed.recorded(axes, (placed,) if there else ())
         model = diagnosed.device(axes)
-        seen = observe(recording, axes)
+        seen = observe_parts([recording], axes)[0]
         noise = np.repeat(diagnosed.NOISE, axes)
         measure, tuning = FreeSimulation((seen,), noise, noise), make_tuning(model, recording.command.channels)
         without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)

@@ -144,6 +144,10 @@ def test_only_faults_that_a_recording_can_carry_are_drawn():
     assert "sensor_misalignment" not in list_applicable_injections(recording(1))
     places = replace(recording(3).response, channels=("shaker", "wing tip", "payload"))
     assert "sensor_misalignment" not in list_applicable_injections(replace(recording(3), response=places))
+    three = recording(3)
+    samples, names = np.hstack([three.response.samples] * 2), ("ax", "ay", "az", "bx", "by", "bz")
+    doubled = replace(three, response=replace(three.response, samples=samples, channels=names))
+    assert "sensor_misalignment" not in list_applicable_injections(doubled)
     imposed = replace(swinging(), meta={"imposed": "position"})
     assert {"added_mass", "force_gain"} <= set(list_applicable_injections(swinging()))
     assert "added_mass" in list_applicable_injections(imposed) and "force_gain" not in list_applicable_injections(
@@ -159,6 +163,10 @@ def test_what_cannot_be_injected_is_refused():
         injected("quantization", 1.5)
     with pytest.raises(ValueError, match="needs 3 response channels"):
         injected("sensor_misalignment", channels=1)
+    still = replace(recording(), response=replace(recording().response, samples=np.zeros((4000, 3))))
+    for effect in ("quantization", "sensor_nonlinearity", "sensor_asymmetry"):
+        with pytest.raises(ValueError, match="the response is constant"):
+            inject(still, effect, 0.5, np.random.default_rng(2))
 
 
 def two_takes() -> Recording:
