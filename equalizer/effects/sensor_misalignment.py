@@ -88,7 +88,8 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
 def _report_angle(values: Values) -> Values:
     """Add the angle of the rotation, `degrees`, which the vocabulary reports, to the values: `Effect.report`."""
     angles_deg = {name: values[name] for name in ANGLE_NAMES if name in values}
-    return {"degrees": math.hypot(*_read_rotation_vector(values)), **angles_deg}
+    # A rotation vector beyond half a turn is the smaller rotation the other way round.
+    return {"degrees": abs(math.remainder(math.hypot(*_read_rotation_vector(values)), 360.0)), **angles_deg}
 
 
 EFFECT = Effect(

@@ -22,7 +22,7 @@ LARGEST_AZIMUTH_ERROR_DEG = 5.0
 
 def estimate_arm_azimuths(jacobian: FloatArray) -> FloatArray:
     """Estimate the azimuths (3,) of the arms, rad, in the order of the joints, from J (3, 3) at a position on the
-    base's axis.
+    base's axis; not singular (`check_reading`).
 
     There each row of the inverse of J is parallel to its forearm, in the plane of its arm; forearms point inwards and
     towards the operator. The result is the nearest triple at exactly 120 degrees to each other. Raises CalibrationError

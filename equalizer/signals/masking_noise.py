@@ -1,8 +1,9 @@
 """Pink noise that masks the sound of a device, as a periodic signal that can be repeated without a discontinuity.
 
 It prevents a participant from answering by the sound of the vibration. The noise is made in the frequency domain: power
-density proportional to 1/f between two corner frequencies, random phases, then an inverse FFT. Called by
-`study.workflows.session.write_masking_noise` (a file) and `study.workflows.trial.masking` (playback in a session).
+density proportional to 1/f between two corner frequencies (-3 dB per octave) and none outside, random phases, then an
+inverse FFT. Called by `study.workflows.session.write_masking_noise` (a file) and `study.workflows.trial.masking`
+(playback in a session).
 """
 
 import math
@@ -10,10 +11,6 @@ import math
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
-
-SLOPE_DB_PER_OCTAVE = -3.0103
-"""Slope of the power density, 10 log10(1/2) for 1/f: equal power in every octave between the corners, none outside
-them."""
 
 HEADROOM_DB = 3.0
 """Distance of the largest sample from full scale (dB), because the analog signal may exceed it between samples.

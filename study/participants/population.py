@@ -27,13 +27,6 @@ DETECTION_SD_DB = 2.5
 """Standard deviation (dB) of detection thresholds between participants, the same deviation at all frequencies of a
 participant, independent of the direction thresholds."""
 
-
-def draw_population(count: int, seed: int) -> tuple[DirectionFeeler, ...]:
-    """Draw participants 1 to `count` of the population of this seed. Each depends on its number and the seed only, not
-    on `count`."""
-    return tuple(draw_person(number, seed) for number in range(1, count + 1))
-
-
 MEMBER_KINDS = ("person", "delivered", "repeating", "criterion_drift")
 """Kinds of participants: a `DirectionFeeler`; one who perceives the delivered acceleration (`DeliveredFeeler`); one who
 asks for a repetition when unsure (`UnsureRepeater`); a `DirectionFeeler` whose criterion drifts."""

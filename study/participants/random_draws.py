@@ -22,8 +22,9 @@ def draw_uniform(stimulus: PerceivedStimulus, seed: int, count: int) -> tuple[fl
     """Draw `count` independent numbers, uniform in (0, 1), for one presentation. seed: of the session."""
     key = (_OBSERVER_STREAM, stimulus.run, stimulus.trial, stimulus.attempt)
     random_words = np.random.SeedSequence(entropy=seed, spawn_key=key).generate_state(count, np.uint64)
-    # 53 random bits, the precision of a float; the half keeps 0 out, whose normal quantile is infinite.
-    return tuple(((int(word) >> 11) + 0.5) * 2.0**-53 for word in random_words)
+    # 53 random bits, the precision of a float; the half keeps 0 out, and the minimum 1, to which the largest word is
+    # rounded: their normal quantiles are infinite.
+    return tuple(min(((int(word) >> 11) + 0.5) * 2.0**-53, 1.0 - 2.0**-53) for word in random_words)
 
 
 def draw_response_time_s(uniform_draw: float) -> float:

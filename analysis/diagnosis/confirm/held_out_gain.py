@@ -100,4 +100,4 @@ def _compute_stretch_powers(measure: ErrorMeasure, candidate: FittedCandidate) -
             power_sums += [
                 np.sum(residuals[stretch] ** 2, axis=0) for stretch in np.array_split(indices, stretch_count)
             ]
-    return np.array(power_sums).reshape(len(power_sums), -1)
+    return np.reshape(power_sums, (len(power_sums), candidate.fitted.residuals[0].shape[1]))

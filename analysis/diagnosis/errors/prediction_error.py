@@ -46,7 +46,7 @@ class PredictionError:
     samples where all are compared, or none is left to fit. None also where no gain can be fitted."""
     channels: tuple[ChannelRms, ...]
     """Errors of each response channel, without the gain factor; empty where they are not finite, no sample is compared,
-    or fewer signals are compared than there are responses."""
+    or forces are compared."""
 
 
 def compute_prediction_error(
@@ -72,15 +72,17 @@ def compute_prediction_error(
         measure.name,
         _compute_normalised_rms(y, f, test_mask),
         None if gain is None else _compute_normalised_rms(y, gain * f, test_mask),
-        tuple(_compute_channel_errors(recording, y[test_mask], f[test_mask])),
+        ()
+        if measure.name == "predicted force"
+        else tuple(_compute_channel_errors(recording, y[test_mask], f[test_mask])),
     )
 
 
 def _compute_channel_errors(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
-    """Yield the errors of the first compared signals as those of the response channels; none where fewer were compared,
-    or the prediction is not finite. y: measured, f: predicted, (n, c)."""
+    """Yield the errors of the response channels, which are the first compared signals; none without a sample, or where
+    the prediction is not finite. y: measured, f: predicted, (n, c)."""
     signal = recording.response
-    if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
+    if not len(y) or not np.isfinite(f).all():
         return
     for c, (name, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
         yield ChannelRms(name, unit, float(np.std(y[:, c])), float(np.sqrt(np.mean((y - f)[:, c] ** 2))))

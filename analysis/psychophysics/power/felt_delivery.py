@@ -25,7 +25,8 @@ class FeltDelivery:
     """Tables of the delivered stimulus by frequency and direction, with masking and adaptation of simulated people."""
 
     tables: tuple[tuple[DeliveryTable, DeliveryTable], ...]
-    """Per frequency of the crowd: of the sides +1 and -1 of `DeliveredTrials`."""
+    """Per frequency of the crowd: of the sides +1 and -1 of `DeliveredTrials`, which a simulated study takes for its
+    sides +1 and -1; the protocol's numbers of the directions are not used."""
     masking: float = 1.0
     """Factor by which harmonics add to the threshold, in squares (masking)."""
     adaptation_db: float = 1.0

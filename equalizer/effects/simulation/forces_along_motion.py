@@ -40,7 +40,7 @@ def compute_effect_forces_along_motion(
     model: MechanicalModel, effects: Sequence[PlacedEffect], motion: Motion, forces: tuple[FloatArray, FloatArray],
     sample_rate_hz: float,
 ) -> FloatArray:  # fmt: skip
-    """Compute the sum of the effects' forces (n, m) at the driven axes along the motion; effects that are no
+    """Compute the sum of the effects' forces (n, m), n >= 2, at the driven axes along the motion; effects that are no
     `AxisForce` add nothing. forces: (n, m) each, the commands, and the unbalanced force: actuator force minus the force
     that the linear model needs for the motion, mean over each step. Friction at rest balances it. Raises ValueError
     where an effect names an axis that the model lacks, or for more laws than the kernel holds."""

@@ -87,7 +87,7 @@ def fit_coefficients(residual: FloatArray, basis: FloatArray, used: FloatArray) 
 def estimate_lag(measured: FloatArray, predicted: FloatArray, largest_lag_samples: int) -> float:
     """Estimate the number of samples by which the measured response (n, p) lags the predicted one, from the peak of the
     normalised cross-correlation, summed over channels, up to `largest_lag_samples` either way; refined unless the peak
-    is at that limit."""
+    is at that limit, which the refinement may exceed by less than `REFINEMENT_STEPS` samples."""
     largest_lag_samples = min(largest_lag_samples, len(measured) - 1)
     padded_length = next_fast_len(len(measured) + largest_lag_samples, True)
     correlation_sum: FloatArray = np.zeros(2 * largest_lag_samples + 1)

@@ -14,6 +14,9 @@ from equalizer.identification.mechanical.mechanical_response import compute_free
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
+_SILENT_AMPLITUDE = 1e-9
+"""Rms response, relative to that of the strongest channel, up to which a channel counts as silent: rounding errors, as
+where a converter shows the same number throughout. Chosen."""
 _MAX_FITTED_LINES = 3000
 """Number of lines, up to a factor of two, to which the initial state is fitted; more are thinned out to limit computing
 time. Chosen."""
@@ -23,8 +26,8 @@ def compute_simulation_errors(
     model: MechanicalModel, segments: Sequence[SegmentLines], band_hz: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Compute two arrays (p + 1,) for p channels: rms error, and rms noise (NaN where not known), of each channel
-    relative to the rms of its response; the last entry is the root mean square over the channels. band_hz: lines from
-    its lower to its upper limit, both included. Without a line in the band all errors are 0."""
+    relative to the rms of its response (`_replace_silent`); the last entry is the root mean square over the channels.
+    band_hz: lines from its lower to its upper limit, both included. Without a line in the band all errors are 0."""
     output_count = model.outputs
     error_power, response_power, noise_power = np.zeros(output_count), np.zeros(output_count), np.zeros(output_count)
     for segment in segments:
@@ -33,11 +36,8 @@ def compute_simulation_errors(
         error_power += (np.abs(misfit) ** 2).sum(axis=0)
         response_power += (np.abs(segment.response[is_in_band]) ** 2).sum(axis=0)
         noise_power += segment.noise[is_in_band].sum(axis=0)
-    # 1e-300 avoids a division by zero for a response without power.
-    error_shares, noise_shares = (
-        error_power / np.maximum(response_power, 1e-300),
-        noise_power / np.maximum(response_power, 1e-300),
-    )
+    reference_power = _replace_silent(response_power)
+    error_shares, noise_shares = error_power / reference_power, noise_power / reference_power
     return (
         np.sqrt(np.append(error_shares, error_shares.mean())),
         np.sqrt(np.append(noise_shares, noise_shares.mean())),
@@ -46,7 +46,8 @@ def compute_simulation_errors(
 
 def compute_simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
     """Compute (lines, p): measured minus simulated spectrum, in the response's unit. Where the segment has a transient,
-    the initial state is fitted by least squares, with each channel divided by the norm of its response."""
+    the initial state is fitted by least squares, with each channel divided by the norm of its response
+    (`_replace_silent`)."""
     frequency_response = compute_sampled_response(
         model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold
     )
@@ -62,7 +63,7 @@ def compute_simulation_misfit(model: MechanicalModel, segment_lines: SegmentLine
     fitted_lines = np.unique(
         np.concatenate([np.arange(min(200, len(free_response))), np.arange(0, len(free_response), stride)])
     )
-    response_norm = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
+    response_norm = np.sqrt(_replace_silent(np.linalg.norm(segment_lines.response, axis=0) ** 2))[:, None]
     weighted_response = (free_response[fitted_lines] / response_norm).reshape(-1, free_response.shape[2])
     weighted_misfit = (misfit[fitted_lines] / response_norm[:, 0]).ravel()
     # Real and imaginary parts are separate equations of real unknowns; columns are scaled to unit norm for rcond.
@@ -75,3 +76,11 @@ def compute_simulation_misfit(model: MechanicalModel, segment_lines: SegmentLine
         / column_norms
     )
     return np.asarray(misfit - free_response @ initial_state)
+
+
+def _replace_silent(response_power: FloatArray) -> FloatArray:
+    """Replace the power of silent channels (`_SILENT_AMPLITUDE`) by the mean over all channels, because an error
+    relative to rounding errors would outweigh all others. response_power: (p,), of the same quantity. At least 1e-300,
+    which avoids a division by zero."""
+    is_silent = response_power <= _SILENT_AMPLITUDE**2 * response_power.max()
+    return np.maximum(np.where(is_silent, response_power.mean(), response_power), 1e-300)

@@ -20,7 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFit, MechanicalFitSettings
+from equalizer.identification.mechanical.mechanical_fit_result import (
+    MechanicalFit,
+    MechanicalFitError,
+    MechanicalFitSettings,
+)
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording
@@ -64,8 +68,8 @@ def fit_rigid_body(
     """Fit a rigid body to two recordings of the same device, at a stronger and a weaker level of the excitation, and
     compute the equivalent damping of friction from their difference (limited to 0 to `LARGEST_REMOVED_SHARE` of the
     damping; r - 1 counts as at least 0.001). fit: that of the whole band, whose tolerances are kept where they are
-    wider. settings: of `fit`. Raises MechanicalFitError where a recording does not determine a rigid body, ValueError
-    where one has no segments."""
+    wider. settings: of `fit`. Raises MechanicalFitError where a recording does not determine a rigid body, or states no
+    amplitude."""
     low_hz, high_hz = fit.band_hz
     up_to_hz = min(high_hz, low_hz * 2**RIGID_OCTAVES)
     rigid_settings = replace(
@@ -112,6 +116,9 @@ def _extract_axis_parameters(model: MechanicalModel) -> FloatArray:
 
 
 def _find_largest_amplitude(recording: Recording) -> float:
-    """Find the largest amplitude of a recording's segments, in the command's unit. Raises ValueError without
-    segments."""
-    return max(segment.amplitude for segment in recording.segments)
+    """Find the largest amplitude of a recording's segments, in the command's unit. Raises MechanicalFitError where none
+    is above 0."""
+    largest_amplitude = max((segment.amplitude for segment in recording.segments), default=0.0)
+    if largest_amplitude <= 0:
+        raise MechanicalFitError("no segment of a recording states an amplitude above 0; state those of both levels")
+    return largest_amplitude

@@ -58,13 +58,6 @@ class ModalForm:
         return state_responses
 
 
-def compute_modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
-    """Convert A (n, n) and C (p, n) to modal form, by eigenvalue decomposition. Raises ValueError where the number of
-    real poles is odd."""
-    eigenvalues, eigenvectors = np.linalg.eig(A)
-    return build_form_from_poles(eigenvalues, C @ eigenvectors)
-
-
 def build_form_from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
     """Make the real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n),
     output of each pole's mode. Raises ValueError where the number of real poles is odd or a conjugate is missing."""

@@ -73,6 +73,6 @@ def _make_watchdog_error(reason: str) -> DeviceError:
     """Make the error for a watchdog that failed the test. reason: a sentence."""
     return DeviceError(
         "The device's watchdog failed its test",
-        f"{reason} If this program died, the device would hold its last force.",
+        f"{reason} Without a watchdog that works, the device would hold its last force if this program died.",
         "Do not let a person hold the handle. Switch the device off and on and try again; else update its firmware.",
     )

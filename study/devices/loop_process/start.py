@@ -21,25 +21,25 @@ KILL_TIMEOUT_S = 2.0
 
 class LoopProcess:
     """The process of the device loop, with a `CallPipe` for each group of methods, named as in `PIPE_NAMES`. The
-    constructor starts it, and raises `DeviceError` where the system refuses to start a process.
+    constructor starts it, and raises `DeviceError` where the system refuses pipes or a process.
 
     It has its own session (on Windows, process group), so that the terminal's Ctrl-C and Ctrl-Z do not reach it. Its
     pipes are closed when this process ends for any reason. It inherits stderr, for warnings after that.
     """
 
     def __init__(self) -> None:
-        pipe_pairs = [Pipe() for _ in PIPE_NAMES]
+        try:
+            # Where the system refuses one of them, the others are closed by their destructors.
+            pipe_pairs = [Pipe() for _ in PIPE_NAMES]
+        except OSError as error:
+            raise _make_start_error(error) from error
         child_ends = [pipe_end for _, pipe_end in pipe_pairs]
         try:
             self._process = _start_process([pipe_end.fileno() for pipe_end in child_ends], child_ends)
         except OSError as error:
             for caller_end, _ in pipe_pairs:
                 caller_end.close()
-            raise DeviceError(
-                "The device's loop cannot be started",
-                f"The system refused to start the process for it: {error.strerror or error}.",
-                "Close other programs, then try again.",
-            ) from error
+            raise _make_start_error(error) from error
         finally:
             for pipe_end in child_ends:
                 pipe_end.close()
@@ -96,6 +96,15 @@ def _start_process(handles: list[int], pipe_ends: list[PipeEnd]) -> "subprocess.
         popen_options = {"pass_fds": handles, "start_new_session": True}
     return subprocess.Popen(
         [sys.executable, "-c", program_text], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **popen_options
+    )
+
+
+def _make_start_error(error: OSError) -> DeviceError:
+    """Make the error for pipes or a process that the system refuses."""
+    return DeviceError(
+        "The device's loop cannot be started",
+        f"The system refused to start the process for it: {error.strerror or error}.",
+        "Close other programs, then try again.",
     )
 
 

@@ -33,9 +33,9 @@ def run_controls(
     controls: Sequence[Control] = CONTROLS,
     settings: CaseSettings = CONTROL_SETTINGS,
 ) -> tuple[ControlOutcome, ...]:
-    """Write, diagnose and judge the controls in the folder `path`, with `on_done(answered, total)` after each case. A
-    repeated call with the same folder and seed continues. Raises StudyError where the processes end early or a file
-    cannot be read or written."""
+    """Write, diagnose and judge the controls in the folder `path`, with `on_done(answered, total)` after each case.
+    controls: some of `CONTROLS`. A repeated call with the same folder and seed continues. Raises StudyError where the
+    processes end early or a file cannot be read or written."""
     folder = ProofFolder(path)
     folder.open.mkdir(parents=True, exist_ok=True)
     case_names_by_control = {control.name: _prepare_control(folder, seed, control, settings) for control in controls}

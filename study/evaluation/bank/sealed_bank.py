@@ -54,11 +54,12 @@ def reveal_bank(
 ) -> tuple[OutcomeT, ...]:
     """Check the labels in the folder, and return the outcomes of the answered cases with numbers below `case_count`,
     sorted by the names of their label files. make_outcome: makes an outcome from a label and its answer. is_unchanged:
-    whether further files whose hashes the label holds are unchanged. Raises StudyError where a label or such a file has
-    changed, or an answer was given to other files."""
+    whether further files whose hashes the label holds are unchanged. Raises StudyError where a label is
+    missing, a label or such a file has changed, or an answer was given to other files."""
     seals = read_seals(folder)
     outcomes: list[OutcomeT] = []
-    broken_names: list[str] = []
+    # A label that was removed after it was sealed must not be left out of the score.
+    broken_names = [name for name in seals if not (folder.path / name).exists()]
     for path in sorted(folder.sealed.glob("*.json")):
         if seals.get(f"sealed/{path.name}") != compute_sha256(path):
             broken_names.append(path.name)

@@ -17,8 +17,8 @@ AXES = ("x", "y", "z")
 """Names of the bench's axes."""
 LEVELS_N = (0.5, 1.5, 3.0)
 """Peaks of the multisines to fit (N); the second also that of one to test."""
-PERIOD_SAMPLES, FIT_PERIODS, TEST_PERIODS = 2000, 4, 2
-"""Samples of a multisine's period, and periods of a segment to fit and of one to test."""
+PERIOD_SAMPLES, TEST_PERIODS = 2000, 2
+"""Samples of a multisine's period, and periods of a segment to test."""
 REST_SAMPLES = 500
 """Samples of rest between two segments."""
 FIRST_LINE, LAST_LINE = 3, 479

@@ -1,5 +1,7 @@
 """Command line that resumes an unfinished session, for messages."""
 
+import shlex
+
 SIMULATED_DEVICE = "simulated"
 """Name of the simulated device, which `hapteq resume` opens without the option --device. Equal to
 `study.devices.opening.SIMULATED`, which is not imported, because this package loads no drivers."""
@@ -12,7 +14,7 @@ def find_device_option(logged_name: str, simulated: bool) -> str:
 
 
 def format_resume_command(session_path: str, device_name: str) -> str:
-    """Format the command `hapteq resume`. session_path: path of the session's folder, inserted without shell quotes;
-    device_name: as `open_device` takes it."""
-    option = "" if device_name == SIMULATED_DEVICE else f" --device {device_name}"
-    return f"hapteq resume {session_path}{option}"
+    """Format the command `hapteq resume`. session_path: path of the session's folder; device_name: as `open_device`
+    takes it. Both are quoted for a POSIX shell where needed."""
+    option = () if device_name == SIMULATED_DEVICE else ("--device", device_name)
+    return shlex.join(("hapteq", "resume", session_path, *option))

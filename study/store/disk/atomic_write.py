@@ -5,15 +5,15 @@ import secrets
 from contextlib import suppress
 from pathlib import Path
 
-from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError, NotSyncedError
 from study.store.disk.privacy import choose_file_mode
 
 
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
     """Write `content` to a temporary file in the same folder, sync it, and move it to `path`; its mode is
     `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyExistsError if the file exists and is
-    not to be replaced, CannotWriteError for an error of the operating system, also where the file is in place and only
-    the sync of the folder failed. After an error the temporary file is removed."""
+    not to be replaced, CannotWriteError for an error of the operating system, NotSyncedError where the file is in place
+    and only the sync of the folder failed. After an error the temporary file is removed."""
     temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not overwrite:
@@ -24,12 +24,20 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> 
             file.flush()
             os.fsync(file.fileno())
         _move_into_place(temporary_path, path, overwrite)
-        sync_folder(path.parent)
     except OSError as problem:
         raise CannotWriteError(path, problem) from problem
     finally:
         with suppress(OSError):
             temporary_path.unlink(missing_ok=True)
+    sync_entry(path)
+
+
+def sync_entry(path: Path) -> None:
+    """Sync the folder that holds a complete file or folder. Raises NotSyncedError where it cannot be synced."""
+    try:
+        sync_folder(path.absolute().parent)
+    except OSError as problem:
+        raise NotSyncedError(path, problem) from problem
 
 
 def sync_folder(folder: Path) -> None:

@@ -74,6 +74,18 @@ class CannotWriteError(StudyError):
         )
 
 
+class NotSyncedError(StudyError):
+    """A file or folder is complete under its name, but the folder that holds it could not be synced to the disk."""
+
+    def __init__(self, path: Path, problem: OSError) -> None:
+        super().__init__(
+            title=f"{path.name} may be lost at a power failure",
+            happened=f"The entry in {path.parent} could not be synced to the disk: {problem.strerror or problem}.",
+            saved=f"{path.name} is in place and complete.",
+            do_now="Check the disk and the permissions of the folder, and keep a copy elsewhere.",
+        )
+
+
 class AlreadyExistsError(StudyError):
     """A file exists under the name to be written, and overwriting was not requested."""
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from study.errors import StudyError
-from study.store.disk.atomic_write import sync_folder
+from study.store.disk.atomic_write import sync_entry, sync_folder
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.privacy import make_folder
 
@@ -54,7 +54,8 @@ def require_new_folder(folder: Path) -> None:
 def create_new_folder(folder: Path) -> Iterator[Path]:
     """Yield a temporary folder for the results, which is renamed to `folder` at the end of the context; after an
     exception in the context it is removed. Raises StudyError as `require_new_folder` does, at the beginning and before
-    renaming, and CannotWriteError where a folder cannot be created, synced or renamed."""
+    renaming, CannotWriteError where a folder cannot be created, synced or renamed, and NotSyncedError where only the
+    folder that holds it cannot be synced."""
     require_new_folder(folder)
     temporary_folder = folder.absolute().with_name(f".{folder.absolute().name}.{secrets.token_hex(4)}.part")
     try:
@@ -67,8 +68,8 @@ def create_new_folder(folder: Path) -> Iterator[Path]:
         try:
             sync_folder(temporary_folder)
             temporary_folder.rename(folder.absolute())
-            sync_folder(folder.absolute().parent)
         except OSError as problem:
             raise CannotWriteError(folder, problem) from problem
+        sync_entry(folder)
     finally:
         shutil.rmtree(temporary_folder, ignore_errors=True)

@@ -39,10 +39,17 @@ class EventLog:
 
     @classmethod
     def create(cls, path: Path) -> "EventLog":
-        """Create an empty log. Raises FileExistsError for an existing log, OSError where it cannot be created,
-        StudyError if another program has locked it."""
-        descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
-        sync_folder(path.parent)
+        """Create an empty log. Raises StudyError where it exists or cannot be created, or another program has locked
+        it."""
+        try:
+            descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
+            sync_folder(path.parent)
+        except OSError as problem:
+            raise StudyError(
+                "The session log cannot be made",
+                f"{path.name} in {path.parent.name}: {problem.strerror}.",
+                "Make room on the disk and check the permissions of the session's folder, then begin again.",
+            ) from problem
         _lock_file(descriptor, path)
         return cls(path, descriptor)
 

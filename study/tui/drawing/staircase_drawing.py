@@ -58,10 +58,10 @@ def draw_staircase(staircase: Staircase, columns: int, rows: int) -> tuple[str, 
         level_labels[round(compute_y(staircase.threshold_n)) // 4] = staircase.threshold_n
     marked_lines = _add_marks(canvas.render_lines(), dots, staircase)
     lines = [
-        f"{_format_level(level_labels.get(row)):>{LABEL_COLUMNS - 1}} {text}".rstrip()
+        f"{format_level(level_labels.get(row)):>{LABEL_COLUMNS - 1}} {text}".rstrip()
         for row, text in enumerate(marked_lines)
     ]
-    return (*lines, _draw_trial_axis(len(staircase.levels_n), round(dots[-1][0]) // 2))
+    return (*lines, _draw_trial_axis(len(staircase.levels_n), round(dots[-1][0]) // 2, columns))
 
 
 def summarise_staircase(staircase: Staircase) -> str:
@@ -95,14 +95,19 @@ def _choose_mark(correct: bool, reversal: bool) -> str:
     return RIGHT_MARK if correct else WRONG_MARK
 
 
-def _format_level(level_n: float | None) -> str:
-    """Format a level with its unit; empty for None."""
-    return "" if level_n is None else f"{level_n:.3g} N"
+def format_level(level_n: float | None) -> str:
+    """Format a level with its unit, in as many of three digits as fit into the width of the labels, such as "0.425 N"
+    and "0.042 N"; empty for None."""
+    if level_n is None:
+        return ""
+    labels = [f"{level_n:.{digit_count}g} N" for digit_count in (3, 2, 1)]
+    return next((label for label in labels if len(label) < LABEL_COLUMNS), labels[-1])
 
 
-def _draw_trial_axis(trial_count: int, last_column: int) -> str:
+def _draw_trial_axis(trial_count: int, last_column: int, columns: int) -> str:
     """Draw the trial axis: "1" under the first trial, and from two trials on the label of the last, ending at its
-    column (from 0) where there is room."""
+    column (from 0) or later. Only "1" where the label does not fit into `columns`."""
     last_label = f"trial {trial_count}" if trial_count > 1 else ""
     gap_columns = max(1, last_column + 1 - len("1") - len(last_label))
-    return f"{'':{LABEL_COLUMNS}}1{'':{gap_columns}}{last_label}".rstrip()
+    axis = f"{'':{LABEL_COLUMNS}}1{'':{gap_columns}}{last_label}".rstrip()
+    return axis if len(axis) <= columns else f"{'':{LABEL_COLUMNS}}1"

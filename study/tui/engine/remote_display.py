@@ -180,7 +180,10 @@ class RemoteDisplay:
                 decision: AfterPause = reply.value
                 return decision
         self._link.send(CloseRequest(request_number))
-        return AfterPause.END_SITTING
+        # A withdrawal that the screen sent before it received this counts: it must not be lost.
+        late_reply = self._await_reply(request_number)
+        is_withdrawn = late_reply is not None and late_reply.value is AfterPause.WITHDRAW
+        return AfterPause.WITHDRAW if is_withdrawn else AfterPause.END_SITTING
 
     def await_return(self, reason: str) -> None:
         self._ask_screen(DisplayCall.AWAIT_RETURN, reason)

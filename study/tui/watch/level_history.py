@@ -12,7 +12,14 @@ from textual.widget import Widget
 
 from study.session.watching.watch_view import StaircasePoint
 from study.tui.drawing.braille import Canvas
-from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK_MARK, RIGHT_MARK, VALLEY_MARK, WRONG_MARK
+from study.tui.drawing.staircase_drawing import (
+    LABEL_COLUMNS,
+    PEAK_MARK,
+    RIGHT_MARK,
+    VALLEY_MARK,
+    WRONG_MARK,
+    format_level,
+)
 
 MIN_AXIS_RATIO = 4.0
 """Least ratio of the cap to the lower end of the level axis, so that small steps do not look large. Chosen, as in
@@ -110,8 +117,7 @@ def _choose_mark(point: StaircasePoint) -> str:
 def _style_row(row: int, text: str, marks: dict[tuple[int, int], str], label_n: float | None) -> Content:
     """Convert a row of characters to styled text, with its level label (N; none for None) before it and marks in place
     of their cells."""
-    label = f"{label_n:5.3g} N" if label_n is not None else ""
-    parts: list[Content | str | tuple[str, str]] = [(f"{label:>{LABEL_COLUMNS - 1}} ", MUTED)]
+    parts: list[Content | str | tuple[str, str]] = [(f"{format_level(label_n):>{LABEL_COLUMNS - 1}} ", MUTED)]
     for column, character in enumerate(text):
         mark = marks.get((row, column))
         parts.append(character if mark is None else (mark, _MARK_STYLES[mark]))

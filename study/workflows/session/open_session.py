@@ -67,7 +67,7 @@ def open_session(
     plan: SessionPlan, device: DeviceInfo, session_equalizer: SessionEqualizer, clock: Clock
 ) -> Iterator[OpenedSession]:
     """Create a session: its folder, a copy of the model, if any, and its log with the first event. The session is
-    locked, and the log open, while the context lasts. Raises StudyError, or OSError where the log cannot be created."""
+    locked, and the log open, while the context lasts. Raises StudyError."""
     participant_number = plan.participant_number
     if participant_number is None:
         participant_number = find_participant_number(

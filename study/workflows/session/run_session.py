@@ -166,7 +166,7 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
             state = start_masking(pause_outcome.state, sitting) if continues else pause_outcome.state
             outcome = replace(outcome, state=state, end_reason=pause_outcome.end_reason)
             if pause_outcome.withdrawn:
-                return replace(_log_sitting_end(outcome, sitting), withdrawn=True)
+                return _end_withdrawn_sitting(outcome, sitting)
         if requester := sitting.supervisor.stop_requester:
             outcome = replace(outcome, end_reason=outcome.end_reason or f"the {requester} stopped the session")
         if outcome.end_reason:
@@ -206,6 +206,15 @@ def _log_sitting_end(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
     ending_event = SessionInterrupted(utc=sitting.clock.utc(), reason=outcome.end_reason)
     fault_text = sitting.device.health().why if outcome.fault is not Fault.NONE else ""
     return SessionEnd(log_and_apply(state, ending_event, sitting), outcome.end_reason, outcome.fault, fault_text)
+
+
+def _end_withdrawn_sitting(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
+    """Log and return the end of a sitting whose participant withdrew. Returned also where the log cannot be written:
+    the data are erased, and the withdrawal must not be lost."""
+    session_end = SessionEnd(outcome.state, outcome.end_reason)
+    with contextlib.suppress(StudyError):
+        session_end = _log_sitting_end(outcome, sitting)
+    return replace(session_end, withdrawn=True)
 
 
 def _report_busy_voids(state: SessionState, sitting: Sitting) -> SessionState:

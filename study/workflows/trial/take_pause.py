@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from study.errors import StudyError
 from study.session.facts.events import PauseTaken
 from study.session.state.state import SessionState
 from study.session.views.participant_views import AfterPause, PauseNotice
@@ -25,7 +26,8 @@ END_REASONS = {AfterPause.END_SITTING: "the participant left", AfterPause.WITHDR
 
 def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutcome:
     """Show the pause until the participant decides or a stop is requested, and log it with its duration (s). Notes that
-    are taken during the pause are logged at once. reason: shown to the participant."""
+    are taken during the pause are logged at once. reason: shown to the participant. Raises StudyError where the log
+    cannot be written, except after a withdrawal."""
     supervisor = sitting.supervisor
     requester = supervisor.pause_requester or "participant"
     supervisor.start_activity("pause")
@@ -38,11 +40,17 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
         return supervisor.keep_alive()
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), sign_of_life)
-    state = write_notes(state, sitting)
     # Cleared after the pause, so that a request made during the pause does not start another one.
     supervisor.pause_requester = None
     paused_s = sitting.clock.now_s() - started_s
-    state = log_and_apply(state, PauseTaken(utc=sitting.clock.utc(), who=requester, paused_s=paused_s), sitting)
-    if supervisor.stop_requester is not None:
+    pause_taken = PauseTaken(utc=sitting.clock.utc(), who=requester, paused_s=paused_s)
+    try:
+        state = log_and_apply(write_notes(state, sitting), pause_taken, sitting)
+    except StudyError:
+        # A full disk must not hide a withdrawal, which erases the log.
+        if decision is not AfterPause.WITHDRAW:
+            raise
+    # A stop that is requested at the same time must not hide a withdrawal, which erases the data.
+    if supervisor.stop_requester is not None and decision is not AfterPause.WITHDRAW:
         return PauseOutcome(state, f"the {supervisor.stop_requester} stopped the session", withdrawn=False)
     return PauseOutcome(state, END_REASONS.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

@@ -79,6 +79,9 @@ def test_a_misalignment_is_reported_by_its_total_angle():
     report = EFFECTS["sensor_misalignment"].report(TURN)
     assert report["degrees"] == pytest.approx(np.sqrt(98))
     assert report.items() >= TURN.items()
+    # Beyond half a turn, it is the same rotation the other way round.
+    beyond = EFFECTS["sensor_misalignment"].report({"about_x": 120.0, "about_y": -120.0, "about_z": 120.0})
+    assert beyond["degrees"] == pytest.approx(360.0 - 120.0 * np.sqrt(3))
 
 
 def test_of_which_only_the_angle_is_known_it_turns_about_the_last_axis():

@@ -94,6 +94,11 @@ def test_a_random_difference_has_a_gain_interval_around_zero():
     assert found.low < 0 < found.high
 
 
+def test_where_no_sample_is_held_out_there_is_no_gain():
+    nothing = SimpleNamespace(records=(SimpleNamespace(test=np.zeros(1600, dtype=bool)),))
+    assert estimate_held_out_gain(nothing, make_candidate(NOISE), make_candidate(0.5 * NOISE)) is None
+
+
 POSITIONS = SimpleNamespace(response=SimpleNamespace(quantities=("position", "position")), position=None)
 
 

@@ -1,12 +1,14 @@
 """A device whose drives move its sensors through cables: masses and cables are found from force and acceleration."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError, MechanicalFitSettings
 from equalizer.identification.mechanical.mechanical_structure import insert_joint
-from equalizer.identification.mechanical.rigid_body import remove_friction_damping
+from equalizer.identification.mechanical.rigid_body import fit_rigid_body, remove_friction_damping
 from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
@@ -75,3 +77,14 @@ def test_what_is_frictions_is_taken_off_where_the_drive_is():
     joined = insert_joint(one_piece(), 1, 2e4 * ONE, 1e-4)
     freed = remove_friction_damping(joined, np.array([4.0]))
     np.testing.assert_allclose(joined.damping - freed.damping, [[4.0, 0.0], [0.0, 0.0]], atol=1e-9)
+
+
+@pytest.mark.parametrize("segments", [(), (Segment(0, 100, "multisine"),)])
+def test_a_rigid_body_is_refused_where_no_amplitude_is_stated(segments):
+    wave = np.random.default_rng(1).standard_normal((100, 1))
+    still = Recording(
+        "device", Signal(wave, RATE_HZ, "force", "N", ("fx",)), Signal(wave, RATE_HZ, "acceleration", "m/s^2", ("ax",)),
+        segments=segments,
+    )  # fmt: skip
+    with pytest.raises(MechanicalFitError, match="no segment of a recording states an amplitude above 0"):
+        fit_rigid_body(SimpleNamespace(band_hz=(3.0, 60.0)), still, still, MechanicalFitSettings((3.0, 60.0)))

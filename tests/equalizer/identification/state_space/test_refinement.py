@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form
+from equalizer.identification.state_space.modal_form import ModalForm
 from equalizer.identification.state_space.refinement import complete_form, refine_form, solve_input_matrices
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.identification.state_space.weighted_lines import weight_lines
+from tests.equalizer.identification.state_space.test_modal_form import make_modal_form
 
 RADIUS = compute_pole_radius(0.5, 1000.0)
 
@@ -23,7 +24,7 @@ def lines(measuring, plant):
 
 
 def disturbed(plant, seed, size):
-    form = compute_modal_form(plant.A, plant.C)
+    form = make_modal_form(plant.A, plant.C)
     random = np.random.default_rng(seed)
     shaken = [part * (1 + size * random.standard_normal(part.shape)) for part in (form.b, form.C)]
     return ModalForm(form.a, *shaken)
@@ -31,7 +32,7 @@ def disturbed(plant, seed, size):
 
 def test_input_matrices_are_exact_where_poles_and_outputs_are(measuring, plant):
     exact = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
-    form = compute_modal_form(plant.A, plant.C)
+    form = make_modal_form(plant.A, plant.C)
     B, D = solve_input_matrices(form, exact)
     assert (
         np.abs(form.compute_state_outputs(exact.z) @ B + D - exact.response).max() < 1e-9 * np.abs(exact.response).max()
@@ -73,12 +74,12 @@ def test_the_bound_holds_where_the_data_ask_for_a_slower_pole(measuring, plant):
     lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
     radius = compute_pole_radius(0.02, 1000.0)
     assert np.abs(np.linalg.eigvals(plant.A)).max() > radius
-    found = refine_form(compute_modal_form(0.9 * plant.A, plant.C), lines, radius)
+    found = refine_form(make_modal_form(0.9 * plant.A, plant.C), lines, radius)
     assert np.abs(found.form.poles).max() <= radius * (1 + 1e-7)
 
 
 def test_states_that_nothing_shows_do_not_stop_the_search(plant, lines):
-    known = compute_modal_form(plant.A, plant.C)
+    known = make_modal_form(plant.A, plant.C)
     twice = ModalForm(
         np.append(known.a, known.a[0]), np.append(known.b, known.b[0]), np.hstack([known.C, 0 * known.C[:, :2]])
     )

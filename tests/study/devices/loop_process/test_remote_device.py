@@ -2,6 +2,7 @@
 for without a bound."""
 
 import contextlib
+import errno
 import os
 import signal
 import threading
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from study.devices.device import Fault
-from study.devices.loop_process import call_pipe
+from study.devices.loop_process import call_pipe, start
 from study.devices.loop_process.serve import DeviceServer
 from study.errors import DeviceError, WrongUseError
 from tests.slow_instances import slow_rows
@@ -185,6 +186,15 @@ def test_only_what_a_stop_and_a_sign_of_life_wait_for_goes_before_other_programs
     assert server.ended.wait(20.0)
     server.close()
     assert sorted(first) == ["serve signs", "serve stop"]
+
+
+def test_pipes_that_the_system_refuses_are_a_device_error(monkeypatch):
+    def refuse():
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    monkeypatch.setattr(start, "Pipe", refuse)
+    with pytest.raises(DeviceError, match="loop cannot be started.*Too many open files"):
+        start.LoopProcess()
 
 
 def test_closing_leaves_the_handle_free_and_the_last_health_known(device, rigs, rig):

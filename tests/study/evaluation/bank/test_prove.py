@@ -12,7 +12,7 @@ import pytest
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank import answer_cases
 from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE, ProofFolder, open_proof_folder
-from study.evaluation.bank.proof_seals import read_answer
+from study.evaluation.bank.proof_seals import read_answer, seal
 from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
 from study.evaluation.bank.prove import make_outcome, prove
 from study.evaluation.bank.seal_cases import BankPlan, list_drawable_cases
@@ -151,6 +151,18 @@ def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
     with pytest.raises(StudyError, match="A seal is broken"):
         prove(folder.path, PLAN, BankOptions(), lambda *_: None)
     assert folder.seals_file.read_text() == sealed
+
+
+def test_a_label_that_was_removed_afterwards_breaks_its_seal(tmp_path):
+    folder = ProofFolder(tmp_path)
+    folder.sealed.mkdir()
+    for name in ("a1b2", "c3d4"):
+        (folder.sealed / f"{name}.json").write_text(f'{{"name": "{name}", "number": 0}}')
+    seal(folder)
+    assert reveal_bank(folder, 100, make_outcome) == ()
+    (folder.sealed / "c3d4.json").unlink()
+    with pytest.raises(StudyError, match=r"A seal is broken.*c3d4\.json"):
+        reveal_bank(folder, 100, make_outcome)
 
 
 def test_seals_that_are_none_break_the_proof(copied):

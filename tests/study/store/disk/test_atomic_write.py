@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from study.errors import ExitCode
+from study.store.disk import atomic_write
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError
+from study.store.disk.file_errors import AlreadyExistsError, CannotWriteError, NotSyncedError
 
 REPOSITORY = Path(__file__).parents[4]
 
@@ -101,6 +102,20 @@ def test_a_folder_in_place_of_the_file_is_named(tmp_path):
     (tmp_path / "a").mkdir()
     with pytest.raises(CannotWriteError, match=r"a is a folder. .*Choose a name for a file"):
         write_atomically(tmp_path / "a", b"one", overwrite=True)
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_where_only_the_folder_is_not_synced_the_file_is_said_to_be_there(tmp_path, monkeypatch, overwrite):
+    (tmp_path / "a").write_bytes(b"old") if overwrite else None
+    monkeypatch.setattr(atomic_write, "sync_folder", fail_to_sync)
+    with pytest.raises(NotSyncedError, match="is in place and complete") as refused:
+        write_atomically(tmp_path / "a", b"one", overwrite=overwrite)
+    assert "Nothing was changed" not in str(refused.value)
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"one"]
+
+
+def fail_to_sync(folder: Path) -> None:
+    raise OSError(5, "Input/output error")
 
 
 def test_any_other_trouble_is_reported_in_the_systems_words():

@@ -5,7 +5,8 @@ import os
 import pytest
 
 from study.errors import StudyError
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk import atomic_write
+from study.store.disk.file_errors import CannotWriteError, NotSyncedError
 from study.store.disk.new_folder import create_new_folder, require_new_folder
 
 
@@ -50,6 +51,17 @@ def test_a_folder_that_was_filled_meanwhile_is_left_alone(tmp_path):
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / "mine").write_text("1")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine"]
+
+
+def test_where_only_the_folder_above_is_not_synced_the_results_are_said_to_be_there(tmp_path, monkeypatch):
+    def fail_to_sync(folder):
+        if folder == tmp_path:
+            raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(atomic_write, "sync_folder", fail_to_sync)
+    with pytest.raises(NotSyncedError, match="out is in place and complete"), create_new_folder(tmp_path / "out"):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 def test_the_folder_above_must_be_there(tmp_path):

@@ -31,9 +31,14 @@ def test_what_was_appended_is_read_back(written):
 
 def test_an_existing_log_is_never_opened_again(written):
     before = written.read_bytes()
-    with pytest.raises(FileExistsError):
+    with pytest.raises(StudyError, match="The session log cannot be made"):
         EventLog.create(written)
     assert written.read_bytes() == before
+
+
+def test_a_log_that_cannot_be_made_is_a_clear_error(tmp_path):
+    with pytest.raises(StudyError, match=r"The session log cannot be made.*No such file"):
+        EventLog.create(tmp_path / "missing" / "events.jsonl")
 
 
 @pytest.mark.parametrize("cut", [1, 2, 10, 40])

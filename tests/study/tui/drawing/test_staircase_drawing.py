@@ -42,7 +42,15 @@ def test_cap_threshold_and_lowest_level_have_their_numbers():
     assert lines[-1].split() == ["1", "trial", "4"]
 
 
-@pytest.mark.parametrize("size", [(20, 6), (60, 12), (200, 40)])
+@pytest.mark.parametrize("level_n", [0.05, 0.0123, 0.00123, 0.0000123])
+def test_long_labels_shift_no_line(level_n):
+    lines = draw_staircase(replace(SMALL, levels_n=(level_n,) * 4, threshold_n=None), 60, 12)
+    labelled_lines = [text for text in lines if " N" in text]
+    assert len(labelled_lines) == 2
+    assert all(text.ljust(60)[LABEL_COLUMNS - 2 : LABEL_COLUMNS] == "N " for text in labelled_lines)
+
+
+@pytest.mark.parametrize("size", [(LABEL_COLUMNS + 8, 6), (20, 6), (60, 12), (200, 40)])
 @pytest.mark.parametrize("trials", [1, 2, 60, 400])
 def test_it_fits_into_its_room(size, trials):
     levels = tuple(0.1 + (n % 7) * 0.4 for n in range(trials))

@@ -12,11 +12,13 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import RealClock
 from study.session.views.participant_views import (
+    AfterPause,
     Answered,
     DemoDone,
     DemoMenu,
     DirectionPicture,
     HandleView,
+    PauseNotice,
     PlayingNotice,
     Question,
     RestNotice,
@@ -199,6 +201,15 @@ def test_a_wait_gives_signs_of_life_twenty_times_a_second(screen):
 
     screen.display.ask(QUESTION, sign)
     assert max(later - earlier for earlier, later in pairwise(signs)) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("reply", "decision"),
+    [(AfterPause.WITHDRAW, AfterPause.WITHDRAW), (AfterPause.CONTINUE_SITTING, AfterPause.END_SITTING)],
+)
+def test_a_withdrawal_that_was_sent_while_a_stop_came_counts(screen, reply, decision):
+    screen.pipe.send(Reply(1, reply))
+    assert screen.display.pause(PauseNotice("a reason", 3), lambda: False) is decision
 
 
 def test_an_engine_that_understands_nothing_any_more_stops_its_device_and_ends(screen, capfd):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from study.errors import StudyError
 from study.session.facts.events import (
     AnswerGiven,
     NoteTaken,
@@ -14,6 +15,7 @@ from study.session.facts.events import (
 from study.session.views.form_views import FormKind
 from study.session.views.participant_views import AfterPause
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.event_log import EventLog
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from tests.study.workflows.session.sitting.person import Person, of
@@ -99,6 +101,31 @@ def test_a_withdrawal_in_a_pause_ends_the_sitting(plan, small_protocol, seat, pe
     end = conduct_new(plan(small_protocol), "simulated", seat)
     assert end.withdrawn
     assert end.end_reason == "the participant withdrew"
+
+
+def test_a_stop_does_not_override_a_withdrawal_in_a_pause(plan, small_protocol, seat, person):
+    def withdraw(notice, sign_of_life):
+        seat.requests.send(StopAsked("experimenter"))
+        return AfterPause.WITHDRAW
+
+    person.pause = withdraw
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert (end.end_reason, end.withdrawn) == ("the participant withdrew", True)
+
+
+def test_a_log_that_cannot_be_written_does_not_hide_a_withdrawal(plan, small_protocol, seat, person, monkeypatch):
+    def fail(log, event):
+        raise StudyError("The session cannot be written to disk", "The disk is full.", "Make room.")
+
+    def withdraw(notice, sign_of_life):
+        monkeypatch.setattr(EventLog, "append", fail)
+        return AfterPause.WITHDRAW
+
+    person.pause = withdraw
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert (end.end_reason, end.withdrawn) == ("the participant withdrew", True)
 
 
 @pytest.mark.slow
