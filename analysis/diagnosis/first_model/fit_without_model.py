@@ -33,7 +33,7 @@ from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from analysis.wording import format_sentence
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError, MechanicalFitSettings
 from equalizer.identification.mechanical.widened_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
@@ -121,10 +121,11 @@ def fit_first_linear_model(
     sentences. on_progress: called with the completed fraction, 0 to 1. source: description of the recordings, for the
     remarks. Raises NothingToDiagnoseError where no model can be fitted, or a recording was made with a weight."""
     _require_no_weight(recordings)
+    settings = MechanicalFitSettings(band_hz=_find_stated_band(recordings))
     if should_use_rigid_model(recordings) and (rigid_model := _try_rigid_model(recordings, source)) is not None:
         return rigid_model, (RIGID_REMARK,)
     try:
-        fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {source}")
+        fit = fit_mechanical_model(recordings, settings, on_progress, f"fitted to {source}")
         if not any(_responds_to_commands(fit.model, recording) for recording in recordings):
             raise MechanicalFitError("the model that fits best hardly responds to the commands")
     except (MechanicalFitError, MechanicalModelError, np.linalg.LinAlgError) as refusal:
@@ -142,6 +143,23 @@ def fit_first_linear_model(
         first_remark,
         *(format_sentence(remark) for remark in fit.remarks),
     )
+
+
+def _find_stated_band(recordings: Sequence[Recording]) -> tuple[float, float] | None:
+    """Find the band in Hz that all recordings state as usable (`meta`, key "band_hz"), as the noise of an accelerometer
+    hides the response at low frequencies; None where none states one, or their bands have no common part. Raises
+    NothingToDiagnoseError where a value is not two rising frequencies."""
+    bands = [band for recording in recordings if (band := recording.meta.get("band_hz")) is not None]
+    for band in bands:
+        is_pair = isinstance(band, Sequence) and len(band) == 2
+        if not is_pair or not all(isinstance(end, int | float) for end in band) or not 0 <= band[0] < band[1]:
+            raise NothingToDiagnoseError(
+                (f"band_hz of a recording is {band!r}; state two frequencies in Hz, the lower one first",)
+            )
+    if not bands:
+        return None
+    low_hz, high_hz = max(float(band[0]) for band in bands), min(float(band[1]) for band in bands)
+    return (low_hz, high_hz) if low_hz < high_hz else None
 
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:

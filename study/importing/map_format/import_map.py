@@ -260,5 +260,5 @@ class ImportMap:
     ] = field(default_factory=DiagnosisMap)
     meta: Annotated[
         dict[str, Any],
-        Field(description="Further information: place_m, feedback (gains), sensor, grip, operator, notes."),
+        Field(description="Further information: place_m, feedback (gains), sensor, grip, operator, notes; band_hz."),
     ] = field(default_factory=dict)

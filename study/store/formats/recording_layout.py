@@ -53,9 +53,9 @@ LAYOUT = (
     Entry(
         "meta",
         "group of attributes, each JSON text",
-        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (of a weight "
-        "on the device), provenance; `time` is `unknown` if the samples are only numbered (sample_rate_hz is "
-        "then 1)",
+        "place, sensor, band_hz (lowest and highest usable frequency), feedback, grip, operator, added_mass_kg or "
+        "added_inertia_kg_m2 (of a weight on the device), provenance; `time` is `unknown` if the samples "
+        "are only numbered (sample_rate_hz is then 1)",
         False,
     ),
 )

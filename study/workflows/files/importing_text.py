@@ -185,6 +185,9 @@ _TIME = f"""\
   `rate [Hz]`, `sampling frequency [Hz]`, not `excitation rate [Hz]`), or one in seconds (`Ts_s`, `dt [s]`) is the step;
   this is reported. In a table the number stands in the first row, with nothing below it. The proposed map accepts `fs`
   and `Ts` without a unit, too.
+* **Usable band.** `band_hz = [25, 1500]` in `[meta]` states the lowest and the highest frequency (Hz) at which the
+  recording is valid, for instance because an accelerometer's noise hides the motion below. Where a diagnosis fits a
+  first linear model to frequency responses, it fits it there.
 * **Unknown time.** `unknown = true` of the clock numbers the samples, at 1 Hz. `meta/time` states it (`unknown`;
   `stamps` if the rate is that of the file's own time).
 * **Uniform stamps.** Stamps are uniform in two cases: each lies within 2 % of a step of its grid point, or all lie

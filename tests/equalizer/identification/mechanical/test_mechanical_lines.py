@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines
+from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
 from equalizer.signals.recording import Segment
 from tests.equalizer.identification.mechanical.test_mechanical_fit import multisine, recording
 
@@ -21,3 +21,13 @@ def test_only_complete_periods_after_the_first_are_without_a_transient():
     assert not has_transient([100, 1100])  # the last period is complete
     assert has_transient([1100, 2100])  # only the first is
     assert has_transient([100, 1900, 2950])  # none is: the longest run begins within the first
+
+
+def test_where_all_segments_are_marked_as_test_the_marks_are_ignored():
+    command = multisine(np.random.default_rng(4), 6)[:, None]
+    for roles, count in ((("test",) * 3, (2, 1)), (("",) * 3, (2, 1)), (("fit", "test", "test"), (1, 2))):
+        segments = tuple(
+            Segment(2000 * k, 2000 * (k + 1), "multisine", 1.0, 1000, role) for k, role in enumerate(roles)
+        )
+        fit, test = split_fit_and_test([recording(command, command, segments=segments)])
+        assert (len(fit), len(test)) == count
