@@ -26,6 +26,7 @@ from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import FAULT_GAIN_FACTOR
 from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError, ModelErrorFloor
 from analysis.diagnosis.result.assemble_findings import assemble_findings
 from analysis.diagnosis.result.candidates import (
@@ -42,7 +43,6 @@ from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.search_by_simulation import SearchOutcome, make_search_context, search_by_simulation
-from analysis.diagnosis.settings import FAULT_GAIN_FACTOR
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

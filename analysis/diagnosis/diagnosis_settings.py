@@ -1,5 +1,5 @@
 """Settings of a diagnosis: effects to consider, signals to compare, time limit. The limits that decide are in
-`settings.py`."""
+`limits.py`."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING

@@ -15,7 +15,7 @@ from analysis.diagnosis.data.find_segments import find_segments
 from analysis.diagnosis.data.input_checks import require_different, require_usable_data
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
 from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, find_parts
-from analysis.diagnosis.settings import BRIDGED_GAP_ERROR, LEAST_GAPLESS_SHARE
+from analysis.diagnosis.limits import BRIDGED_GAP_ERROR, LEAST_GAPLESS_SHARE
 from analysis.diagnosis.types import Mask
 from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording

@@ -24,7 +24,7 @@ from analysis.diagnosis.types import Mapper, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import Effect
 from equalizer.effects.law_entry import make_library_effects
-from equalizer.effects.placing import find_place
+from equalizer.effects.placing import find_device_part
 from equalizer.plant.mechanical_model import MechanicalModel, adopt_recording_units
 from equalizer.signals.recording import Recording
 
@@ -81,11 +81,11 @@ def search_by_simulation(
         has_named_law = any(balance.named for balance in balances)
         # Effects of the actuator show only in complete commands: not in those reduced by the force of other motions.
         is_complete_command = not fitting.is_reduced and not recordings[0].meta.get("imposed")
-        catalogue = (
-            []
-            if has_named_law
-            else [entry for entry in catalogue if _is_unobservable(entry.name, find_place(entry), is_complete_command)]
-        )
+        catalogue = [
+            entry
+            for entry in catalogue
+            if not has_named_law and _is_unobservable(entry.name, find_device_part(entry), is_complete_command)
+        ]
         nameable_effects = []
     impact_search = _ImpactSearch(fitting, nameable_effects, settings, progress)
     if settings.clean:

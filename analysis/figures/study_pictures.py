@@ -20,7 +20,7 @@ from analysis.psychophysics.detection import compute_thresholds_above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.observed_shares import BIN_DB
-from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PrimaryAnalysis
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thresholds
 from analysis.threshold_words import select_threshold_words
@@ -62,7 +62,8 @@ def _make_thresholds_picture(analysis: StudyAnalysis) -> Picture:
         title="Thresholds by frequency",
         caption="One marker and line per participant. Hollow markers with an arrow are cut by the cap; those above "
         "the cap are runs that the trial limit stopped. Black: group mean with comparison interval: two means differ "
-        "significantly when their intervals do not overlap. They are not confidence intervals of the means."
+        f"significantly ({100 * (1 - CONFIDENCE):.0f} % level) when their intervals do not overlap. They are not "
+        "confidence intervals of the means."
         + (f" {analysis.table.coverage_warning}" if analysis.table.coverage_warning else ""),
         figure=draw_thresholds(analysis.table, analysis.comparisons, analysis.protocol.staircase.cap_n),
     )
@@ -120,8 +121,8 @@ def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
     people_picture = primary and Picture(
         name="psychometric",
         title="Psychometric functions, all people together",
-        caption=f"{points_text}Levels are relative to each person's threshold by the model of all answers, whose curve "
-        f"is drawn. {select_threshold_words(analysis.protocol.staircase).misfit_note}",
+        caption=f"{points_text}Levels are relative to each person's threshold by the hierarchical model of all "
+        f"answers, whose curve is drawn. {select_threshold_words(analysis.protocol.staircase).misfit_note}",
         figure=draw_people_curves(answer_counts, primary),
     )
     return [
@@ -133,8 +134,8 @@ def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
                 title=f"Psychometric functions of {subject}",
                 caption=points_text
                 + (
-                    "Curves: the model of all answers; it shrinks a person's threshold towards those of the others "
-                    "where the person's own answers carry little information."
+                    "Curves: the hierarchical model of all answers; it shrinks a person's threshold towards those of "
+                    "the others where the person's own answers carry little information."
                     if primary
                     else "Curves: the most probable ones of this person."
                 ),
@@ -150,13 +151,15 @@ def _make_medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
     """Make the picture of the median thresholds by the hierarchical model, with the direction limit."""
     return Picture(
         name="medians",
-        title="Thresholds by the model of all answers",
-        caption=f"Black: the median participant with its {100 * primary.confidence:g} % interval. Above the cap no "
-        "size is known: an arrow from the one-sided bound, or from the lower end of the axis where there is none, and "
-        "people, hollow, on one line. An interval without an upper mark continues above the axis. Lines join the "
-        "thresholds of one person as estimated by the model: shrunk towards the others where their own answers carry "
-        "little information. Diamond and thick line on the cap: the direction limit and its interval, between the "
-        "frequencies played alone.",
+        title="Thresholds by the hierarchical model of all answers",
+        caption=f"Black: threshold of the median participant with its {100 * primary.confidence:g} % interval. The "
+        "size of a threshold above the cap is not known. Such a median is an arrow, which begins at its one-sided "
+        "lower bound, or at the lower end of the axis where there is no bound; such thresholds of participants are "
+        "hollow markers on a line above the cap. An interval without an upper mark continues above the axis. Coloured "
+        "lines join the thresholds of a participant, as estimated by the model: it shrinks them towards those of the "
+        "others where the participant's own answers carry little information. Diamond and thick line on the cap: the "
+        "direction limit, the frequency at which the median threshold reaches the cap, and its interval; both are "
+        "known only within the range of the frequencies played.",
         figure=draw_medians(primary, cap_n),
     )
 

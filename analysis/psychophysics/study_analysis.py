@@ -1,10 +1,10 @@
 """Complete analysis of a study's trials: thresholds, statistics and warnings.
 
-The published analysis (one-way ANOVA of the thresholds of runs between groups, with Tukey-Kramer comparisons) is
-reproduced and compared with analyses that fit the design: repeated measures, Friedman's test, and, as primary analysis,
-a hierarchical model of all answers. Equations and sources are in the modules that are called here. Begin at
-`analyse_study`.
-"""
+The published analysis (one-way ANOVA of the thresholds of runs between groups, with Tukey-Kramer comparisons; R. P.
+Wilson, S. Chan, J. K. Salisbury, G. Niemeyer, "Multi-DOF Equalization of Haptic Devices for Accurate Rendering at High
+Frequencies") is reproduced and compared with analyses that fit the design: repeated measures, Friedman's test, and, as
+primary analysis, a hierarchical model of all answers. Equations and sources are in the modules that are called here.
+Begin at `analyse_study`."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -272,14 +272,14 @@ def _anonymise_declared_result(result: DeclaredResult) -> dict[str, Any]:
 
 
 def describe_design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
-    """Compare in words the published one-way analysis with the repeated-measures analysis, at the 5 % level."""
+    """Compare in words the published one-way analysis with the repeated-measures analysis, at 1 - `CONFIDENCE`."""
     if anova.p is None or within.p is None:
         text = "neither" if anova.p is None and within.p is None else "only one"
         return (
             f"The published analysis is one-way, between groups; the design is within participants. Of the two, {text} "
             "can be computed from these data, so they cannot be compared."
         )
-    is_same_verdict = (anova.p < 0.05) == (within.p < 0.05)
+    is_same_verdict = (anova.p < 1 - CONFIDENCE) == (within.p < 1 - CONFIDENCE)
     return (
         "The published analysis is one-way: it treats every threshold as that of another person, so differences "
         f"between people count as error: {format_f_text(anova.df_between, anova.df_within, anova.f)}, "

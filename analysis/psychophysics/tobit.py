@@ -76,23 +76,33 @@ def compute_tobit_contrasts(
     has_values: NDArray[np.bool_] = np.asarray(is_measured[:, is_kept].any(axis=1))
     if not (is_censored & is_measured).any() or has_values.sum() < 3 or not is_kept[0]:
         return ()
-    frequencies_hz = [
-        frequency_hz for frequency_hz, is_fitted in zip(frequencies_hz, is_kept, strict=True) if is_fitted
-    ]
+    frequencies_hz = [hz for hz, is_fitted in zip(frequencies_hz, is_kept, strict=True) if is_fitted]
     cells = np.ix_(has_values, is_kept)
     values_db, is_censored, is_measured = values_db[cells], is_censored[cells], is_measured[cells]
     try:
         fit = fit_tobit(values_db, is_censored)
     except np.linalg.LinAlgError:
         return ()
-    frequency_count, df = len(frequencies_hz), len(values_db) - 1
+    pair_counts = (is_measured[:, 1:] & is_measured[:, :1]).sum(axis=0)
+    return _make_contrasts(fit, frequencies_hz, pair_counts, (len(values_db) - 1, planned_contrasts), confidence)
+
+
+def _make_contrasts(
+    fit: TobitFit,
+    frequencies_hz: Sequence[float],
+    pair_counts: NDArray[np.intp],
+    df_and_family: tuple[int, int],
+    confidence: float,
+) -> tuple[Contrast, ...]:
+    """Make the contrasts of a fit of k frequencies. pair_counts: (k - 1,), people with values at both frequencies.
+    df_and_family: degrees of freedom, and the number of planned contrasts."""
+    frequency_count, (df, planned_contrasts) = len(frequencies_hz), df_and_family
     differences_db = fit.parameters[1:frequency_count] - fit.parameters[0]
     standard_errors_db = np.sqrt(
         np.diag(fit.covariance)[1:frequency_count] + fit.covariance[0, 0] - 2.0 * fit.covariance[0, 1:frequency_count]
     )
     half_widths_db = float(student.ppf(0.5 + confidence / 2, df)) * standard_errors_db
     p_values = [float(p) for p in 2.0 * student.sf(np.abs(differences_db / standard_errors_db), df)]
-    pair_counts = (is_measured[:, 1:] & is_measured[:, :1]).sum(axis=0)
     return tuple(
         Contrast(
             frequency_hz=frequencies_hz[index + 1],

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from analysis.diagnosis.limits import DISTORTION_P
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
 from analysis.diagnosis.localisation.level_trends import LevelTrend, compute_level_trends
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.settings import DISTORTION_P
 from analysis.diagnosis.unit_wording import format_share
 from analysis.reports.page import Section, Table
 from analysis.wording import MISSING, conjoin

@@ -1,8 +1,8 @@
 """Paragraphs of a diagnosis report on the method: error measure, split of the samples, noise estimate, re-tuning and
 choice of effects, tests in the map of the mismatch."""
 
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
 from analysis.wording import conjoin
 
 # Parts of the sentences; free simulation is the output error, predicted force the equation error (inverse dynamics).

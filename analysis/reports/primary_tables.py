@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
+from analysis.psychophysics.hierarchy.likelihood_thresholds import LikelihoodThreshold, convert_to_newton
 from analysis.psychophysics.hierarchy.objective import LOG_SD_BOUNDS
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
-from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, convert_to_newton
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Section, Table
@@ -229,7 +229,7 @@ def _make_contrast_table(
     )
 
 
-def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
+def _make_run_table(runs: Sequence[LikelihoodThreshold], confidence: float, notes: tuple[str, ...]) -> Table:
     """Make the folded table of the maximum-likelihood thresholds of single persons by frequency. confidence: 0 to 1."""
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
@@ -240,7 +240,7 @@ def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tup
     )
 
 
-def format_run(run: RunLikelihood) -> tuple[str, str]:
+def format_run(run: LikelihoodThreshold) -> tuple[str, str]:
     """Format a person's threshold at a frequency and its likelihood interval (N): one-sided without one end, `MISSING`
     without both."""
     lower_n, upper_n = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)

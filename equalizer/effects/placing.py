@@ -1,8 +1,9 @@
 """Conversion of effects between the form of a model file (axis names, parameters) and that of a simulation (sites,
 values).
 
-A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
-file, `convert_to_model_effects` back.
+A site is the index of a driven axis or, for sensor effects, of a response channel. To place an effect is to find its
+sites. `place_effects` converts from a file, `convert_to_model_effects` back; `find_device_part` finds in which part of
+the device (`Place` of the vocabulary) an effect acts. Called by the diagnosis and the checks of model files.
 """
 
 from collections.abc import Iterator
@@ -58,13 +59,13 @@ def convert_to_model_effects(
         _convert_to_model_effect(placed_effect, axis_name)
         for placed_effect in placed_effects
         for axis_name in _iterate_axis_names(
-            placed_effect, output_channels if find_place(placed_effect.effect) == "sensor" else input_channels
+            placed_effect, output_channels if find_device_part(placed_effect.effect) == "sensor" else input_channels
         )
     )
 
 
-def find_place(effect: Effect) -> Place:
-    """Find the place where an effect sits; for a discovered law, by the quantity it acts on."""
+def find_device_part(effect: Effect) -> Place:
+    """Find the part of the device in which an effect acts; for a discovered law, by the quantity it acts on."""
     return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
 
 
@@ -92,9 +93,9 @@ def shorten_axis_name(channel: str, channels: tuple[str, ...]) -> str:
 
 
 def _iterate_axis_names(placed_effect: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
-    """Iterate over the axis names of the sites, or yield a single None where an effect other than a law acts on all
-    channels; where there is only one channel, only for an effect that cannot act on one alone. Raises PlacingError for
-    a site beyond the channels."""
+    """Iterate over the axis names of the sites. For an effect other than a law at all channels, yield None instead,
+    which stands for all; but with a single channel, an effect that can act on a single channel keeps its axis name.
+    Raises PlacingError for a site beyond the channels."""
     is_at_all_sites = placed_effect.effect.law is None and set(placed_effect.sites) == set(range(len(channels)))
     if is_at_all_sites and (len(channels) > 1 or "one" not in placed_effect.effect.sites):
         yield None
@@ -102,7 +103,7 @@ def _iterate_axis_names(placed_effect: PlacedEffect, channels: tuple[str, ...]) 
     for site in placed_effect.sites:
         if not 0 <= site < len(channels):
             raise PlacingError(
-                f"{placed_effect.effect.name} is placed at number {site + 1}, but there are {len(channels)}"
+                f"{placed_effect.effect.name} acts on channel {site + 1}, but there are only {len(channels)} channels"
             )
         yield shorten_axis_name(channels[site], channels)
 
@@ -136,7 +137,7 @@ def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffec
 
 def find_sites(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
     """Find the indices of the axes or channels that an effect of a model names; all where it names none. Raises
-    PlacingError where the name matches no channel or several."""
+    PlacingError where the name matches no channel or several, KeyError for an unknown kind."""
     place = EFFECTS_BY_NAME[effect.kind].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
     channels = outputs if place == "sensor" else inputs
     if effect.axis is None:
@@ -144,6 +145,6 @@ def find_sites(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str,
     exact_matches = tuple(index for index, channel in enumerate(channels) if channel == effect.axis)
     matches = exact_matches or tuple(index for index, channel in enumerate(channels) if channel[-1:] == effect.axis)
     if len(matches) != 1:
-        problem = "is on several of" if matches else "is none of"
+        problem = "fits several of" if matches else "is none of"
         raise PlacingError(f"{effect.kind}: the axis '{effect.axis}' {problem} {', '.join(channels)}")
     return matches

@@ -69,8 +69,8 @@ class ConsentSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SetupSettings:
-    """Set-up and posture of the participant, which are asked for and logged at the start of every sitting, with the
-    required values."""
+    """Set-up and posture of the participant, with the required values. Where `ask` is true, they are asked for and
+    logged at the start of every sitting."""
 
     ask: Annotated[bool, Field(description="Whether the questions on the set-up are asked. Default: no.")] = False
     hearing_masked: Annotated[
@@ -167,7 +167,8 @@ class PracticeSettings:
         Field(
             ge=0.001,
             le=3.0,
-            description="Amplitude of every practice trial. Default 2: well above most thresholds, well below the cap.",
+            description="Amplitude of the practice trials, or the middle of its range (`rove_db`). Default 2: well "
+            "above most thresholds, well below the cap.",
         ),
     ] = 2.0
     rove_db: RoveDb = 0.0
@@ -184,8 +185,8 @@ class PracticeSettings:
         Field(
             ge=1,
             le=50,
-            description="Number of last answers that are counted, see `right_needed`. Default 5: guessing gives 4 of "
-            "5 with a probability of 19 %.",
+            description="Number of last answers that are counted, see `right_needed`. Default 5: guessing gives 4 or "
+            "more of 5 with a probability of 19 %, and passes within the 10 trials of `trial_limit` with 45 %.",
         ),
     ] = 5
     trial_limit: Annotated[

@@ -76,8 +76,8 @@ class Rig(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledIo:
-    """Compiled `sense` and `write` of a rig's driver: a `Rig` with an attribute `halves` of this type can be driven by
-    a compiled loop, without the Python interpreter.
+    """Compiled `sense` and `write` of a rig's driver: a `Rig` with an attribute `compiled_io` of this type can be
+    driven by a compiled loop, without the Python interpreter.
 
     Both functions do exactly what the rig's methods of the same names do, including errors; the rig's `buttons` may
     then be called from any thread. See `study.devices.drive.compiled_drive` for the signatures."""

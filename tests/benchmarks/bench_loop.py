@@ -46,7 +46,7 @@ void two_calls(Read read, Send send, int times) {
 
 
 class Interpreted:
-    """A rig without its compiled halves."""
+    """A rig without its compiled functions."""
 
     def __init__(self, rig) -> None:
         self.sense, self.write, self.buttons, self.close = rig.sense, rig.write, rig.buttons, rig.close

@@ -30,7 +30,7 @@ CATALOGUES = {
 }
 """Folders of things of one kind, each in a file that is found by its name: neither crowded nor with files too small."""
 
-LONG_FILES = {"analysis/diagnosis/settings.py"}
+LONG_FILES = {"analysis/diagnosis/limits.py"}
 SMALL_BESIDE_THEIR_IMPORTER = {
     "study/tui/app/load_screens.py",
     "study/tui/app/outcomes.py",

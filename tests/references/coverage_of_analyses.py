@@ -23,8 +23,8 @@ from analysis.psychophysics.comparisons import compare_group_means
 from analysis.psychophysics.coverage.coverage_words import MEDIAN_TEXTS, MeasuredCoverage, format_coverage_table
 from analysis.psychophysics.coverage.measured_coverage import MEASURED_COVERAGES
 from analysis.psychophysics.group_contrasts import compute_contrasts
+from analysis.psychophysics.hierarchy.likelihood_thresholds import LikelihoodThreshold
 from analysis.psychophysics.hierarchy.primary import compute_primary_analysis
-from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.tobit import compute_tobit_contrasts
@@ -76,7 +76,7 @@ def _published(threshold_n) -> Iterator[Found]:
             yield "tukey", HZ[place], None, pair.lower <= mean_n[place] - mean_n[0] <= pair.upper
 
 
-def _runs(name: str, runs: tuple[RunLikelihood, ...], true_db) -> Iterator[Found]:
+def _runs(name: str, runs: tuple[LikelihoodThreshold, ...], true_db) -> Iterator[Found]:
     subjects = list(dict.fromkeys(run.subject for run in runs))
     for run in runs:
         true = true_db[subjects.index(run.subject), HZ.index(run.frequency_hz)]

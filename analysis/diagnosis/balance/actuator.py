@@ -36,7 +36,7 @@ from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
 from analysis.diagnosis.data.correlated_residuals import bootstrap_gain, draw_bootstrap_blocks
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     COMMAND_LAW_GAIN,
     COMMAND_RIVAL_MARGIN,
     FURTHER_LAW_SHARE,

@@ -19,7 +19,7 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, Structure, improves_significantly
-from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
+from analysis.diagnosis.limits import MOVING_TIME_SHARE, STILL_SHARE
 
 DEAD_BAND_EFFECT = "force_deadband"
 """Name of the actuator's dead band in the catalogue of effects."""
@@ -78,7 +78,7 @@ def _is_at_rest_in_dead_band(regression: Regression) -> bool:
     velocity = np.concatenate([motion.velocity[motion.fit, driven_channel] for motion in motions])
     force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
     is_moving = velocity**2 > STILL_SHARE * np.mean(velocity**2)
-    return bool(np.mean(is_moving[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
+    return bool(np.mean(is_moving[force == 0.0]) < MOVING_TIME_SHARE) if np.any(force == 0.0) else False
 
 
 def _add_equivalent(judged_law: JudgedLaw, equivalent: str, reason: str) -> JudgedLaw:

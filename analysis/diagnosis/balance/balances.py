@@ -16,7 +16,7 @@ from analysis.diagnosis.balance.linear_part import find_driven_channels, search_
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, SECOND_BAND_SHARE, STILL_SHARE
+from analysis.diagnosis.limits import MOVING_TIME_SHARE, SECOND_BAND_SHARE, STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
@@ -83,7 +83,7 @@ def select_samples_in_motion(records: Sequence[Observed], motions: Sequence[Moti
     time. At rest, friction balances any applied force: no law predicts that force, and linear terms would be fitted to
     it."""
     moving_masks = [_find_moving_samples(motion, motions) for motion in motions]
-    if np.mean(np.concatenate(moving_masks)) > MOVES_MOST_OF_THE_TIME:
+    if np.mean(np.concatenate(moving_masks)) > MOVING_TIME_SHARE:
         return ()
     return [
         replace(motion, fit=motion.fit & is_moving, test=motion.test & is_moving)

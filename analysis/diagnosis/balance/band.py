@@ -11,15 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, BAND_NARROWEST_CYCLES, BAND_WIDEST
+from analysis.diagnosis.limits import ACCELERATION_NOISE_SHARE, BAND_NARROWEST_CYCLES, HIGHEST_BAND_END_RATIO
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import estimate_spectral_density
 
 
 def compute_band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
     """Compute the upper end of the band in Hz: median over recordings and channels, at least `BAND_NARROWEST_CYCLES`
-    cycles in the longest recording, at most `BAND_WIDEST` of the sample rate. samples: (n, d) each. order: time
-    derivative of the position that was measured (0, 1 or 2)."""
+    cycles in the longest recording, at most `HIGHEST_BAND_END_RATIO` of the sample rate. samples: (n, d) each. order:
+    time derivative of the position that was measured (0, 1 or 2)."""
     upper_ends_hz = [
         _compute_channel_band_end_hz(column, rate_hz, 2 * (2 - order))
         for recording_samples in samples
@@ -27,7 +27,11 @@ def compute_band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: in
     ]
     longest_samples = max(len(recording_samples) for recording_samples in samples)
     return float(
-        np.clip(np.median(upper_ends_hz), BAND_NARROWEST_CYCLES * rate_hz / longest_samples, BAND_WIDEST * rate_hz)
+        np.clip(
+            np.median(upper_ends_hz),
+            BAND_NARROWEST_CYCLES * rate_hz / longest_samples,
+            HIGHEST_BAND_END_RATIO * rate_hz,
+        )
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.settings import BALANCE_FOLDS, BALANCE_MOST_SAMPLES
+from analysis.diagnosis.limits import BALANCE_FOLDS, BALANCE_MOST_SAMPLES
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 

@@ -27,7 +27,7 @@ from analysis.diagnosis.balance.structures import (
     improves_significantly,
     refine_parameters,
 )
-from analysis.diagnosis.settings import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_SHORTFALL
+from analysis.diagnosis.limits import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_SHORTFALL
 
 MOST_COMPARED_SUMS = 12
 """Number of sums whose nonlinear parameters are refined. Chosen: there are eleven free laws."""

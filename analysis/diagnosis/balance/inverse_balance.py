@@ -26,7 +26,7 @@ from analysis.diagnosis.balance.blocks import (
 from analysis.diagnosis.balance.judged_law import select_test_blocks
 from analysis.diagnosis.balance.laws.command_laws import CommandLaw
 from analysis.diagnosis.balance.structures import StructureSearch
-from analysis.diagnosis.settings import STILL_SHARE
+from analysis.diagnosis.limits import STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask
 from equalizer.signals.signal import FloatArray
 

@@ -31,7 +31,7 @@ from analysis.diagnosis.balance.structures import (
     fit_values,
 )
 from analysis.diagnosis.data.correlated_residuals import bootstrap_gain, draw_bootstrap_blocks, is_confirmed_by_folds
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     BOOTSTRAP_DRAWS,
     FREE_LAW_GAIN,
     FURTHER_LAW_GAIN,

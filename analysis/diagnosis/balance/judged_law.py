@@ -14,7 +14,7 @@ from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.laws.free_laws import FREE_LAWS, FREE_POSITION_LAWS, FREE_SPEED_LAWS
 from analysis.diagnosis.balance.laws.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.settings import LEAST_JUDGED_BLOCKS, STILL_SHARE
+from analysis.diagnosis.limits import LEAST_JUDGED_BLOCKS, STILL_SHARE
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray

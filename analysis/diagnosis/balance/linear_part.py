@@ -24,7 +24,7 @@ from analysis.diagnosis.balance.structures import (
     refine_parameters,
     search_structures,
 )
-from analysis.diagnosis.settings import LINEAR_LAW_GAIN, LINEAR_PART_ROUNDS, MOST_LINEAR_LAWS
+from analysis.diagnosis.limits import LINEAR_LAW_GAIN, LINEAR_PART_ROUNDS, MOST_LINEAR_LAWS
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 

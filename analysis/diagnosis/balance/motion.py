@@ -17,7 +17,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 from analysis.diagnosis.balance.band import compute_band_begin_hz, compute_band_end_hz
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.settings import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
+from analysis.diagnosis.limits import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.discovered_law import collect_channels, name_conditions
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY

@@ -19,7 +19,7 @@ from analysis.diagnosis.balance.laws.law import BaseTerms, Law, Scales, measure_
 from analysis.diagnosis.balance.laws.motion_laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import Regression, build_regression, fit_all_laws
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     FURTHER_LAW_ERRORS,
     FURTHER_LAW_EXCESS,
     FURTHER_LAW_GAIN,

@@ -21,7 +21,7 @@ from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import add_payload, apply_conditions
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
-from analysis.diagnosis.settings import LAW_FORCE_SHARE, MOTION_OVERSAMPLED
+from analysis.diagnosis.limits import LAW_FORCE_SHARE, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
 from equalizer.effects.placing import place_recorded_effects

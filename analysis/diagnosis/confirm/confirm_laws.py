@@ -39,12 +39,12 @@ from analysis.diagnosis.confirm.laws_for_simulation import (
 from analysis.diagnosis.confirm.require_gain import CONSTANT_FORCE
 from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import CONFIRMED_RATIO, HELD_OUT_ERROR, INTERVAL_FACTOR
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, is_near_noise
-from analysis.diagnosis.settings import CONFIRMED_RATIO, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray

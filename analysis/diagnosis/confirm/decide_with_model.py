@@ -21,15 +21,15 @@ from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, estimate_held_out_gain
 from analysis.diagnosis.errors.hypothesis import Claim
-from analysis.diagnosis.search.parsimony import is_refined_candidate
-from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement, SearchResult, UnconfirmedEffect
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     CANDIDATES_WITH_GAIN,
     FURTHER_LAW_SHARE,
     NAMED_CEILING_SHARE,
     NAMED_ERROR,
 )
+from analysis.diagnosis.search.parsimony import is_refined_candidate
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, UnconfirmedEffect
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
 

@@ -18,7 +18,7 @@ from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.settings import CONSTANT_ERROR_RATIO
+from analysis.diagnosis.limits import CONSTANT_ERROR_RATIO
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

@@ -20,7 +20,7 @@ from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, ma
 from analysis.diagnosis.first_model.model_from_balance import build_first_model, compute_law_power_share
 from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.settings import LAW_BAND_POWER_SHARE
+from analysis.diagnosis.limits import LAW_BAND_POWER_SHARE
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 

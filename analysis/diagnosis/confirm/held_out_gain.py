@@ -14,8 +14,13 @@ import numpy as np
 from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
+from analysis.diagnosis.limits import (
+    BOOTSTRAP_LEVEL,
+    HELD_OUT_MISMATCH_ERROR,
+    HELD_OUT_STRETCHES,
+    LEAST_HELD_OUT_STRETCHES,
+)
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, HELD_OUT_STRETCHES, HELD_OUT_SURPRISE, LEAST_HELD_OUT_STRETCHES
 from equalizer.signals.signal import FloatArray
 
 
@@ -72,13 +77,13 @@ def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
 def _compute_remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, noise_factor: float) -> float:
     """Compute the mean over channels of (e^2 - k n^2) / (s^2 - k n^2) on held-out samples: rms residual e, rms signal
     s, rms noise n, and k = noise_factor (1 subtracts the noise power, 0 does not). Channels with s up to
-    `HELD_OUT_SURPRISE` n are left out; 0 where none remains, or nothing is held out."""
+    `HELD_OUT_MISMATCH_ERROR` n are left out; 0 where none remains, or nothing is held out."""
     masks = [record.test for record in measure.records]
     if not any(mask.any() for mask in masks):
         return 0.0
     residual_rms = compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit
     channel_rms = compute_signal_rms(measure.records, masks)
-    is_above_noise = channel_rms > HELD_OUT_SURPRISE * measure.noise
+    is_above_noise = channel_rms > HELD_OUT_MISMATCH_ERROR * measure.noise
     if not is_above_noise.any():
         return 0.0
     noise_power = noise_factor * measure.noise[is_above_noise] ** 2

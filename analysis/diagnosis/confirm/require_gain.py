@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain, predicts_motion
+from analysis.diagnosis.limits import FURTHER_LAW_SHARE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import SearchResult, UnconfirmedEffect, judge
-from analysis.diagnosis.settings import FURTHER_LAW_SHARE
 
 CONSTANT_FORCE = "constant_force"
 CONSTANT_EFFECTS = {CONSTANT_FORCE: "force", "sensor_offset": "offset"}

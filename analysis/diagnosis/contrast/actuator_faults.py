@@ -32,7 +32,7 @@ from analysis.diagnosis.contrast.fault import (
 )
 from analysis.diagnosis.contrast.interpolation import shift_samples
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import LONGEST_DELAY
+from analysis.diagnosis.limits import LONGEST_DELAY_PERIODS
 from equalizer.effects.simulation.sensor_path import filter_one_pole
 from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
@@ -197,9 +197,9 @@ def _make_deadband(axis: _Axis, width: float) -> Variant:
 
 
 def choose_trial_delays_s(samples: FloatArray, rate_hz: float) -> list[float]:
-    """Choose delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST_DELAY` periods of the median
-    frequency of the samples (n,); empty where that range is empty."""
-    shortest_s, longest_s = 0.1 / rate_hz, LONGEST_DELAY / compute_median_frequency_hz(samples, rate_hz)
+    """Choose delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST_DELAY_PERIODS` periods of the
+    median frequency of the samples (n,); empty where that range is empty."""
+    shortest_s, longest_s = 0.1 / rate_hz, LONGEST_DELAY_PERIODS / compute_median_frequency_hz(samples, rate_hz)
     if longest_s <= shortest_s:
         return []
     # As many as needed for the ranges `SIZE_RANGE` of neighbouring delays to overlap.

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import filter_band_pass
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import RESPONSE_BAND_SHARE, RESPONSE_OVERSAMPLED
+from analysis.diagnosis.limits import RESPONSE_BAND_SHARE, RESPONSE_OVERSAMPLED
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 

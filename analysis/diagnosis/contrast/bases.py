@@ -10,7 +10,7 @@ from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, 
 from analysis.diagnosis.contrast.compared_base import LEAST_ROWS, Base
 from analysis.diagnosis.contrast.force_base import build_force_base
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, CONSTANT_SIGNAL, MISFIT_SHARE, MOST_MOTION_RATIO
+from analysis.diagnosis.limits import AUTOREGRESSIVE_ORDER, CONSTANT_SIGNAL, MISFIT_SHARE, MOST_MOTION_RATIO
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 

@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.rank_faults import FOLDS
 from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
 from analysis.diagnosis.effect_words import get_noun
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     BOOTSTRAP_DRAWS,
     BOOTSTRAP_LEVEL,
     FAULT_GAIN_FACTOR,

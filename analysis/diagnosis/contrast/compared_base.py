@@ -25,7 +25,7 @@ from analysis.diagnosis.contrast.joint_products import ColumnIndices, GramBlocks
 from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.correlated_residuals import compute_lagged_products
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_GAPLESS_SHARE
+from analysis.diagnosis.limits import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_GAPLESS_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 

@@ -9,7 +9,7 @@ fault means to transform the recorded signals to those without it (`fault`). Mad
 from dataclasses import dataclass
 
 from analysis.diagnosis.contrast.fault import Fault
-from analysis.diagnosis.settings import SAME_DEVICE_EXCESS, SETS_EXCESS_FACTOR
+from analysis.diagnosis.limits import SAME_DEVICE_EXCESS, SETS_EXCESS_FACTOR
 from equalizer.signals.signal import FloatArray
 
 

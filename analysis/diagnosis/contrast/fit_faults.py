@@ -15,7 +15,7 @@ from typing import NamedTuple
 from analysis.diagnosis.contrast.compared_base import ComparedBase, undo_fault_in_rows
 from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
 from analysis.diagnosis.contrast.joint_products import SetPair, SizeFit, fit_sizes
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, FAULT_SIZE_TOLERANCE, INVERSION_ROUNDS
+from analysis.diagnosis.limits import CONTRAST_BLOCKS, FAULT_SIZE_TOLERANCE, INVERSION_ROUNDS
 from analysis.diagnosis.types import TimeBudget
 
 ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))

@@ -1,4 +1,5 @@
-"""Force balance as the base model of a comparison with reference recordings: the device without the fault.
+"""Force balance as the base of a comparison with reference recordings. "Base" in this package: the nominal model, of
+the device without the fault, beside which each possible fault is fitted. Built by `bases`.
 
 Per driven axis, F = M a + D v + K q + c + sum of w phi: linear regression of the force on the motion of all measured
 channels, a constant, and further laws phi of the motion, some of them linear or of the time (`balance.laws`), that
@@ -16,14 +17,14 @@ from analysis.diagnosis.balance.laws.motion_laws import find_likely_pitches, mak
 from analysis.diagnosis.balance.motion import Motion, compute_motions, filter_band_pass
 from analysis.diagnosis.balance.regression import Regression, build_regression
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import BASE_LAW_GAIN, MOST_BASE_LAWS
+from analysis.diagnosis.limits import BASE_LAW_GAIN, MOST_BASE_LAWS
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceBase:
-    """Base model of one driven axis: makes rows of the force and of the columns (regressors) that predict it."""
+    """Nominal model of one driven axis: makes rows of the force and of the columns (regressors) that predict it."""
 
     axis: int
     """Index of the driven axis in the command."""
@@ -36,13 +37,16 @@ class ForceBase:
     rate_hz: float
     """Sample rate of the rows (Hz), after decimation."""
     lowest_hz: float = 0.0
-    """Lower end of the band (Hz), see `Motion`."""
+    """Lower end (Hz) of the band of the motions by which the laws were selected, see `Motion`; used for the force of
+    reused rows only. For other rows `compute_motions` determines it anew from the parts' accelerations."""
 
     def build_rows(
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
         """Build the rows of each part, (kept samples, 1 + columns): the force (N or N m) first. reusable_rows: rows of
-        parts with the same motion, whose columns are reused, so that only the force is filtered again."""
+        parts with the same motion, whose columns are reused, so that only the force is filtered again, with `lowest_hz`
+        as lower end; that of the columns may differ slightly, where the motion is integrated from accelerations. Raises
+        NoMotionError where a part contains no motion."""
         if reusable_rows is not None:
             filtered_forces = (
                 filter_band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz)
@@ -73,8 +77,8 @@ class ForceBase:
 
 
 def build_force_base(motions: Sequence[Motion], axis: int, is_rotational: bool) -> ForceBase:
-    """Build the base model of one axis: select laws first among the general laws, then with cogging at the pitches that
-    the residual force shows. motions: of the compared recordings."""
+    """Build the nominal model of one axis: select laws first among the general laws, then with cogging at the pitches
+    that the residual force shows. motions: of the compared recordings."""
     scales = [measure_scales(motions, channel, is_rotational) for channel in range(len(motions[0].channels))]
     is_free_rotation = any(scale.turns for scale in scales)
     regression = build_regression(motions, axis, list(make_laws(motions, is_rotational)), is_free_rotation)

@@ -17,7 +17,7 @@ from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, apply
 from analysis.diagnosis.contrast.fault import ClockRate
 from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.sensor_base import SensorBase
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, DELAY_STEP, LARGEST_CLOCK_ERROR
+from analysis.diagnosis.limits import CONTRAST_BLOCKS, DELAY_STEP, LARGEST_CLOCK_ERROR
 from equalizer.effects.starts.response_starts import estimate_lag
 from equalizer.signals.signal import FloatArray
 

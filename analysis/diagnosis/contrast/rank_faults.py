@@ -46,7 +46,7 @@ from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import build_sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import make_misalignment_fault, make_sensor_faults, make_shared_faults
 from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
-from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, CONTRAST_BLOCKS, DELAY_STEP, LEAST_FAULT_GAIN, MISFIT_SHARE
+from analysis.diagnosis.limits import BOOTSTRAP_LEVEL, CONTRAST_BLOCKS, DELAY_STEP, LEAST_FAULT_GAIN, MISFIT_SHARE
 from analysis.diagnosis.types import Mask, TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

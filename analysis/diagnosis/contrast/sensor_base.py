@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import differentiate, filter_band_pass
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import SENSOR_TAPS
+from analysis.diagnosis.limits import SENSOR_TAPS
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray

@@ -37,7 +37,7 @@ from analysis.diagnosis.contrast.fault import (
 )
 from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import LARGEST_CLOCK_ERROR, REVERSAL_SHARE
+from analysis.diagnosis.limits import LARGEST_CLOCK_ERROR, REVERSAL_SHARE
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 

@@ -2,7 +2,7 @@
 
 Mains hum and white noise in a response are faults where they are clearly stronger than in the clean recordings and, for
 hum, in the commands; a quantized command is one where its step is coarser than that of the clean commands. Called by
-`reference.compare_with_reference`. Limits are in `analysis.diagnosis.settings`; other numbers are chosen by hand.
+`reference.compare_with_reference`. Limits are in `analysis.diagnosis.limits`; other numbers are chosen by hand.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.contrast.recording_part import Part
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     LINE_PROMINENCE,
     MAINS_HZ,
     MAINS_TOLERANCE_HZ,

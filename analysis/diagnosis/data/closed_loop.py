@@ -6,7 +6,7 @@ Granger (Econometrica 37 (1969), 424): whether past responses improve the predic
 
 import numpy as np
 
-from analysis.diagnosis.settings import FED_BACK_SHARE, PREDICTED_SHARE
+from analysis.diagnosis.limits import FED_BACK_SHARE, PREDICTED_SHARE
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.settings import DRIVEN_COHERENCE, DRIVEN_DEVIATIONS
+from analysis.diagnosis.limits import DRIVEN_COHERENCE, DRIVEN_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import hann

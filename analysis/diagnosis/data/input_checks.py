@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.data.observed_parts import count_fit_samples
 from analysis.diagnosis.data.recorded_conditions import find_payload_problems
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     CYCLES_SHARE,
     DRIVEN_DEVIATIONS,
     LARGEST_VALUE,

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.settings import (
-    AT_REST,
+from analysis.diagnosis.limits import (
     CHOOSE_SHARE,
     LEVELS_TO_HOLD_ONE_BACK,
     LEVELS_TO_STRATIFY,
-    LONGEST_TAIL,
+    LONGEST_TAIL_SHARE,
     MODEL_FLOOR,
+    REST_RANGE_SHARE,
     TEST_SHARE,
 )
 from analysis.diagnosis.types import Mask
@@ -125,21 +125,21 @@ class Span:
 
 def find_moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
     """Find the end of each part's motion: the last sample at which any channel differs from its rest value at the
-    part's end by more than `AT_REST` of its range. response: (n, p); parts: start and end (exclusive)."""
+    part's end by more than `REST_RANGE_SHARE` of its range. response: (n, p); parts: start and end (exclusive)."""
     return tuple(Span(start, start + _find_end_of_motion(response[start:stop]), stop) for start, stop in parts)
 
 
 def _find_end_of_motion(samples: FloatArray) -> int:
     """Count the samples until the end of motion, at least half of them; all where the part does not move, or does not
-    come to rest before its last `LONGEST_TAIL`. The rest value is the median over that tail."""
+    come to rest before its last `LONGEST_TAIL_SHARE`. The rest value is the median over that tail."""
     samples = samples[:, np.isfinite(samples).any(axis=0)]
-    tail_start = int((1 - LONGEST_TAIL) * len(samples))
+    tail_start = int((1 - LONGEST_TAIL_SHARE) * len(samples))
     is_complete: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
     if not is_complete[:tail_start].any() or not is_complete[tail_start:].any():
         return len(samples)
     is_displaced = np.abs(
         samples - np.median(samples[tail_start:][is_complete[tail_start:]], axis=0)
-    ) > AT_REST * np.ptp(samples[is_complete], axis=0)
+    ) > REST_RANGE_SHARE * np.ptp(samples[is_complete], axis=0)
     moving_samples = np.flatnonzero(is_displaced.any(axis=1))
     if not len(moving_samples) or moving_samples[-1] >= tail_start:
         return len(samples)

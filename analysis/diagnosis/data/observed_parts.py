@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed, find_moving_spans, split_samples, stack_measured_signals
-from analysis.diagnosis.settings import CHOOSE_SHARE
+from analysis.diagnosis.limits import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal

@@ -11,7 +11,7 @@ from math import isfinite
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion
-from analysis.diagnosis.settings import MOST_GROWTH
+from analysis.diagnosis.limits import MOST_GROWTH
 from equalizer.effects.command_sign import reverse_commands
 from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.linear_simulation import compute_driven_axes, compute_growth_rate

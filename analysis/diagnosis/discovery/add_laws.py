@@ -22,6 +22,13 @@ from analysis.diagnosis.discovery.validation import (
     is_shorter_and_as_good,
 )
 from analysis.diagnosis.errors.output_error import gather_evidence
+from analysis.diagnosis.limits import (
+    HELD_OUT_ALONE_ERROR,
+    LAW_MOST_ROUNDS,
+    LEAST_PITCH_PERIODS,
+    NAMED_ERROR,
+    NOISE_ALONE,
+)
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.parsimony import has_far_smaller_error
@@ -29,13 +36,6 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
 from analysis.diagnosis.search.time_budget import limit_map
 from analysis.diagnosis.search.verdict import SearchResult, UnconfirmedEffect, judge
-from analysis.diagnosis.settings import (
-    HELD_OUT_ALONE_ERROR,
-    LAW_MOST_ROUNDS,
-    LEAST_PITCH_PERIODS,
-    NAMED_ERROR,
-    NOISE_ALONE,
-)
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import AxisForce
 from equalizer.laws.law import Law

@@ -1,9 +1,10 @@
 """Beam search over a grammar of terms: the sums of up to `LAW_MOST_TERMS` terms with the least error in one view.
 
 A view is the filtered residual of one axis or reading (`matched_filter.View`). The error is cross-validated over blocks
-(`screen_terms`). The best sums are extended by one term at a time until the best one leaves at most `LAW_MAIN_PART` of
-the excess error, or a further term is not worth adding (`is_worth_adding`). All sums are finally ranked by the Bayesian
-information criterion, and a negative control gives the share of the error that chance removes. Called by `discover`.
+(`screen_terms`). The best sums are extended by one term at a time until the best one leaves at most
+`LAW_REMAINDER_SHARE` of the excess error, or a further term is not worth adding (`is_worth_adding`). All sums are
+finally ranked by the Bayesian information criterion, and a negative control gives the share of the error that chance
+removes. Called by `discover`.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,10 +22,10 @@ from analysis.diagnosis.discovery.screen_terms import (
     build_normal_equations,
     cross_validate_terms,
 )
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     LAW_BEAM,
-    LAW_MAIN_PART,
     LAW_MOST_TERMS,
+    LAW_REMAINDER_SHARE,
     LAW_STARTS_REFINED,
     LAW_WORTH_SHARE,
 )
@@ -59,7 +60,7 @@ def search_best_sums(base: NormalEquations, terms: Sequence[Term], time_left: Ti
     all_sums = [*beam, *_fit_without_variables(base, beam, finite_terms, term_order, time_left)]
     while beam and len(beam[0].terms) < LAW_MOST_TERMS and time_left():
         best_sum = beam[0]
-        if best_sum.cross_validated_error - 1 <= LAW_MAIN_PART * (best_sum.base_error - 1):
+        if best_sum.cross_validated_error - 1 <= LAW_REMAINDER_SHARE * (best_sum.base_error - 1):
             break
         extended_sums: list[Sum] = []
         for beam_sum in beam[: LAW_BEAM // 2]:

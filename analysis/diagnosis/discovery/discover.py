@@ -22,21 +22,21 @@ from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.discovery.view_terms import list_view_terms
 from analysis.diagnosis.errors.hypothesis import remove_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
+from analysis.diagnosis.limits import (
+    EXPLAINED_ERROR,
+    FITTED_SUM_ERROR_RATIO,
+    LAW_ALONE_REMAINDER,
+    LAW_AXES_SHARE,
+    LAW_COMMAND_SHARE,
+    LAW_MOST_ROUNDS,
+    LAW_NOISE_POWER,
+    MOST_FITTED_SUMS,
+    NOISE_ALONE,
+)
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import limit_map
-from analysis.diagnosis.settings import (
-    EXPLAINED_ERROR,
-    LAW_ALONE_REMAINDER,
-    LAW_AXES_SHARE,
-    LAW_COMMAND_SHARE,
-    LAW_FITTED,
-    LAW_FITTED_WITHIN,
-    LAW_MOST_ROUNDS,
-    LAW_NOISE_POWER,
-    NOISE_ALONE,
-)
 from analysis.diagnosis.types import Progress, TimeBudget
 
 
@@ -205,9 +205,9 @@ def _may_explain_alone(best_sum: Sum) -> bool:
 
 
 def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
-    """Choose the best `LAW_FITTED` sums and, if each of them contains all variables of the first, also the best sum
-    that does not, so that the first has a rival. sums: the best first."""
-    sums_to_fit = [*sums[:LAW_FITTED]]
+    """Choose the best `MOST_FITTED_SUMS` sums and, if each of them contains all variables of the first, also the best
+    sum that does not, so that the first has a rival. sums: the best first."""
+    sums_to_fit = [*sums[:MOST_FITTED_SUMS]]
     if not sums_to_fit or any(not set(sums[0].variables) <= set(term_sum.variables) for term_sum in sums_to_fit):
         return sums_to_fit
     rival = next((term_sum for term_sum in sums if not set(sums[0].variables) <= set(term_sum.variables)), None)
@@ -263,13 +263,13 @@ def _compute_explained_squares(views: Sequence[View], term_sum: Sum) -> float:
 
 
 def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
-    """Keep the sums whose error above the noise is at most `LAW_FITTED_WITHIN` times that of the first, which counts as
-    at least `LAW_NOISE_POWER` - 1."""
+    """Keep the sums whose error above the noise is at most `FITTED_SUM_ERROR_RATIO` times that of the first, which
+    counts as at least `LAW_NOISE_POWER` - 1."""
     return [
         term_sum
         for term_sum in sums
         if term_sum.cross_validated_error - 1
-        <= LAW_FITTED_WITHIN * max(sums[0].cross_validated_error - 1, LAW_NOISE_POWER - 1)
+        <= FITTED_SUM_ERROR_RATIO * max(sums[0].cross_validated_error - 1, LAW_NOISE_POWER - 1)
     ]
 
 

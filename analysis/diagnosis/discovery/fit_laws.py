@@ -23,6 +23,7 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.snap_exponents import is_full_soft_limit
 from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
+from analysis.diagnosis.limits import LAW_EXPONENT_TOLERANCE
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.parsimony import are_inseparable
 from analysis.diagnosis.search.search_context import (
@@ -33,7 +34,6 @@ from analysis.diagnosis.search.search_context import (
 )
 from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_recordings
 from analysis.diagnosis.search.time_budget import OutOfTimeError
-from analysis.diagnosis.settings import LAW_EXPONENT_TOLERANCE
 from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
 

@@ -25,7 +25,7 @@ from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.forces.missing_force import compute_axis_transfer
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
+from analysis.diagnosis.limits import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import ActsOn
 from equalizer.plant.linear_simulation import discretise_model

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.discovery.matched_filter import View
-from analysis.diagnosis.settings import RETUNING_BOUND
+from analysis.diagnosis.limits import RETUNING_BOUND
 from equalizer.signals.signal import FloatArray
 
 _LEAST_INDEPENDENT_SHARE = 1e-6

@@ -11,9 +11,9 @@ from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
+from analysis.diagnosis.limits import INTERVAL_FACTOR, LAW_ROUNDING_TOLERANCE
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.search_context import FIRST_FIT_STEPS, SearchContext
-from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_ROUNDING_TOLERANCE
 from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
 from equalizer.laws.law import Law, find_parameter_roles
 

@@ -22,10 +22,10 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import POWER_BOUNDS
 from analysis.diagnosis.discovery.snap_exponents import converge_and_snap
 from analysis.diagnosis.effect_words import get_noun
+from analysis.diagnosis.limits import LAW_FACTOR_ERROR, LOUDER_RATIO, NOISE_ACCURACY, SAME_LAW_SHARE, SHUFFLED_RATIO
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import are_inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import LAW_FACTOR_ERROR, LOUDER_RATIO, NOISE_ACCURACY, SAME_LAW_SHARE, SHUFFLED_RATIO
 from analysis.wording import conjoin
 from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.signals.recording import Segment

@@ -19,13 +19,13 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import (
     UNTIMED,
     RuleChoice,
-    count_samples_to_settle,
+    count_samples_to_omit,
     select_error_measure,
 )
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from analysis.diagnosis.limits import UNKNOWN_NOISE_SHARE
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, estimate_noise_floor
 from analysis.diagnosis.noise.rounding import find_rounding_step
-from analysis.diagnosis.settings import UNKNOWN_NOISE_SHARE
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -155,8 +155,8 @@ def _describe_model_effects(model_effects: Sequence[PlacedEffect]) -> tuple[str,
 
 def _exclude_transient(record: Observed, model: MechanicalModel) -> Observed:
     """Remove the samples of the initial motion from all three sets, where that motion decays soon
-    (`count_samples_to_settle`)."""
-    first_settled_sample = count_samples_to_settle(record, model)
+    (`count_samples_to_omit`)."""
+    first_settled_sample = count_samples_to_omit(record, model)
     if not first_settled_sample:
         return record
     is_settled = np.arange(len(record.command)) >= first_settled_sample

@@ -20,10 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh, eigvalsh, null_space
 
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     AT_RETUNING_BOUND,
     RETUNING_BOUND,
-    UNSTATED_MODES,
+    UNSTATED_MODE_SHARE,
     UNSTATED_SHARE,
     WIDER_RETUNING_BOUND,
 )
@@ -32,7 +32,7 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
-UNSTATED_TOLERANCE = Tolerance(modes=UNSTATED_MODES)
+UNSTATED_TOLERANCE = Tolerance(modes=UNSTATED_MODE_SHARE)
 """Tolerance of a model that states none; that of entries at the axes follows from `_choose_deviation`."""
 DAMPING_UNCERTAINTY_RATIO = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less

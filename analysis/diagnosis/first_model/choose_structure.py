@@ -23,7 +23,7 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_modal_structure,
     fit_structure,
 )
-from analysis.diagnosis.settings import MODES_GAIN, REPORTED_REMAINDER_SHARE, RICHER_STRUCTURE_GAIN
+from analysis.diagnosis.limits import MODES_GAIN, REPORTED_REMAINDER_SHARE, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording

@@ -28,7 +28,7 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_structure,
 )
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, fit_rigid_model, should_use_rigid_model
-from analysis.diagnosis.settings import LEAST_MODEL_RESPONSE
+from analysis.diagnosis.limits import LEAST_MODEL_RESPONSE
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from analysis.wording import format_sentence
 from equalizer.effects.simulation.simulator import simulate_response

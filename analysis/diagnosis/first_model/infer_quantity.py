@@ -16,7 +16,7 @@ from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import build_regression
 from analysis.diagnosis.data.measured_motion import is_driven
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import DERIVATIVE_GAIN
+from analysis.diagnosis.limits import DERIVATIVE_GAIN
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording

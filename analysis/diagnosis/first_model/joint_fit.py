@@ -19,7 +19,7 @@ from analysis.diagnosis.balance.blocks import Block, compute_squared_error, sele
 from analysis.diagnosis.balance.judged_law import has_held_out_motion
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, build_regression, compute_signal_power
-from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, LEAST_TEST_BLOCKS
+from analysis.diagnosis.limits import ACCELERATION_NOISE_SHARE, LEAST_TEST_BLOCKS
 from equalizer.signals.signal import FloatArray
 
 Part = Literal["mass", "damping", "stiffness"]

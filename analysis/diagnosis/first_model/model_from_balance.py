@@ -4,7 +4,11 @@ The rows of M, D and K are the weights of the balances without further laws; the
 tolerance of a matrix is half the largest difference between its entries and those of the balances with the named laws
 (not made symmetric), plus a share (`FOUND_PARAMETER_DEVIATION`) of the largest entry, at least 1e-12. A diagonal mass
 is at least `MASSLESS_SHARE` of the force's rms over that of the acceleration, because every coordinate of a mechanical
-model needs a mass."""
+model needs a mass.
+
+`fit_without_model` takes the model of `build_plain_model` where there is one. `confirm.force_balance_measures` compares
+with the model of `build_first_model`, and by `compute_law_power_share` decides whether it also compares in the narrow
+band in which the noise is small."""
 
 from collections.abc import Sequence
 
@@ -13,7 +17,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed
-from analysis.diagnosis.settings import FOUND_PARAMETER_DEVIATION, MASSLESS_SHARE
+from analysis.diagnosis.limits import FOUND_PARAMETER_DEVIATION, MASSLESS_SHARE
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -30,8 +34,8 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
         return None
     driven_channels = [regression.base_terms.driven_channel for regression in regressions]
     rows_without_laws, rows_with_laws = (
-        [_fit_matrix_rows(balance, indices, driven_channels) for balance, indices in zip(balances, choice, strict=True)]
-        for choice in (
+        [_fit_matrix_rows(balance, indices, driven_channels) for balance, indices in zip(balances, laws, strict=True)]
+        for laws in (
             [()] * command_count,
             [tuple(law.law_index for law in balance.named if law.law_index >= 0) for balance in balances],
         )
@@ -84,8 +88,8 @@ def build_plain_model(balances: Sequence[Balance], recording: Recording, name: s
 
 
 def compute_law_power_share(balances: Sequence[Balance], band_hz: float) -> float:
-    """Compute the share of the power of a named law's force at frequencies up to `band_hz` (Hz): the smallest share of
-    all named laws, 1 without any. Laws of the command (negative index) are not counted."""
+    """Compute the share of the power of a law's force that lies at frequencies up to `band_hz` (Hz): the smallest share
+    of all named laws, 1 without any. Laws of the command (negative index) are not counted."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression

@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import is_free_motion, select_time_unit
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, build_regressions, fit_jointly
-from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
+from analysis.diagnosis.limits import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
 from analysis.wording import format_sentence
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitError, MechanicalFitSettings

@@ -18,7 +18,7 @@ from analysis.diagnosis.first_model.free_motion import convert_free_motion
 from analysis.diagnosis.first_model.infer_quantity import infer_quantities
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
-from analysis.diagnosis.settings import SINGULAR_VALUE_RATIO
+from analysis.diagnosis.limits import SINGULAR_VALUE_RATIO
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording

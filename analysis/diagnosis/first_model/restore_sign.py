@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     LEAST_SIGN_SHARE,
     REVERSAL_SPEED_SHARE,
     SIGNED_SPEED_ERROR_RATIO,

@@ -20,7 +20,7 @@ from analysis.diagnosis.balance.structures import Structure, improves_significan
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, is_free_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import REVERSED_CHANNELS_KEY
-from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
+from analysis.diagnosis.limits import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal

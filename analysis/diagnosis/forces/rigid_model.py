@@ -20,8 +20,8 @@ from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.forces.force_measure import build_predicted_force_measure
 from analysis.diagnosis.forces.inverse_dynamics import compute_required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
+from analysis.diagnosis.limits import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
-from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

@@ -14,8 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtr
 
-from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     ENTRY_DIRECTION_SINE,
     ENTRY_LINE_POWER_RATIO,
     ENTRY_PER_DIMENSION,
@@ -26,6 +25,7 @@ from analysis.diagnosis.settings import (
     SENSOR_LINE_POWER_RATIO,
     SENSOR_PRESENT_SHARE,
 )
+from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import ComplexArray, FloatArray
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.data.spectral_lines import Band
+from analysis.diagnosis.limits import DISTORTION_P, STEADY_DB
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
-from analysis.diagnosis.settings import DISTORTION_P, STEADY_DB
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 

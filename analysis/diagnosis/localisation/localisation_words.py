@@ -3,10 +3,10 @@ depends on (`state_regions`)."""
 
 from collections.abc import Sequence
 
+from analysis.diagnosis.limits import ENTRY_LEAST_LINES, ENTRY_RIVAL_P
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
-from analysis.diagnosis.settings import ENTRY_LEAST_LINES, ENTRY_RIVAL_P
 from analysis.diagnosis.unit_wording import format_share
 from analysis.wording import conjoin, format_p_text
 

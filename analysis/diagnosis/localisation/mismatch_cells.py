@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.diagnosis.data.spectral_lines import Band, compute_noncentral_f_sf
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE, MODEL_FLOOR
 from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, compute_residual_lines
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.data.spectral_lines import Band
 from analysis.diagnosis.document import Mismatch
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.state_regions import StateRegion
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 MOST_ROWS = 40
 """Largest number of rows of the table of mismatches. Chosen by hand."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from analysis.diagnosis.data.spectral_lines import Band
-from analysis.diagnosis.settings import LARGEST_LEARNED_SHARE
+from analysis.diagnosis.limits import LARGEST_LEARNED_SHARE
 from analysis.wording import conjoin
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.spectral_lines import Band
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE, MOST_NAMED_STATES, STATE_CONCENTRATION
 from analysis.diagnosis.localisation.block_permutation import IntArray
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
@@ -23,7 +24,6 @@ from analysis.diagnosis.localisation.state_regions import (
     StateRegion,
     find_state_regions,
 )
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MOST_NAMED_STATES, STATE_CONCENTRATION
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence

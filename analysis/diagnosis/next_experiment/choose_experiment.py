@@ -22,8 +22,8 @@ from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.limits import DISCRIMINATING_GAIN
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment
-from analysis.diagnosis.settings import DISCRIMINATING_GAIN
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Hold

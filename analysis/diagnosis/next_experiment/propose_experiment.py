@@ -17,7 +17,7 @@ from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import is_equal_rival
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, compute_sensitivity
-from equalizer.effects.placing import find_place
+from equalizer.effects.placing import find_device_part
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 3
@@ -53,7 +53,7 @@ def propose_experiment(context: SearchContext, explanation: Explanation) -> Prop
             continue  # no experiment of the menu sets a condition
         claim = named_fit.hypothesis.claims[-1]
         record = context.measure.records[0]
-        is_sensor_effect = find_place(claim.effect) == "sensor"
+        is_sensor_effect = find_device_part(claim.effect) == "sensor"
         axis = min(claim.sites[0], record.command.shape[1] - 1) if is_sensor_effect else claim.sites[0]
         # The menu's largest command is that of the existing recordings on this axis.
         level = max(float(np.abs(recorded.command[:, axis]).max()) for recorded in context.measure.records)

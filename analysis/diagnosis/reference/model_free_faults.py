@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, make_claim_hypothesis
-from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
+from analysis.diagnosis.limits import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.lattice import confirm_lattice_step, find_lattice_step

@@ -12,6 +12,7 @@ from dataclasses import replace
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.reference.learn_model_error import LearnedError, add_learned_noise
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
@@ -20,7 +21,6 @@ from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, UnconfirmedEffect
-from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 

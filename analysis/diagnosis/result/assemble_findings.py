@@ -17,6 +17,7 @@ from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.limits import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import MismatchMaps, build_mismatch_maps, summarise_worst_channel
 from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
@@ -32,7 +33,6 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors, compute_interval_errors
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
-from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
 from equalizer.effects.placing import convert_to_model_effects, shorten_axis_name
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

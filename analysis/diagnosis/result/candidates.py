@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from analysis.diagnosis.confirm.require_gain import CONSTANT_EFFECTS
 from analysis.diagnosis.document import Candidate, Diagnosis, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.effect_words import get_noun, get_place
+from analysis.diagnosis.limits import FURTHER_LAW_GAIN, LAW_CEILING_SHARE
 from analysis.diagnosis.result.candidate_wording import REFINEMENT_REASON
 from analysis.diagnosis.result.findings import BalanceErrors
-from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_CEILING_SHARE
 from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import shorten_axis_name

@@ -15,10 +15,10 @@ from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import get_parameter_unit
+from analysis.diagnosis.limits import CONTRAST_BLOCKS, SAME_DEVICE_EXCESS
 from analysis.diagnosis.reference.compare_with_reference import Contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, SAME_DEVICE_EXCESS
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place

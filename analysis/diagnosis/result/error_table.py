@@ -13,9 +13,9 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
+from analysis.diagnosis.limits import EQUAL_ERROR_RATIO, HELD_OUT_MISMATCH_ERROR, STILL_SHARE
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import EQUAL_ERROR_RATIO, HELD_OUT_SURPRISE, STILL_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
@@ -94,7 +94,7 @@ def is_held_out_still(records: Sequence[Observed], noise: FloatArray) -> bool:
     held_out_power = _compute_mean_power(records, [record.test for record in records])
     fitted_power = _compute_mean_power(records, [record.fit | record.choose for record in records])
     # A channel that contains only noise is never below a share of that in the fitted samples.
-    still_power = np.fmax(STILL_SHARE * fitted_power, (HELD_OUT_SURPRISE * noise) ** 2)
+    still_power = np.fmax(STILL_SHARE * fitted_power, (HELD_OUT_MISMATCH_ERROR * noise) ** 2)
     return bool((STILL_SHARE * fitted_power > noise**2).any() and (held_out_power <= still_power).all())
 
 

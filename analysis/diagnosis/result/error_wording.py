@@ -8,8 +8,8 @@ force.
 from collections.abc import Sequence
 
 from analysis.diagnosis.document import Errors
+from analysis.diagnosis.limits import CONFIRMED_FIT_RATIO, EQUAL_ERROR_RATIO
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
-from analysis.diagnosis.settings import CONFIRMED_FIT_RATIO, EQUAL_ERROR_RATIO
 from analysis.diagnosis.unit_wording import format_error, format_error_of_signal, format_share
 from analysis.wording import capitalise
 

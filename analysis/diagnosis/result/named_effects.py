@@ -12,11 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.document import Estimate, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
-from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import is_equal_rival, is_refined_candidate
-from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.search.verdict import compute_step_shares
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     EXPLAINED_BY_CHANCE,
     INTERVAL_SHARE,
     MOST_RIVALS,
@@ -27,9 +23,13 @@ from analysis.diagnosis.settings import (
     NO_CANDIDATE_STEEPNESS,
     PROBABILITY_SCALE,
 )
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.parsimony import is_equal_rival, is_refined_candidate
+from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.search.verdict import compute_step_shares
 from equalizer.effects.discovered_law import Channels, derive_law_units, set_law_values
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.placing import find_place, shorten_axis_name
+from equalizer.effects.placing import find_device_part, shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -80,7 +80,7 @@ def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Lab
         effects.append(
             NamedEffect(
                 effect=claim.effect.name,
-                place=find_place(claim.effect),
+                place=find_device_part(claim.effect),
                 axis=find_axis_letter(claim, labels),
                 share=shares[claim_index],
                 probability=probability,
@@ -99,7 +99,7 @@ def find_axis_letter(claim: Claim, labels: Labels) -> str | None:
     """Find the axis letter of an effect's site; None where it is at several sites, or can have no single site."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
-    is_sensor_effect = find_place(claim.effect) == "sensor"
+    is_sensor_effect = find_device_part(claim.effect) == "sensor"
     channels = labels.outputs if is_sensor_effect else labels.inputs
     return shorten_axis_name(channels[claim.sites[0]], channels)
 

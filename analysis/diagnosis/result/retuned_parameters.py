@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import EQUAL_ERROR_RATIO, RETUNING_DOUBTED, RETUNING_NAMED
+from analysis.diagnosis.limits import EQUAL_ERROR_RATIO, RETUNING_DOUBTED, RETUNING_NAMED
 from analysis.diagnosis.unit_wording import format_error, format_value
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray

@@ -13,7 +13,7 @@ from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.named_effects import extract_law, find_axis_letter, make_labels, report_parameters
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import UnconfirmedEffect
-from equalizer.effects.placing import find_place
+from equalizer.effects.placing import find_device_part
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
@@ -44,7 +44,7 @@ def list_unconfirmed_candidates(
         candidates.append(
             Candidate(
                 effect=claim.effect.name,
-                place=find_place(claim.effect),
+                place=find_device_part(claim.effect),
                 axis=find_axis_letter(claim, labels),
                 parameters=report_parameters(
                     unconfirmed_effect.hypothesis, claim_index, unconfirmed_effect.hypothesis.point

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.diagnosis.limits import UNIT_CORRELATION, UNIT_FACTOR
 from analysis.diagnosis.result.findings import TimeSeries
-from analysis.diagnosis.settings import UNIT_CORRELATION, UNIT_FACTOR
 from equalizer.plant.mechanical_model import MechanicalModel
 
 

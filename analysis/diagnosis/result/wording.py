@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect, format_law
 from analysis.diagnosis.effect_words import WHOLE_DEVICE_FAULTS, format_parameters, format_place, get_noun
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.result.candidate_wording import (
     REFINEMENT_REASON,
     DeviceWording,
@@ -36,7 +37,6 @@ from analysis.diagnosis.result.retuned_parameters import (
     describe_retuning,
     find_moved_parameters,
 )
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.unit_wording import format_probability, format_share, typeset_unit
 from analysis.wording import capitalise, conjoin, end_sentence, format_p_text
 

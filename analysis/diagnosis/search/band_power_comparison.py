@@ -15,8 +15,8 @@ from analysis.diagnosis.errors.band_power_fit import BandPowerFit, perturb
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import IMPACTS_ERROR, IMPACTS_LEAST_SPREAD, IMPACTS_RIVAL_RATIO, IMPACTS_SHARE
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import IMPACTS_ERROR, IMPACTS_LEAST_SPREAD, IMPACTS_RIVAL_RATIO, IMPACTS_SHARE
 from equalizer.signals.signal import FloatArray
 
 

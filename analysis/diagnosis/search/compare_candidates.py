@@ -1,12 +1,12 @@
 """Compare candidate hypotheses: continue the best first fits until they converge, then order all by their errors.
 
 A Gauss-Newton fit converges about geometrically: after relative reductions g1 and g2 of the cost by two fits, the next
-is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end when that is below a tolerance. The
-sensitivity (Jacobian) to the model's own parameters takes one simulation for each of them. It is therefore kept from
-fit to fit, and recomputed once after the first fit, then only where a parameter has moved far; only fits near the best
-are refined. With forces that depend on the motion, a sensitivity that was computed without these forces, or on one
-period, may lead to a point short of the minimum: refined fits are then continued with the sensitivity of all parameters
-on all samples (`_polish`).
+is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end when that is below a tolerance. A second
+start and near equivalents of a hypothesis get a single fit (`_refine_until_converged`). The sensitivity (Jacobian) to
+the model's own parameters takes one simulation for each of them. It is therefore kept from fit to fit, and recomputed
+once after the first fit, then only where a parameter has moved far; only fits near the best are refined. With forces
+that depend on the motion, a sensitivity that was computed without these forces, or on one period, may lead to a point
+short of the minimum: refined fits are then continued with the sensitivity of all parameters on all samples (`_polish`).
 """
 
 from collections.abc import Sequence
@@ -25,10 +25,7 @@ from analysis.diagnosis.errors.output_error import (
     predict_decrease,
     stack_fit_residuals,
 )
-from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, compute_sensitivity
-from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_recordings
-from analysis.diagnosis.search.time_budget import OutOfTimeError
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     MOST_REFINED,
     NEAR_NOISE_ERROR,
     REFINING_GAIN_SHARE,
@@ -37,12 +34,16 @@ from analysis.diagnosis.settings import (
     SECOND_START_ERROR,
     SHARED_SENSITIVITY_SHARE,
 )
+from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, compute_sensitivity
+from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_recordings
+from analysis.diagnosis.search.time_budget import OutOfTimeError
 
 REFINING_STEPS, FULL_FIT_STEPS = 4, 2
 """Gauss-Newton steps of a refining fit, and of one that continues it on all samples. Chosen."""
 POLISHING_ROUNDS, POLISHING_GAIN = 3, 0.002
-"""Largest number of rounds of `_polish`, and share of the cost that a round must remove for another to follow. A round
-takes a simulation for every parameter of the model. Chosen."""
+"""Largest number of rounds of `_polish`, and least share of the cost that a round must remove for another to follow
+(or that of `_compute_gain_limit`, if it is larger). A round takes a simulation for every parameter of the model.
+Chosen."""
 MAX_RENEWALS, CONVERGED_GAIN, CONVERGED_GAIN_PER_LOG, RENEWAL_MOVE = 4, 0.0005, 0.01, 0.5
 """Largest number of fits in a row, with the sensitivity renewed between them; relative reduction of the cost below
 which a fit has converged, and factor on ln(cost) for that limit far above the noise (`_compute_gain_limit`); and change
@@ -195,8 +196,8 @@ def refine_with_sensitivity(
 
 def _fit_full_record(context: SearchContext, start: Fitted, jacobian: Sensitivity) -> Fitted:
     """Fit to all samples, started from the fit to one period of each segment, or that with longer simulation steps:
-    repeat fits of `FULL_FIT_STEPS` steps, at most `MAX_RENEWALS`, until the cost converges; above the noise, periods
-    may differ."""
+    repeat fits of `FULL_FIT_STEPS` steps, at most `MAX_RENEWALS`, until the cost converges. The minimum may differ from
+    that of one period, because periods may differ by more than the noise."""
     best_fit = start
     for _ in range(MAX_RENEWALS):
         next_fit = fit(context.measure, context.tuning, best_fit, jacobian, FULL_FIT_STEPS, context.map_)
@@ -262,26 +263,27 @@ def _refine_until_converged(
 ) -> tuple[Fitted, Sensitivity]:
     """Continue a fit, with renewed sensitivities, until the cost converges or `MAX_RENEWALS` is reached. jacobian:
     sensitivity at another point of the same hypothesis, or of one with nearly the same predicted motion; None = not
-    computed yet. previous_gain: relative reduction of the cost by the previous fit; infinite = unknown."""
+    computed yet. previous_gain: relative reduction of the cost by the previous fit, of use only with a given
+    `jacobian`; if it is infinite, no further reduction is expected after the first fit, which is then the only one."""
     best_fit = fitted
-    is_complete = jacobian is not None
-    previous_gain = previous_gain if is_complete else np.inf
+    is_recomputed_or_given = jacobian is not None
+    previous_gain = previous_gain if is_recomputed_or_given else np.inf
     current_jacobian = jacobian or compute_sensitivity(context, best_fit.deviations, best_fit.hypothesis)
     for _ in range(MAX_RENEWALS):
         next_fit = fit(context.measure, context.tuning, best_fit, current_jacobian, REFINING_STEPS, context.map_)
         gain = 1 - next_fit.cost / best_fit.cost if best_fit.cost > 0 else 0.0
         best_fit, expected_gain, previous_gain = next_fit, predict_decrease(gain, previous_gain), gain
-        has_converged = (expected_gain if is_complete else gain) < _compute_gain_limit(best_fit)
-        if (is_complete and has_converged) or (
+        has_converged = (expected_gain if is_recomputed_or_given else gain) < _compute_gain_limit(best_fit)
+        if (is_recomputed_or_given and has_converged) or (
             context.score_fit(best_fit).score.worst_channel <= SECOND_START_ERROR and has_converged
         ):
             break
         if (
-            not is_complete
+            not is_recomputed_or_given
             or np.abs(best_fit.deviations - current_jacobian.base_deviations).max(initial=0.0) > RENEWAL_MOVE
         ):
             current_jacobian = compute_sensitivity(context, best_fit.deviations, best_fit.hypothesis, with_forces=True)
-            is_complete = True
+            is_recomputed_or_given = True
     return best_fit, current_jacobian
 
 

@@ -31,6 +31,14 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Hypothesis, combine_hypotheses
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
+from analysis.diagnosis.limits import (
+    ADDED_GAIN,
+    ADDED_SHARE,
+    HELD_OUT_MISMATCH_ERROR,
+    MOST_EFFECTS,
+    NEAR_NOISE_ERROR,
+    NOISE_ALONE,
+)
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
 from analysis.diagnosis.search.parsimony import are_inseparable, compute_excess, has_small_error, is_worthwhile
@@ -39,14 +47,6 @@ from analysis.diagnosis.search.search_context import (
     SearchContext,
 )
 from analysis.diagnosis.search.time_budget import OutOfTimeError, grant_time, limit_map
-from analysis.diagnosis.settings import (
-    ADDED_GAIN,
-    ADDED_SHARE,
-    HELD_OUT_SURPRISE,
-    MOST_EFFECTS,
-    NEAR_NOISE_ERROR,
-    NOISE_ALONE,
-)
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
@@ -204,7 +204,7 @@ def is_worth_searching(context: SearchContext, explanation: Explanation, base: F
         if has_noise_limit and len(base.fitted.hypothesis.claims) > 1 and has_small_error(explanation.retuned, base):
             return False
         return base.score.worst_channel > context.least_remaining_error
-    has_held_out_mismatch = bool(np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
+    has_held_out_mismatch = bool(np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_MISMATCH_ERROR)
     return has_held_out_mismatch or context.references is not None or base.score.worst_channel > NOISE_ALONE
 
 

@@ -22,6 +22,12 @@ from analysis.diagnosis.errors.standard_errors import (
     compute_standard_errors,
     finish_fit,
 )
+from analysis.diagnosis.limits import (
+    INTERVAL_FACTOR,
+    MOST_BETWEEN_SEGMENTS,
+    REPLACEMENTS_TRIED,
+    UNDETERMINED_REACH,
+)
 from analysis.diagnosis.search.compare_candidates import choose_plainest
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import is_equal_rival
@@ -29,12 +35,6 @@ from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.short_recordings import shorten_recordings
 from analysis.diagnosis.search.time_budget import grant_time
-from analysis.diagnosis.settings import (
-    INTERVAL_FACTOR,
-    MOST_BETWEEN_SEGMENTS,
-    REPLACEMENTS_TRIED,
-    UNDETERMINED_REACH,
-)
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 

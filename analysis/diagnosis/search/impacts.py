@@ -32,6 +32,7 @@ from analysis.diagnosis.errors.hypothesis import (
 )
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
+from analysis.diagnosis.limits import EXPLAINED_BY_CHANCE, IRREGULAR_ERROR, PEAKED_KURTOSIS
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.band_power_comparison import (
@@ -52,7 +53,6 @@ from analysis.diagnosis.search.second_effect_with_play import (
     search_second_effects,
 )
 from analysis.diagnosis.search.time_budget import grant_time
-from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, IRREGULAR_ERROR, PEAKED_KURTOSIS
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence

@@ -9,10 +9,10 @@ import numpy as np
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
 from analysis.diagnosis.errors.output_error import Fitted
+from analysis.diagnosis.limits import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
 from analysis.diagnosis.types import Mask
-from equalizer.effects.placing import find_place
+from equalizer.effects.placing import find_device_part
 from equalizer.signals.signal import FloatArray
 
 _LEAST_RMS = 1e-300
@@ -36,7 +36,7 @@ def has_unpredicted_channel(measure: ErrorMeasure, base: Fitted, fitted: Fitted)
         np.argmax(np.log(np.maximum(base_rms, _LEAST_RMS)) - np.log(np.maximum(fitted_rms, _LEAST_RMS)))
     )
     claim = fitted.hypothesis.claims[-1]
-    sensor_sites = claim.sites if find_place(claim.effect) == "sensor" else ()
+    sensor_sites = claim.sites if find_device_part(claim.effect) == "sensor" else ()
     is_unpredicted = fitted_rms >= np.maximum(
         NO_PREDICTION_SHARE * _compute_signal_rms(measure), NO_PREDICTION_ERROR * measure.noise
     )

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim
-from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     ADDED_GAIN,
     ADDED_SHARE,
     AS_GOOD_GAIN,
@@ -28,6 +27,7 @@ from analysis.diagnosis.settings import (
     REFINED_MOST_GAIN,
     REFINED_SHARE,
 )
+from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.effect import Effect
 
 DRY_FRICTION = frozenset(

@@ -14,6 +14,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses, remove_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.limits import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.next_effect import (
@@ -26,7 +27,6 @@ from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile, 
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.search.verdict import compute_step_shares, is_near_noise, is_worth_naming
-from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 

@@ -19,7 +19,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, solve_bounded_step, stack_fit_residuals
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import STRONGEST_START, WEAKEST_START
+from analysis.diagnosis.limits import STRONGEST_START, WEAKEST_START
 from analysis.diagnosis.types import Mapper
 
 

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import EXPLAINED_ERROR
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, explain, is_worth_searching, start_explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
@@ -61,7 +62,6 @@ from analysis.diagnosis.search.verdict import (
     judge,
     list_remarks,
 )
-from analysis.diagnosis.settings import EXPLAINED_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 

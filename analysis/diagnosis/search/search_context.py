@@ -15,10 +15,7 @@ from analysis.diagnosis.errors.fit_score import FitScore, compute_fit_score, com
 from analysis.diagnosis.errors.hypothesis import Hypothesis, remove_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, build_jacobian, evaluate_fit, fit
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
-from analysis.diagnosis.search.screening import ScreenedHypothesis
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     FITTING_GAIN_SHARE,
     HELD_OUT_ALONE_ERROR,
     LEAST_FITTED,
@@ -27,6 +24,9 @@ from analysis.diagnosis.settings import (
     MOST_FITTED,
     NOISE_ALONE,
 )
+from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
+from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.types import Mapper, Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray

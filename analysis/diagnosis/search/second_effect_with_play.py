@@ -17,10 +17,10 @@ from analysis.diagnosis.errors.band_power_fit import BandPowerFit, BandPowerProb
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
+from analysis.diagnosis.limits import IMPACTS_SHARE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FITTING, SCREENING, STARTING, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
-from analysis.diagnosis.settings import IMPACTS_SHARE
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect
 

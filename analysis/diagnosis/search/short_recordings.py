@@ -26,10 +26,10 @@ from analysis.diagnosis.errors.output_error import (
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion
 from analysis.diagnosis.forces.inverse_response import compute_transmission_zeros
 from analysis.diagnosis.forces.predicted_force import PredictedForce
+from analysis.diagnosis.limits import FITTING_GAIN_SHARE, RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
 from analysis.diagnosis.noise.periods import find_settled_periods
 from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
 from analysis.diagnosis.search.search_context import FITTING, SCREENING, SearchContext, compute_sensitivity, fit_first
-from analysis.diagnosis.settings import FITTING_GAIN_SHARE, RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.effects.simulation.bodies import Restarts

@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, make_claim_hypothesis
-from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
+from analysis.diagnosis.limits import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
 from equalizer.effects.effect import ALL_SITES, Effect, Values
-from equalizer.effects.placing import find_place
+from equalizer.effects.placing import find_device_part
 from equalizer.effects.simulation.interpolated_response import resample_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
@@ -35,7 +35,7 @@ def list_candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mappe
     whose estimator finds no starting value is left out."""
 
     def list_effect_hypotheses(effect: Effect) -> list[Hypothesis]:
-        is_sensor_effect = find_place(effect) == "sensor"
+        is_sensor_effect = find_device_part(effect) == "sensor"
         sites = range(evidence.model.outputs if is_sensor_effect else evidence.model.inputs)
         starts = [effect.starts(evidence, site)[:STARTS_PER_CLAIM] for site in sites]
         hypotheses: list[Hypothesis] = []

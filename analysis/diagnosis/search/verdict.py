@@ -13,16 +13,12 @@ import numpy as np
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import compute_mismatch_share, has_small_error
-from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.time_budget import OUT_OF_TIME
-from analysis.diagnosis.settings import (
+from analysis.diagnosis.limits import (
     CONFIRMED_SHARE,
     EXPLAINED_BY_CHANCE,
     HELD_OUT_ALONE_ERROR,
     HELD_OUT_ERROR,
-    HELD_OUT_SURPRISE,
+    HELD_OUT_MISMATCH_ERROR,
     HELD_OUT_TOO_SMALL,
     MOST_EFFECTS,
     NAMED_ERROR,
@@ -31,6 +27,10 @@ from analysis.diagnosis.settings import (
     NOISE_ALONE,
     WIDER_RETUNING_BOUND,
 )
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.parsimony import compute_mismatch_share, has_small_error
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from equalizer.signals.signal import FloatArray
 
 TEST_HALF_USED = (
@@ -188,14 +188,16 @@ def is_wider_bound_needed(result: SearchResult) -> bool:
 
 def is_simpler(wider_result: SearchResult, result: SearchResult) -> bool:
     """Whether the search with a wider bound explains the recordings, by effects or by parameters alone (with a held-out
-    error up to `HELD_OUT_SURPRISE`), and the first search does not or needs more effects; False where the model then is
-    physically impossible (`Tuning.is_physical`) or at the wider bound."""
+    error up to `HELD_OUT_MISMATCH_ERROR`), and the first search does not or needs more effects; False where the model
+    then is physically impossible (`Tuning.is_physical`) or at the wider bound."""
     explanation, tuning = wider_result.found, wider_result.context.tuning
     if result.judgement.verdict == "explained" and len(explanation.steps) >= len(result.found.steps):
         return False
     by_effects = wider_result.judgement.verdict == "explained"
     by_parameters = wider_result.judgement.verdict == "parameters"
-    by_parameters = by_parameters and not np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE
+    by_parameters = (
+        by_parameters and not np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_MISMATCH_ERROR
+    )
     if not by_effects and not by_parameters:
         return False
     deviations = (explanation.after if by_effects else explanation.retuned).fitted.deviations

@@ -20,7 +20,7 @@ from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note, set_ratio_ticks, style_axes
-from equalizer.effects.placing import find_place
+from equalizer.effects.placing import find_device_part
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
@@ -163,7 +163,7 @@ def _scale_axis(axes: Axes, errors: FloatArray) -> None:
 def _describe_claim(claim: Claim, axes: Sequence[str]) -> str:
     """Describe effect and axis of a claim in words, or how its axes share parameters."""
     noun = get_noun(claim.effect.name)
-    if claim.spread != "one" or find_place(claim.effect) == "hand":
+    if claim.spread != "one" or find_device_part(claim.effect) == "hand":
         return f"{noun}, {'all alike' if claim.spread == 'all' else 'each its own'}" if len(claim.sites) > 1 else noun
     site = claim.sites[0]
     return f"{noun}, {axes[site] if site < len(axes) else site + 1}" if len(axes) > 1 else noun

@@ -22,7 +22,11 @@ from analysis.psychophysics.hierarchy.inference import (
     estimate_direction_limit,
     estimate_medians,
 )
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, compute_run_likelihoods
+from analysis.psychophysics.hierarchy.likelihood_thresholds import (
+    LikelihoodThreshold,
+    Nuisance,
+    compute_likelihood_thresholds,
+)
 from analysis.psychophysics.repeated_measures import RepeatedMeasures, analyse_repeated_measures
 from equalizer.signals.signal import FloatArray
 from protocols.procedure.staircase import to_db
@@ -70,7 +74,7 @@ class PrimaryAnalysis:
     limit: DirectionLimit
     persons: tuple[PersonEstimate, ...]
     """Estimates of each person, in the order of `Answers.subjects`."""
-    runs: tuple[RunLikelihood, ...]
+    runs: tuple[LikelihoodThreshold, ...]
     """Likelihood of each person's threshold at each frequency, by the answers there alone."""
     person_sd_db: float
     """Standard deviation of thresholds between persons, common to all frequencies."""
@@ -131,7 +135,7 @@ def compute_primary_analysis(
         limit=estimate_direction_limit(frequencies_hz, compute_pseudo_thresholds(fit), cap_db, confidence,
                               answers.has_enough_answers, bound_above_hz),
         persons=persons,
-        runs=compute_run_likelihoods(answers, _make_nuisances(fit, persons), cap_db, family, confidence),
+        runs=compute_likelihood_thresholds(answers, _make_nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(standard_deviations[0]), frequency_sd_db=float(standard_deviations[1]),
         slope=float(np.exp(parameters[k + 2])),
         slope_log_sd=float(standard_deviations[2]), criterion_sd=float(standard_deviations[3]),

@@ -5,7 +5,7 @@ model are not fitted but fixed, so that its distributions of persons become prio
 the mean level played with an SD of 30 dB, the logarithm of the slope around its usual value with an SD of 0.4 (a factor
 of 1.5), the criterion (response bias) around 0 with an SD of 0.3 d'. Only the lapse rate is fitted, under its prior of
 `objective.Prior`; then thresholds, slopes and criteria are the maximum a posteriori. Each run also has the likelihood
-interval of `run_likelihood`, in which slope, criterion and lapse rate are averaged over the same priors.
+interval of `likelihood_thresholds`, in which slope, criterion and lapse rate are averaged over the same priors.
 """
 
 import math
@@ -18,6 +18,11 @@ from scipy.stats import beta
 
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import STARTING_SLOPE, Family
+from analysis.psychophysics.hierarchy.likelihood_thresholds import (
+    LikelihoodThreshold,
+    Nuisance,
+    compute_likelihood_thresholds,
+)
 from analysis.psychophysics.hierarchy.objective import LAPSE_BOUNDS, Objective, Prior
 from analysis.psychophysics.hierarchy.primary import (
     CONFIDENCE,
@@ -25,7 +30,6 @@ from analysis.psychophysics.hierarchy.primary import (
     drop_unanswered_frequencies,
     estimate_persons,
 )
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, compute_run_likelihoods
 from protocols.procedure.staircase import to_db
 
 SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
@@ -53,7 +57,7 @@ class SinglePersons:
     """Most probable thresholds, slope and criterion of each participant."""
     lapse: float
     """Most probable lapse rate (0 to 1), the same for all persons."""
-    runs: tuple[RunLikelihood, ...]
+    runs: tuple[LikelihoodThreshold, ...]
     """Likelihood interval of each run."""
 
 
@@ -83,5 +87,5 @@ def fit_single_persons(
         float(lapse_node) for lapse_node in beta.ppf(LAPSE_QUANTILES, prior.lapse_alpha, prior.lapse_beta)
     )
     nuisance = Nuisance(STARTING_SLOPE[family], 0.0, lapse_nodes, SLOPE_LOG_SD, CRITERION_SD)
-    runs = compute_run_likelihoods(answers, [nuisance] * answers.persons, cap_db, family, confidence)
+    runs = compute_likelihood_thresholds(answers, [nuisance] * answers.persons, cap_db, family, confidence)
     return SinglePersons(family, answers.frequencies_hz, confidence, persons, lapse, runs)

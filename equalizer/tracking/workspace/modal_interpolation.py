@@ -25,8 +25,9 @@ from equalizer.tracking.workspace.place_weights import compute_place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
-"""Density of the fixed real poles that describe the smooth remainder. Chosen by hand; the error of the fit is tested
-against `REMARK_THRESHOLD` for every place."""
+"""Number of fixed real poles, which describe the smooth remainder, per octave of the model's band. They are spread over
+a wider range (`LOWEST_POLE_RATIO`, `HIGHEST_POLE_RATIO`), and thus less densely. Chosen by hand; the error of the fit
+is tested against `REMARK_THRESHOLD` for every place."""
 LOWEST_POLE_RATIO, HIGHEST_POLE_RATIO = 0.3, 4.5
 """Frequency of the lowest and the highest of these poles, relative to the lower and the upper end of the band.
 Chosen by hand."""
@@ -119,9 +120,9 @@ def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMod
     # interpolation over places, and multiplied by the interpolated frequency afterwards.
     residue = natural_hz * np.einsum("k,kpm->pm", weights, np.array([mode.residue / mode.natural_hz for mode in track]))
     rank = max(_count_rank(mode.residue) for mode in track)
-    u, s, v = np.linalg.svd(residue)
+    u, s, vh = np.linalg.svd(residue)
     share = float(weights @ [mode.share for mode in track])
-    return BandMode(natural_hz, damping_ratio, (u[:, :rank] * s[:rank]) @ v[:rank], share, track[0].sample_rate_hz)
+    return BandMode(natural_hz, damping_ratio, (u[:, :rank] * s[:rank]) @ vh[:rank], share, track[0].sample_rate_hz)
 
 
 def _count_rank(residue: ComplexArray) -> int:
@@ -177,8 +178,9 @@ def _assemble_model(
 
 
 def _choose_remainder_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
-    """Choose the discrete real poles, (poles,), at least four, logarithmically spaced from below the band to above it,
-    at most 0.4 of the sample rate, which is below half of it. Chosen by hand."""
+    """Choose the discrete real poles, (poles,): `REAL_POLES_PER_OCTAVE` for each octave of the band, at least four,
+    spaced logarithmically from below the band to above it, at most 0.4 of the sample rate, which is below half of it.
+    Chosen by hand."""
     lowest_hz, highest_hz = LOWEST_POLE_RATIO * band_hz[0], min(HIGHEST_POLE_RATIO * band_hz[1], 0.4 * rate_hz)
     pole_count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
     return np.asarray(np.exp(-2 * np.pi * np.geomspace(lowest_hz, highest_hz, pole_count) / rate_hz))
@@ -187,12 +189,12 @@ def _choose_remainder_poles(band_hz: tuple[float, float], rate_hz: float) -> Flo
 def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Realise R / (z - pole) plus its conjugate by real state-space matrices A, B, C, two states per rank of the
     residue R. Singular values below 1e-9 of the largest are rounding errors of the truncation to that rank."""
-    u, s, v = np.linalg.svd(mode.residue)
+    u, s, vh = np.linalg.svd(mode.residue)
     rank = int((s > 1e-9 * s[0]).sum())
     pole = mode.pole
     rotation = np.array([[pole.real, pole.imag], [-pole.imag, pole.real]])
     A = np.kron(np.eye(rank), rotation)
-    output_shapes, input_shapes = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * v[:rank]
+    output_shapes, input_shapes = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * vh[:rank]
     B = np.concatenate([np.stack([2 * row.real, -2 * row.imag]) for row in input_shapes])
     C = np.hstack([np.column_stack([column.real, column.imag]) for column in output_shapes.T])
     return A, B, C

@@ -27,8 +27,9 @@ from study.devices.rig import READING_SIZE, CompiledIo, Rig
 
 
 def get_compiled_io(rig: Rig) -> CompiledIo | None:
-    """Get the compiled functions `sense` and `write` of a rig from its attribute `halves`; None where it has none."""
-    compiled_io = getattr(rig, "halves", None)
+    """Get the compiled functions `sense` and `write` of a rig from its attribute `compiled_io`; None where it has
+    none."""
+    compiled_io = getattr(rig, "compiled_io", None)
     return compiled_io if isinstance(compiled_io, CompiledIo) else None
 
 

@@ -64,11 +64,11 @@ class CappedDevice(Protocol):
 class ForceReporting(Protocol):
     """A driver that reads the force that the device reports."""
 
-    def given_n(self) -> float:
+    def read_reported_n(self) -> float:
         """Norm of the horizontal force (N) that the device reports at this moment."""
         ...
 
-    def given_past_this_n(self, asked_n: float) -> float:
+    def read_reported_without_cap_n(self, asked_n: float) -> float:
         """Norm of the horizontal force (N) that the device reports when `asked_n` is commanded without the driver's own
         cap, so that only the cap of the vendor's library acts."""
         ...
@@ -84,12 +84,12 @@ class CommandPausing(Protocol):
         """Send no commands for this time (s). Returns the time of the last command (s, monotonic clock)."""
         ...
 
-    def force_on(self) -> bool:
+    def is_force_on(self) -> bool:
         """Whether the device reports that its forces are on."""
         ...
 
 
-REQUIRED_METHODS = ("given_n", "given_past_this_n", "withhold", "force_on")
+REQUIRED_METHODS = ("read_reported_n", "read_reported_without_cap_n", "withhold", "is_force_on")
 """Methods of `ForceReporting` and `CommandPausing`."""
 
 
@@ -123,7 +123,7 @@ def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
     _check_reported_force("at each tick", tick_capped_n)
     if device.fault() is not Fault.NONE:
         raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
-    library_capped_n = rig.given_past_this_n(COMMAND_TO_CAP_RATIO * TEST_FORCE_N)
+    library_capped_n = rig.read_reported_without_cap_n(COMMAND_TO_CAP_RATIO * TEST_FORCE_N)
     _check_reported_force("of the library", library_capped_n)
     return max(tick_capped_n, library_capped_n)
 
@@ -132,7 +132,7 @@ def _measure_largest_n(device: CappedDevice, rig: ForceReporting) -> float:
     """The largest force (N) that the device reports during `OSCILLATION_DURATION_S`."""
     largest_n, end_s = 0.0, time.monotonic() + OSCILLATION_DURATION_S
     while time.monotonic() < end_s:
-        largest_n = max(largest_n, rig.given_n())
+        largest_n = max(largest_n, rig.read_reported_n())
         device.keep_alive()
         time.sleep(POLL_INTERVAL_S)
     return largest_n
@@ -156,14 +156,14 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
     `DeviceError` where the force remained, or was too small or off before the commands stopped."""
     device.hold(_make_constant_force(device.info.sample_rate_hz))
     _keep_alive_for(device, HOLD_DURATION_S)
-    if device.fault() is not Fault.NONE or not rig.force_on():
+    if device.fault() is not Fault.NONE or not rig.is_force_on():
         raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
     if device.health().peak_command_n < MIN_COMMANDED_SHARE * TEST_FORCE_N:
         raise _make_acceptance_error(f"The force only reached {device.health().peak_command_n:.2f} N.")
     silent_since_s = rig.withhold(PAUSE_S)
     limit_s = rig.drops_force_after_s + MARGIN_S
-    while rig.force_on():
-        if time.monotonic() - silent_since_s > limit_s and rig.force_on():
+    while rig.is_force_on():
+        if time.monotonic() - silent_since_s > limit_s and rig.is_force_on():
             rig.withhold(0.0)
             device.stop()
             raise _make_acceptance_error(f"The force was still there {1000 * limit_s:.0f} ms after the last command.")

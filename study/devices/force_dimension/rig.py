@@ -4,7 +4,8 @@ The compiled functions of `tick_io` do the reading and writing; this class owns 
 errors. In addition to the safety layer, `tick_io` never sends a force whose norm is above the cap or NaN. Any failure
 is raised as a `DeviceError`: the safety layer then writes a zero force, and if that fails too, the device's watchdog,
 if it has one, switches the force off. Made by `open_rig`; the acceptance test (`force_limit_check`) also calls
-`force_on`, `given_n`, `given_past_this_n` and `withhold`, whose names its protocols define.
+`is_force_on`, `read_reported_n`, `read_reported_without_cap_n` and `withhold`. The names of the other methods are those
+of the interfaces of `study.devices.rig`, which drivers of other devices implement, too.
 """
 
 import contextlib
@@ -90,8 +91,8 @@ class ForceDimensionRig:
             self._zero_thread.start()
 
     @property
-    def halves(self) -> CompiledIo | None:
-        """The two halves of a compiled tick; None with an accelerometer that compiled code cannot read."""
+    def compiled_io(self) -> CompiledIo | None:
+        """The compiled `sense` and `write`; None with an accelerometer that compiled code cannot read."""
         if self._uncompiled_accelerometer is not None:
             return None
         return CompiledIo(
@@ -130,30 +131,30 @@ class ForceDimensionRig:
             self._cells[loop_cells.WITHHELD_UNTIL_S] = time.monotonic() + seconds
             return float(self._cells[loop_cells.SENT_S])
 
-    def force_on(self) -> bool:
+    def is_force_on(self) -> bool:
         """Whether the device reports that its forces are on. May be called from any thread. Raises `DeviceError`."""
         try:
             return self._handle.read_status().force_on
         except LibraryError as error:
             raise self._record_failure(f"The library says: {error}") from error
 
-    def given_n(self) -> float:
-        """Norm of the horizontal force (N) that the device reports at this moment; the vertical force is left out,
-        because it may compensate gravity. Raises `DeviceError`."""
+    def read_reported_n(self) -> float:
+        """Read the norm of the horizontal force (N) that the device reports at this moment; the vertical force is left
+        out, because it may compensate gravity. Raises `DeviceError`."""
         try:
             x, y, _ = self._handle.read_force_n()
         except LibraryError as error:
             raise self._record_failure(f"The library says: {error}") from error
         return math.hypot(x, y)
 
-    def given_past_this_n(self, asked_n: float) -> float:
-        """Horizontal force (N) that the device reports when `asked_n` (N) is sent along x without the cap of this rig,
-        to test the cap of the library; a zero follows at once. Only for the acceptance test of a device, with no hand
-        on the handle. Raises `DeviceError`."""
+    def read_reported_without_cap_n(self, asked_n: float) -> float:
+        """Send `asked_n` (N) along x without the cap of this rig, to test the cap of the library, and read the norm of
+        the horizontal force (N) that the device then reports; a zero follows at once. Only for the acceptance test of a
+        device, with no hand on the handle. Raises `DeviceError`."""
         with self._send_lock:
             try:
                 self._handle.set_force(asked_n, 0.0, 0.0)
-                return self.given_n()
+                return self.read_reported_n()
             except LibraryError as error:
                 raise self._record_failure(f"The library says: {error}") from error
             finally:

@@ -21,13 +21,13 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import PredictionError, compute_prediction_error
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
+from analysis.diagnosis.limits import EXPLAINED_ERROR
 from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
 from analysis.diagnosis.real_answer.make_real_answer import describe_named_effects, make_real_answer
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.settings import EXPLAINED_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording

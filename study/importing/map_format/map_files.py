@@ -49,7 +49,7 @@ def assign_files(import_map: ImportMap, files: Sequence[Path]) -> tuple[PartFile
     if unused_names := [path.name for path in ordered_paths if path not in used_paths]:
         subject, remedy = ("clock", "a [[clock]] with it") if is_parallel else ("part", "a [[part]] for it")
         raise ImportProblemError(
-            f"no {subject} of the map is in the file {unused_names[0]}; leave it out, or add {remedy}"
+            f"no {subject} of the map takes the file {unused_names[0]}; leave it out, or add {remedy}"
         )
     return parts
 

@@ -41,12 +41,13 @@ def name_probe_recording(number: int) -> str:
 def save_trial_recording(
     folder: SessionFolder, name: str, recording: Recording, conditions: Mapping[str, Any]
 ) -> SavedRecording:
-    """Save the recording of a trial or probe; on return it is on the disk, as 32-bit floating-point numbers.
+    """Save the recording of a trial or probe; on return it is on the disk, all signals but the position (float64) as
+    32-bit floating-point numbers.
 
     conditions: JSON values about what was played and the state of the device. No file is overwritten: where one of this
-    name exists, because the end of a log was lost but not the recordings, the name gets a number. Raises StudyError
-    where the file cannot be written.
-    """
+    name exists, because the end of a log was lost but not the recordings, the name gets a number. Raises
+    CannotWriteError where the file cannot be written, ValueError for an inconsistent recording or NaN in the
+    conditions."""
     name = _find_free_name(folder.path, name)
     path = folder.path / name
     write_recording(path, replace(recording, meta={**recording.meta, **conditions}), precision="float32")

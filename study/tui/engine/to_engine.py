@@ -102,7 +102,7 @@ class Diagnose:
     out: str
     """Path of the folder for the results; empty: a new folder in the session's folder, or next to the recording."""
     clean: tuple[str, ...] = ()
-    """Paths of recordings that were made while the device worked correctly, for comparison."""
+    """Paths of reference recordings, of the device without a fault; `--clean` in a terminal."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,13 +25,13 @@ HELP = """\
 
 Where does a recording differ from a model of the device, and what physics does the model lack?
 
-* **Recordings**: one file of `hapteq record` or `hapteq import`, or several of one device, set apart by spaces (quote a
-  name that holds some); or the folder of a session, whose trials are taken.
+* **Recordings**: one file of `hapteq record` or `hapteq import`, or several of one device, separated by spaces (put a
+  name with spaces in quotation marks); or the folder of a session, whose trials are taken.
 * **Model**: a mechanical model, MODEL.toml. Left empty, a linear one is fitted to the recordings first; a session on
   the simulated device is compared with its twin.
-* **In order**: recordings of the device when it was in order, where there are any. Differences from the model that
-  they already show are not counted as mismatch.
-* **Results**: a folder that is not there yet. Left empty, one next to the recording, or in the session's folder.
+* **Reference**: recordings of the device without a fault (`--clean`), where there are any. Differences from the
+  model that they already show are not counted as mismatch.
+* **Results**: a folder that does not exist yet. Left empty, one next to the recording, or in the session's folder.
 
 **F5** begins, **Esc** goes back.
 
@@ -41,7 +41,7 @@ In a terminal: `hapteq diagnose REC.h5 --model MODEL.toml --out DIR`.
 FIELDS = (
     ("sources", "Recordings", "REC.h5, several, or a session's folder"),
     ("model", "Model", "MODEL.toml; empty: none is given"),
-    ("clean", "In order", "recordings of the device in order; may stay empty"),
+    ("clean", "Reference", "recordings without a fault; may stay empty"),
     ("out", "Results", "a new folder; empty: next to the recording"),
 )
 """Name, label and placeholder of each field, from top to bottom."""

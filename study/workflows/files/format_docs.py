@@ -1,7 +1,7 @@
 """Generate docs/formats.md, docs/importing.md and docs/schemas/*.json from the code that reads and writes the files.
 
 A program: `python -m study.workflows.files.format_docs docs` updates them; a test (`test_format_docs.py`) fails where
-they differ from the code. Most fixed texts of the pages are in `format_text` and `importing_text`.
+they differ from the code. Most fixed texts of the pages are in `formats_text` and `importing_text`.
 """
 
 import json
@@ -33,7 +33,7 @@ from study.store.formats.calibration_file import ABOUT as CALIBRATION_ABOUT
 from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import REQUEST_CLASSES, REQUEST_FORMAT, REQUEST_VERSION
-from study.workflows.files import format_text
+from study.workflows.files import formats_text
 from study.workflows.files.importing_docs import compose_importing_page
 
 
@@ -50,7 +50,7 @@ def make_event_schema() -> dict[str, Any]:
 def format_session_log() -> Iterable[str]:
     """Yield heading and paragraphs of docs/formats.md on the session log and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
-    yield from format_text.SESSION_LOG_NOTES
+    yield from formats_text.SESSION_LOG_NOTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema(
         "repeats.json",
-        f"`*{repeats_file.SUFFIX}`, {format_text.REPEATS_DESCRIPTION}",
+        f"`*{repeats_file.SUFFIX}`, {formats_text.REPEATS_DESCRIPTION}",
         lambda: make_document_schema(
             repeats_file.REPEATS_VALIDATOR.json_schema(), repeats_file.FORMAT, repeats_file.VERSION
         ),
@@ -124,12 +124,12 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema(
         "live.json",
-        format_text.LIVE_STATE_DESCRIPTION,
+        formats_text.LIVE_STATE_DESCRIPTION,
         lambda: make_document_schema(
             TypeAdapter(LiveState).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION
         ),
     ),
-    Schema("request.json", format_text.REQUEST_DESCRIPTION, make_request_schema),
+    Schema("request.json", formats_text.REQUEST_DESCRIPTION, make_request_schema),
 )
 """Schemas of protocols and JSON formats; only those in this tuple are documented."""
 
@@ -138,7 +138,7 @@ def compose_formats_page() -> str:
     """Compose the text of docs/formats.md, in Markdown."""
     parts = [
         "# File formats",
-        *format_text.INTRODUCTION,
+        *formats_text.INTRODUCTION,
         *_format_recordings(),
         "## Identified model (`.h5`)",
         _format_layout(identified_model_file.LAYOUT),
@@ -147,10 +147,10 @@ def compose_formats_page() -> str:
         _format_layout(CALIBRATION_LAYOUT),
         *_format_mechanical_models(),
         "## Effects",
-        format_text.EFFECTS_NOTES,
+        formats_text.EFFECTS_NOTES,
         _format_effects(),
         "## Laws without a name",
-        format_text.LAW_SECTION,
+        formats_text.LAW_SECTION,
         *_format_csv_tables(),
         *format_session_log(),
         "## JSON documents and protocols",
@@ -177,17 +177,17 @@ def _format_recordings() -> Iterable[str]:
     """Yield the section on the HDF5 file of a recording."""
     yield "## Recording (`.h5`)"
     yield _format_layout(recording_layout.LAYOUT)
-    yield format_text.SIGNAL_TABLE_NOTE
+    yield formats_text.SIGNAL_TABLE_NOTE
     yield _format_layout(recording_layout.SIGNAL_ATTRIBUTES)
-    yield format_text.SEGMENT_TABLE_NOTE
+    yield formats_text.SEGMENT_TABLE_NOTE
     yield _format_layout(recording_layout.SEGMENT_FIELDS)
-    yield format_text.RECORDING_NOTES
+    yield formats_text.RECORDING_NOTES
 
 
 def _format_mechanical_models() -> Iterable[str]:
     """Yield the section on the TOML file of a mechanical model."""
     yield "## Mechanical model (`.toml`)"
-    yield format_text.MECHANICAL_MODEL_NOTES
+    yield formats_text.MECHANICAL_MODEL_NOTES
     yield _format_layout(mechanical_model_file.LAYOUT)
 
 
@@ -212,8 +212,8 @@ def _format_effects() -> str:
 
 
 _CSV_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
-    ("trials.csv", Trial, format_text.TRIALS_NOTES),
-    ("thresholds.csv", Threshold, format_text.THRESHOLDS_NOTES),
+    ("trials.csv", Trial, formats_text.TRIALS_NOTES),
+    ("thresholds.csv", Threshold, formats_text.THRESHOLDS_NOTES),
 )
 """CSV tables with a row per dataclass instance: file name, dataclass, description."""
 
@@ -224,7 +224,7 @@ def _format_csv_tables() -> Iterable[str]:
     yield _format_markdown_table(
         ("header", "holds"), [(f"`{','.join(kind.header)}`", f"{kind.quantity}, {kind.unit}") for kind in TABLE_KINDS]
     )
-    yield format_text.FORCE_TABLE_NOTES
+    yield formats_text.FORCE_TABLE_NOTES
     for name, row_type, description in _CSV_TABLES:
         yield f"## `{name}`"
         yield description

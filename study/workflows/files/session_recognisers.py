@@ -4,7 +4,7 @@ A session folder is checked as a whole: its log is replayed against the rules, t
 with the SHA-256 in the log, and the tables with what the log gives. Recordings of probes are not compared.
 """
 
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 
 from protocols.document.lock import LOCK_FORMAT, LockError, lock_from_json
@@ -18,11 +18,17 @@ from study.store.disk.json_document import read_json
 from study.store.disk.provenance import compute_sha256
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME
-from study.store.sessions.live_file import LIVE_FORMAT
-from study.store.sessions.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
-from study.store.sessions.request_inbox import REQUEST_FORMAT
+from study.store.sessions.live_file import LIVE_FORMAT, LIVE_VERSION
+from study.store.sessions.log_seal import SEAL_FORMAT, SEAL_NAME, SEAL_VERSION, read_seal
+from study.store.sessions.request_inbox import REQUEST_FORMAT, REQUEST_VERSION
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
-from study.store.sessions.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, describe_unfinished_withdrawal
+from study.store.sessions.withdrawal_files import (
+    TOMBSTONE_FORMAT,
+    TOMBSTONE_VERSION,
+    WITHDRAWAL_FORMAT,
+    WITHDRAWAL_VERSION,
+    describe_unfinished_withdrawal,
+)
 from study.workflows.files.file_content import FileContent
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import find_result_problems
@@ -30,26 +36,48 @@ from study.workflows.results.session_results import find_result_problems
 SESSION_KIND = "session"
 """Name of a session folder or log in messages."""
 
+STATISTICS_FORMAT, STATISTICS_VERSION = "hapteq-anova", 1
+"""Name and version of the format of the statistics of a study, `study_analysis.make_anova_document`."""
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentKind:
+    """A kind of JSON document."""
+
+    name: str
+    """Of the kind, in words."""
+    version: int
+    """Of the format, the only one that is accepted."""
+    required_keys: tuple[str, ...]
+
+
 DOCUMENT_KINDS = {
-    SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
-    "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
-    SEAL_FORMAT: ("seal of a session log", ("session", "lines", "bytes", "head", "sha256")),
-    LIVE_FORMAT: (
+    SUMMARY_FORMAT: DocumentKind(
+        "session summary",
+        SUMMARY_VERSION,
+        ("session", "subject", "protocol", "device", "runs", "answers", "closed"),
+    ),
+    STATISTICS_FORMAT: DocumentKind(
+        "statistics of a study", STATISTICS_VERSION, ("participants", "frequencies_hz", "one_way", "comparisons")
+    ),
+    SEAL_FORMAT: DocumentKind("seal of a session log", SEAL_VERSION, ("session", "lines", "bytes", "head", "sha256")),
+    LIVE_FORMAT: DocumentKind(
         "live state of a session",
+        LIVE_VERSION,
         tuple(field.name for field in fields(LiveState) if field.default is MISSING),
     ),
-    REQUEST_FORMAT: ("request to a running session", ("request", "who")),
-    WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
-    TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
+    REQUEST_FORMAT: DocumentKind("request to a running session", REQUEST_VERSION, ("request", "who")),
+    WITHDRAWAL_FORMAT: DocumentKind("withdrawal that was begun", WITHDRAWAL_VERSION, ()),
+    TOMBSTONE_FORMAT: DocumentKind("tombstone of a withdrawn session", TOMBSTONE_VERSION, ("session", "withdrawn_utc")),
 }
-"""Kind in words and required keys of each JSON document, by its `format` entry."""
+"""Kinds of JSON documents, by their `format` entry."""
 
 
 def recognise_session(content: FileContent) -> str | None:
     """Recognise a session folder, or a session log by its name or by the session format in its first 1000 characters
-    (the first line of a log states it). A log alone is replayed, without checks of recordings and tables. Returns the
-    session in words; None for other files. Raises UnusableFileError for a damaged session, and for a log with another
-    name than `LOG_NAME`: the log of its folder would be replayed in its place."""
+    (the first line of a log states it). A log alone is replayed, without checks of recordings and of tables other than
+    the session summary. Returns the session in words; None for other files. Raises UnusableFileError for a damaged
+    session, and for a log with another name than `LOG_NAME`: the log of its folder would be replayed in its place."""
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
@@ -76,17 +104,17 @@ def recognise_document(content: FileContent) -> str | None:
     finished one leaves no such document."""
     if content.json_format not in DOCUMENT_KINDS:
         return None
-    kind, required_keys = DOCUMENT_KINDS[content.json_format]
+    kind = DOCUMENT_KINDS[content.json_format]
     if content.json_format == WITHDRAWAL_FORMAT:
         problem = "the erasing is not finished; `hapteq withdraw` continues it"
-        raise UnusableFileError(content.path, kind, (problem,))
+        raise UnusableFileError(content.path, kind.name, (problem,))
     if content.json_format == SEAL_FORMAT:
         read_seal(content.path)
-    document = read_json(content.path, content.json_format, SUMMARY_VERSION)
-    missing_keys = [key for key in required_keys if key not in document]
+    document = read_json(content.path, content.json_format, kind.version)
+    missing_keys = [key for key in kind.required_keys if key not in document]
     if missing_keys:
-        raise UnusableFileError(content.path, kind, (f"it lacks {', '.join(missing_keys)}",))
-    return kind
+        raise UnusableFileError(content.path, kind.name, (f"it lacks {', '.join(missing_keys)}",))
+    return kind.name
 
 
 def recognise_lock(content: FileContent) -> str | None:

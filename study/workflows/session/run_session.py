@@ -78,7 +78,9 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
         sitting.display.goodbye(
             Goodbye(not session_end.end_reason, session_end.state.answers, session_end.end_reason, ineligibility)
         )
-    # Notes that were taken while the log was open are written before it is sealed.
+    # Notes that were taken since the log was last written are logged. `_run_actions` has sealed a finished session
+    # before the goodbye, so that it is sealed even if the program ends there; later notes get a further seal. A session
+    # that was closed without being finished (refusal, exclusion) is sealed here for the first time.
     session_end = replace(session_end, state=write_notes(session_end.state, sitting))
     if session_end.state.closed:
         seal_log(sitting.folder.log)

@@ -9,7 +9,7 @@ from scipy.signal import butter, sosfilt
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.command_sign import CROSS_AXIS_TILTS, DIRECTION_PAIRS, SIGN_REVERSED, reverse_commands
 from equalizer.effects.discovered_law import Channels
-from equalizer.effects.placing import find_place, place_effects
+from equalizer.effects.placing import find_device_part, place_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import ModelEffect
@@ -104,7 +104,7 @@ def test_a_stop_beyond_zero_pushes_as_its_law_written_out(bench):
 
 
 def test_every_effect_that_pushes_or_is_pushed_was_turned():
-    assert {each.name for each in CATALOGUE if find_place(each) != "sensor"} <= set(NUMBERS)
+    assert {each.name for each in CATALOGUE if find_device_part(each) != "sensor"} <= set(NUMBERS)
     assert {*SIGN_REVERSED, *DIRECTION_PAIRS, *CROSS_AXIS_TILTS} <= set(NUMBERS)
 
 

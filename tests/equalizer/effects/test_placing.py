@@ -67,13 +67,13 @@ def test_a_sensors_axis_is_a_channel_of_the_response(bench):
 
 def test_a_letter_that_two_channels_end_with_is_refused(bench):
     model = replace(bench.three_axes(), effects=(written("coulomb_friction", "x", False),))
-    with pytest.raises(PlacingError, match="the axis 'x' is on several of fx, tx"):
+    with pytest.raises(PlacingError, match="the axis 'x' fits several of fx, tx"):
         place_effects(model, Channels(("fx", "tx"), OUTPUTS))
 
 
 def test_an_effect_beyond_the_channels_cannot_be_written(bench):
     (one,) = placed(bench.three_axes(), written("coulomb_friction", "z", False))
-    with pytest.raises(PlacingError, match="coulomb_friction is placed at number 3, but there are 2"):
+    with pytest.raises(PlacingError, match="coulomb_friction acts on channel 3, but there are only 2 channels"):
         convert_to_model_effects((one,), INPUTS[:2], OUTPUTS)
 
 

@@ -44,7 +44,7 @@ NAMED_IN = {
         "study/devices/force_dimension/rig.py",  # zero only
     },
     "hold_unchecked": {"study/devices/force_dimension/force_limit_check.py"},
-    "given_past_this_n": {"study/devices/force_dimension/force_limit_check.py"},
+    "read_reported_without_cap_n": {"study/devices/force_dimension/force_limit_check.py"},
     "StandbyThread": set(),
     "run_block": set(),
 }

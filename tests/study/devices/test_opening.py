@@ -195,7 +195,9 @@ def test_without_a_hand_a_driver_of_a_lab_s_own_opens(own):
 
 
 def test_a_driver_that_cannot_show_its_force_is_not_accepted(own):
-    with pytest.raises(DeviceError, match="its driver has no given_n, given_past_this_n, withhold, force_on"):
+    with pytest.raises(
+        DeviceError, match="its driver has no read_reported_n, read_reported_without_cap_n, withhold, is_force_on"
+    ):
         opening.accept_device("own", SETTINGS, RealClock(), "Ada")
     assert own.closed
     with pytest.raises(DeviceError, match="locked for hands"):

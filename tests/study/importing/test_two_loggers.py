@@ -127,6 +127,6 @@ def test_a_logger_whose_file_is_not_given_is_named(loggers):
 
 
 def test_a_file_of_no_logger_is_named_with_what_the_map_may_add(loggers, files):
-    assert "No clock of the map is in the file spare.npz; leave it out, or add a [[clock]] with it" in refusal(
+    assert "No clock of the map takes the file spare.npz; leave it out, or add a [[clock]] with it" in refusal(
         TWO_LOGGERS.format(offset=""), *loggers, files("spare.npz", y=np.zeros(9))
     )

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from analysis.diagnosis.balance.laws.law import Formula
-from analysis.diagnosis.settings import SLEW_REACHED_SHARE
+from analysis.diagnosis.limits import SLEW_REACHED_SHARE
 from equalizer.effects.force_nonlinearity import apply_square_law
 from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray

@@ -6,7 +6,7 @@ import pytest
 from analysis.diagnosis.balance.balances import balance_selected_motions, select_samples_in_motion
 from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
+from analysis.diagnosis.limits import MOVING_TIME_SHARE
 
 RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
 
@@ -45,7 +45,7 @@ def test_friction_of_an_axis_that_rests_at_its_targets_is_named(hunting_balance)
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     (named, *_) = balance.named
 
-    assert np.mean(np.abs(speed) > 0.1 * speed.std()) < MOVES_MOST_OF_THE_TIME + 0.3
+    assert np.mean(np.abs(speed) > 0.1 * speed.std()) < MOVING_TIME_SHARE + 0.3
     assert named.law.effect in ("coulomb_friction", "presliding_hysteresis")
     assert named.values["level"] == pytest.approx(LEVEL, rel=0.15)
 
@@ -98,7 +98,7 @@ def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, reco
     """The look that is taken where an axis mostly rests, and nothing is named over all samples."""
     force, position = _simulate_pushes(friction, wander=wander)
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
-    assert np.mean(speed**2 > 0.01 * np.mean(speed**2)) < MOVES_MOST_OF_THE_TIME
+    assert np.mean(speed**2 > 0.01 * np.mean(speed**2)) < MOVING_TIME_SHARE
     records = observe_parts((record_samples(force, position, RATE_HZ),), 1)
     found = balance_selected_motions(
         select_samples_in_motion, records, compute_motions(records), frozenset(), lambda: True, map

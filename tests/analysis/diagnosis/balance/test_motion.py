@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.balance.laws.motion_laws import make_laws
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signal
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import BAND_WIDEST
+from analysis.diagnosis.limits import HIGHEST_BAND_END_RATIO
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import Signal
 
@@ -69,7 +69,7 @@ def test_the_band_ends_where_the_noise_of_the_motion_would_bend_the_mass(record_
             )
         ).band_hz
 
-    assert end_hz(0.0) == pytest.approx(BAND_WIDEST * RATE_HZ)
+    assert end_hz(0.0) == pytest.approx(HIGHEST_BAND_END_RATIO * RATE_HZ)
     ends = [end_hz(noise) for noise in (1e-6, 1e-5, 1e-3)]
     assert ends[0] > ends[1] > ends[2] > 3.0
 

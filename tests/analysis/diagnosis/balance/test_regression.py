@@ -11,7 +11,7 @@ from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.balance.regression import build_regression, fit_all_laws
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import BALANCE_FOLDS
+from analysis.diagnosis.limits import BALANCE_FOLDS
 
 RATE_HZ, COUNT = 500.0, 6000
 SCALE = Law("scale", 0, (1.0,), lambda m, n: np.tanh(m.velocity[:, :1] / n[0]), name_weights("level"))

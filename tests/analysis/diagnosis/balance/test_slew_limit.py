@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.laws.command_laws import make_slew_laws
-from analysis.diagnosis.settings import SLEW_REACHED_SHARE
+from analysis.diagnosis.limits import SLEW_REACHED_SHARE
 from tests.slow_instances import slow
 
 RATE_HZ, SPEED = 50.0, 1.5

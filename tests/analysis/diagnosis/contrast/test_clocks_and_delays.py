@@ -24,7 +24,7 @@ from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, sugge
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.recording_part import split_into_parts
 from analysis.diagnosis.contrast.sensor_faults import make_sensor_faults
-from analysis.diagnosis.settings import LEAST_FAULT_GAIN
+from analysis.diagnosis.limits import LEAST_FAULT_GAIN
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 

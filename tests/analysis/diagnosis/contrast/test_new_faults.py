@@ -10,7 +10,7 @@ from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.fault import Lags
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.recording_part import split_into_parts
-from analysis.diagnosis.settings import CONTRAST_BLOCKS, MISFIT_SHARE
+from analysis.diagnosis.limits import CONTRAST_BLOCKS, MISFIT_SHARE
 from equalizer.signals.signal import FloatArray
 
 

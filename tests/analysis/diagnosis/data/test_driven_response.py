@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.diagnosis.data.driven_response import compute_response_significance
-from analysis.diagnosis.settings import DRIVEN_DEVIATIONS
+from analysis.diagnosis.limits import DRIVEN_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from tests.slow_instances import slow_after

@@ -13,7 +13,7 @@ from analysis.diagnosis.data.observed import (
     stack_measured_signals,
 )
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.settings import MODEL_FLOOR
+from analysis.diagnosis.limits import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 

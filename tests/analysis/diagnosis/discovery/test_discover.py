@@ -20,10 +20,10 @@ from analysis.diagnosis.discovery.validation import NO_OTHER_EXCITATION
 from analysis.diagnosis.discovery.view_terms import list_view_terms
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import SHUFFLED_RATIO
 from analysis.diagnosis.result.wording import write_summary_lines
 from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.search_by_simulation import has_discovered_law
-from analysis.diagnosis.settings import SHUFFLED_RATIO
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.laws.evaluate import evaluate
 from tests.diagnosed import device

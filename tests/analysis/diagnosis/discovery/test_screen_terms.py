@@ -17,7 +17,7 @@ from analysis.diagnosis.discovery.screen_terms import (
 )
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.settings import RETUNING_BOUND
+from analysis.diagnosis.limits import RETUNING_BOUND
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal

@@ -10,11 +10,11 @@ from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
+from analysis.diagnosis.limits import LAW_ALONE_REMAINDER
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search import FurtherSearches, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, judge
-from analysis.diagnosis.settings import LAW_ALONE_REMAINDER
 from equalizer.effects.catalogue import EFFECTS
 from tests.lawful import arena_of, law, recorded
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.errors.error_measure_rule import is_self_stable, select_error_measure
+from analysis.diagnosis.errors.error_measure_rule import decays_within, select_error_measure
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import Signal
 from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, make_model
@@ -59,9 +59,9 @@ def test_the_rule_takes_windows_under_a_controller_where_accelerations_alone_wer
 
 
 def test_what_holds_itself_comes_to_rest_within_a_third_of_the_recording() -> None:
-    assert is_self_stable(make_model(400.0), 10.0)
-    assert not is_self_stable(make_model(400.0), 0.5)
-    assert not is_self_stable(make_model(0.0), 10.0)
+    assert decays_within(make_model(400.0), 10.0)
+    assert not decays_within(make_model(400.0), 0.5)
+    assert not decays_within(make_model(0.0), 10.0)
 
 
 def test_feedback_is_seen_by_the_excitation_beside_the_command(controlled_recording: Recording) -> None:

@@ -12,8 +12,8 @@ from analysis.diagnosis.errors.hypothesis import (
     remove_claim,
 )
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.limits import STARTS_PER_CLAIM
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
-from analysis.diagnosis.settings import STARTS_PER_CLAIM
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 

@@ -11,8 +11,8 @@ from analysis.diagnosis.errors.output_error import (
     solve_bounded_step,
     stack_fit_residuals,
 )
+from analysis.diagnosis.limits import RETUNING_BOUND
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eigh
 
 from analysis.diagnosis.errors.tuning import DAMPING_UNCERTAINTY_RATIO, make_tuning
-from analysis.diagnosis.settings import UNSTATED_SHARE
+from analysis.diagnosis.limits import UNSTATED_SHARE
 from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 

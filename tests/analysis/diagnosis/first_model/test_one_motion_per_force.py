@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.motion import find_motion_signal
 from analysis.diagnosis.data.driven_response import compute_response_significance
 from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
-from analysis.diagnosis.settings import DRIVEN_DEVIATIONS
+from analysis.diagnosis.limits import DRIVEN_DEVIATIONS
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.spectral_lines import compute_hold_samples, find_detection_lines
+from analysis.diagnosis.limits import DISTORTION_P
 from analysis.diagnosis.localisation.distortion import find_distortions
 from analysis.diagnosis.localisation.level_trends import compute_level_trends
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
-from analysis.diagnosis.settings import DISTORTION_P
 
 
 def distortions_of(recording):

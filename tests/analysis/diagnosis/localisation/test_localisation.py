@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from analysis.diagnosis.limits import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorComparison
 from analysis.diagnosis.localisation.localisation import find_state_dependences
 from analysis.diagnosis.localisation.localisation_words import (
@@ -12,7 +13,6 @@ from analysis.diagnosis.localisation.localisation_words import (
 )
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import StateRegion
-from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 ALONG_X = EntryScore("a force along x", "mechanism", "x", 1.0, 0.9, 1.0, ())
 ALONG_ALL = EntryScore("forces along several axes", "mechanism", None, 0.9, 0.95, 1.0, ())

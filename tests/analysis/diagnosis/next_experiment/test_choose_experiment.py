@@ -9,6 +9,7 @@ from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import make_tuning
+from analysis.diagnosis.limits import DISCRIMINATING_GAIN
 from analysis.diagnosis.next_experiment.choose_experiment import (
     MOST_RECORDINGS,
     Bench,
@@ -18,7 +19,6 @@ from analysis.diagnosis.next_experiment.choose_experiment import (
     predict_gains,
 )
 from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
-from analysis.diagnosis.settings import DISCRIMINATING_GAIN
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import compute_driven_axes

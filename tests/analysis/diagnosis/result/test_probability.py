@@ -2,8 +2,8 @@
 
 import pytest
 
+from analysis.diagnosis.limits import NO_CANDIDATE_LEAST, NO_CANDIDATE_MOST
 from analysis.diagnosis.result.named_effects import compute_none_probability, compute_probabilities
-from analysis.diagnosis.settings import NO_CANDIDATE_LEAST, NO_CANDIDATE_MOST
 
 
 def test_of_no_candidates_none_has_a_probability():

@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import EXPLAINED_ERROR
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
 from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile
@@ -18,7 +19,6 @@ from analysis.diagnosis.search.revise_selection import (
 )
 from analysis.diagnosis.search.search import prune
 from analysis.diagnosis.search.time_budget import CountedBudget, grant_time
-from analysis.diagnosis.settings import EXPLAINED_ERROR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 

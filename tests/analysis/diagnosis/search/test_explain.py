@@ -9,11 +9,11 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.limits import ADDED_GAIN, INTERVAL_SHARE
 from analysis.diagnosis.search import explain
 from analysis.diagnosis.search.explain import _find_effect_pair
 from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.verdict import ONLY_REFINES
-from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.signals.signal import Signal

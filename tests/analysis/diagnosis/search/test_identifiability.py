@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.limits import INTERVAL_FACTOR, MOST_BETWEEN_SEGMENTS
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.identifiability import (
@@ -18,7 +19,6 @@ from analysis.diagnosis.search.identifiability import (
 )
 from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.time_budget import grant_time
-from analysis.diagnosis.settings import INTERVAL_FACTOR, MOST_BETWEEN_SEGMENTS
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 

@@ -7,10 +7,10 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
+from analysis.diagnosis.limits import RETUNING_BOUND, WIDER_RETUNING_BOUND
 from analysis.diagnosis.search.search import repeat_with_wider_bound, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, CountedBudget
 from analysis.diagnosis.search.verdict import MODEL_MOVED
-from analysis.diagnosis.settings import RETUNING_BOUND, WIDER_RETUNING_BOUND
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from tests.diagnosed import FRICTION_N, RUBBING, device, recorded

@@ -7,11 +7,11 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
+from analysis.diagnosis.limits import LAST_EFFECT_SHARE
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.search import prune, search_effects
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
 from analysis.diagnosis.search.time_budget import grant_time
-from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 

@@ -16,7 +16,7 @@ from analysis.psychophysics.hierarchy.curve import (
     compute_proportion_correct,
     differentiate_evidence,
 )
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, _compute_likelihood_on_grid
+from analysis.psychophysics.hierarchy.likelihood_thresholds import Nuisance, _compute_likelihood_on_grid
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document

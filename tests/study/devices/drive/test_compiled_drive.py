@@ -29,7 +29,7 @@ FAULTS = {
 
 
 class Interpreted:
-    """A rig without its compiled halves."""
+    """A rig without its compiled functions."""
 
     def __init__(self, rig) -> None:
         self.sense, self.write, self.buttons, self.close = rig.sense, rig.write, rig.buttons, rig.close
@@ -47,7 +47,7 @@ def lived_through(rigs, stub, seed: int, interpreted: bool) -> list:
     """A device with random faults at random times: what it told after each block of ticks, and its caller heard."""
     random, clock, heard = np.random.default_rng(seed), VirtualClock(), []
     rig = stub.rig()
-    assert rig.halves is not None
+    assert rig.compiled_io is not None
     with contextlib.closing(SafeDevice(Interpreted(rig) if interpreted else rig, rigs.SETTINGS, clock)) as device:
         assert device._runner._compiled is None if interpreted else device._runner._compiled is not None
         device._governor.ring = np.zeros((600, cells.RING_WIDTH))
@@ -148,12 +148,12 @@ class ScriptedRig:
         self._calls = np.append(collect_system_calls(SharedLock()), find_address(clock.work))
         self._calls[CLOCK], self._calls[SLEEP] = find_address(clock.now), find_address(clock.wait)
         self._own, self._samples = np.array([float(fails_at), 0.0]), np.zeros((1, 1))
-        self.halves = CompiledIo(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
+        self.compiled_io = CompiledIo(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
 
     def sense(self):
         reading = np.empty(READING_SIZE)
         if code := tremble(self._calls, self._own, self._samples, reading):
-            raise self.halves.error(code)
+            raise self.compiled_io.error(code)
         return reading
 
     def write(self, force_n) -> None:

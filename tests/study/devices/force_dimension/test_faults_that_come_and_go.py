@@ -163,6 +163,6 @@ def test_a_repeated_zero_that_is_answered_with_an_error_is_followed_by_the_brake
         rig.write(np.zeros(3))
         assert stepped_stub.applied_n.any()
         stepped_stub.fail("dhdSetForce", 7)
-        assert repeat_zero_once(rig.halves.calls, rig.halves.cells, 0.0, np.zeros(3)) != 0
+        assert repeat_zero_once(rig.compiled_io.calls, rig.compiled_io.cells, 0.0, np.zeros(3)) != 0
         stepped_stub.advance(0.001)
         assert stepped_stub.safe

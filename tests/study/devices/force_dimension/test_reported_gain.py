@@ -73,7 +73,7 @@ def test_a_gain_that_is_off_by_30_percent_is_suspected_in_the_first_trial(age, g
 def status_checks(stepped_stub, axis: int, amplitude_n: float) -> int:
     """The first error code of the status checks while a trial of 2.5 s is played along this axis alone; else 0."""
     with contextlib.closing(stepped_stub.rig()) as rig:
-        calls, cells = rig.halves.calls, rig.halves.cells
+        calls, cells = rig.compiled_io.calls, rig.compiled_io.cells
         for tick in range(2500):
             if tick % STATUS_CYCLE_TICKS in STATUS_CHECK_TICKS:
                 code: int = check_status(calls, cells)

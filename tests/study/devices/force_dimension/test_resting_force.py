@@ -39,7 +39,7 @@ def test_the_repeated_zero_keeps_the_lock_for_no_wait_for_the_interpreter(stub):
     stub.set("watchdog_stretch", 1000)
     keep, over = ctypes.PyDLL(None).usleep, threading.Event()
     with contextlib.closing(stub.rig(rests=True)) as rig:
-        calls = rig.halves.calls
+        calls = rig.compiled_io.calls
         longest_wait_s(calls, EVERY_S, 0.01)  # compiled
         sent = stub.get("writes")
 

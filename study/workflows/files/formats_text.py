@@ -15,16 +15,20 @@ GENERATED_PAGE_NOTE = (
     "This page is generated from the code (`python -m study.workflows.files.format_docs docs`): change the code, not "
     "the page."
 )
+"""Sentence at the beginning of a generated page."""
 
 INTRODUCTION = (
     f"{GENERATED_PAGE_NOTE} `hapteq validate FILE` checks any of these files and lists its problems.",
     "Every HDF5 file and every JSON document states its `format` and `version`. TOML and CSV files are recognised by "
     f"their keys or header. Units: {UNITS_CLAUSE}. `g` is standard gravity. Time is the first dimension of each array.",
 )
+"""Paragraphs at the beginning of the page."""
 
 SIGNAL_TABLE_NOTE = "Each of `command`, `response`, `position`, `excitation`, `condition` has these attributes:"
+"""Sentence above the table of the attributes of a signal."""
 
 SEGMENT_TABLE_NOTE = "A row of `segments` has these fields:"
+"""Sentence above the table of the fields of a segment."""
 
 RECORDING_NOTES = (
     "With a plant that has direct feedthrough, `response[k]` depends on `command[k-1]`. If the sensor is faster than "
@@ -58,9 +62,10 @@ LAW_SECTION = "\n\n".join(
         f"{_FUNCTION_NAMES}. Comparisons do not exist: `maximum(x - 0.01, 0)` is a stop, `(1 + sign(vx))/2` is 1 "
         "during upward motion.",
         "**Functions with memory.** `lag(s, tau_s)` is one pole. `play(s, half_width)` follows s with play. "
-        f"`delay(s, seconds)` stores up to {MAX_CELLS} instants. `integral(s)` integrates over time. A second argument "
-        "must be constant. In a law of a force or response, the initial state is that of signals which have always had "
-        "their first values. In a law of a command, it is that of zero signals.",
+        f"`delay(s, seconds)` interpolates between stored instants, of which every second one is at least seconds / "
+        f"{MAX_CELLS} later. `integral(s)` integrates over time. A second argument must be constant. In a law of a "
+        "force or response, the initial state is that of signals which have always had their first values. In a law of "
+        "a command, it is that of zero signals.",
         "**Signals.** `x`, `vx`, `ax`, `fx` are position, velocity, acceleration and command of the x axis; y and z "
         "likewise. `t` is the time from the first sample, in seconds. The recording's own channel names are allowed, "
         "too. If these do not end in x, y, z, the axes are named x, y, z in their order. A law of the force may also "
@@ -121,10 +126,13 @@ REPEATS_DESCRIPTION = (
     "next to a table of forces found by repetition: errors of each play, and the trajectory, model and device that the "
     "forces belong to"
 )
+"""What the file of a repetition contains, in the list of JSON documents."""
 
 LIVE_STATE_DESCRIPTION = "`live.json`, the present state of a running session; replaced several times a second"
+"""What the file of the live state contains, in the same list."""
 
 REQUEST_DESCRIPTION = (
     "a file in a session's folder `requests/`: a request of another program to the session, removed when it is read. A "
     "file name that begins with `stop` is a request to stop, with any content"
 )
+"""What the file of a request contains, in the same list."""

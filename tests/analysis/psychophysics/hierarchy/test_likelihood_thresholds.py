@@ -5,7 +5,11 @@ import pytest
 
 from analysis.psychophysics.hierarchy.answers import count_cells
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, compute_run_likelihoods, convert_to_newton
+from analysis.psychophysics.hierarchy.likelihood_thresholds import (
+    Nuisance,
+    compute_likelihood_thresholds,
+    convert_to_newton,
+)
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.reports.primary_tables import format_run
 from tests.analysis.conftest import PUBLISHED
@@ -16,7 +20,7 @@ SAME = {"person_sd_db": 0.0, "frequency_sd_db": 0.0, "slope_log_sd": 0.0, "crite
 
 def simulate_runs(true_n, people=300):
     study = simulate_study(Crowd((35.0,), (true_n,), **SAME), PUBLISHED, people, (8,))
-    return compute_run_likelihoods(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
+    return compute_likelihood_thresholds(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
 
 
 @pytest.mark.parametrize("true_n", [pytest.param(0.3, marks=pytest.mark.slow), 1.0])
@@ -48,7 +52,7 @@ def likelihood_of_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
     levels_db, n = 20 * np.log10(np.asarray(levels_n)), len(levels_n)
     side = np.where(np.arange(n) % 2, 1.0, -1.0)
     answers = count_cells(("a",), (35.0,), np.zeros(n, dtype=np.intp), levels_db, side, np.asarray(right))
-    (run,) = compute_run_likelihoods(answers, [Nuisance(slope, 0.1, (0.02,))], CAP_DB, family)
+    (run,) = compute_likelihood_thresholds(answers, [Nuisance(slope, 0.1, (0.02,))], CAP_DB, family)
     return run
 
 

@@ -33,11 +33,11 @@ from equalizer.signals.signal import FloatArray
 
 GRID_STEP_DB, GRID_MARGIN_DB = 0.1, 30.0
 """Step of the grid of thresholds (dB), and its reach below the lowest level and above the highest level or the cap.
-Chosen: the step is far below the width of an interval."""
+Both chosen: the step is far below the width of an interval."""
 QUADRATURE_NODES = 7
 """Number of nodes of the Gauss-Hermite quadrature over slopes, and of that over criteria. Chosen."""
 EQUAL_LOG_LIKELIHOOD = 1e-9
-"""Difference of log-likelihoods below which they count as equal."""
+"""Difference of log-likelihoods below which they count as equal. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,33 +58,35 @@ class Nuisance:
 
 
 @dataclass(frozen=True, slots=True)
-class RunLikelihood:
-    """Threshold of a participant at a frequency by the answers there, in dB re 1 N. The interval: from the lowest to
+class LikelihoodThreshold:
+    """Threshold of a participant at a frequency by the answers of all runs there, in dB re 1 N; the names of the fields
+    are those of the entries of `anova.json`. The interval: from the lowest to
     the highest threshold whose log-likelihood is within half the chi-squared quantile (1 df) of the maximum."""
 
     subject: str
     frequency_hz: float
     trials: int
-    """Number of answers, of all runs of the person at this frequency together."""
+    """Number of answers, of all runs of the participant at this frequency together."""
     db: float | None
-    """Maximum-likelihood estimate. None where it is above the cap: only the lower bound `lower_db` is then reported.
-    Also None where `below` is True: only the upper bound `upper_db` is then reported."""
+    """Maximum-likelihood estimate of the threshold. None where it is above the cap: only the lower bound `lower_db` is
+    then reported. Also None where `below` is True: only the upper bound `upper_db` is then reported."""
     lower_db: float | None
     """Lower end; None: no lower end within `GRID_MARGIN_DB` below the levels played."""
     upper_db: float | None
     """Upper end; None: the answers do not contradict a participant who feels no direction at all, or `db` is None
     because it is above the cap."""
     below: bool
-    """True where the likelihood is highest at the lower end of the grid, as after right answers only."""
+    """Whether the threshold lies below the levels played: True where the likelihood is highest at the lower end of the
+    grid, as after right answers only."""
 
 
-def compute_run_likelihoods(
+def compute_likelihood_thresholds(
     answers: Answers,
     nuisances: Sequence[Nuisance],
     cap_db: float,
     family: Family = Family.WEIBULL,
     confidence: float = 0.95,
-) -> tuple[RunLikelihood, ...]:
+) -> tuple[LikelihoodThreshold, ...]:
     """Compute threshold and interval of each participant at each frequency with answers, in the order of `Answers.run`.
     nuisances: an entry per subject of the answers. cap_db: cap in dB re 1 N. confidence: of the two-sided interval."""
     frequency_count = len(answers.frequencies_hz)
@@ -97,7 +99,7 @@ def compute_run_likelihoods(
         answer_count = int((answers.right + answers.wrong)[answers.run == run_index].sum())
         estimate_and_ends = _find_likelihood_interval(grid_db, log_likelihood, cap_db, confidence)
         run_estimates.append(
-            RunLikelihood(
+            LikelihoodThreshold(
                 answers.subjects[person_index],
                 answers.frequencies_hz[frequency_index],
                 answer_count,
@@ -142,7 +144,7 @@ def _find_likelihood_interval(
     grid_db: FloatArray, log_likelihood: FloatArray, cap_db: float, confidence: float
 ) -> tuple[float | None, float | None, float | None, bool]:
     """Find estimate, lower end, upper end (dB), and whether the maximum is at the lower end of the grid
-    (`RunLikelihood`). grid_db, log_likelihood: (g,)."""
+    (`LikelihoodThreshold`). grid_db, log_likelihood: (g,)."""
     best_db = float(grid_db[log_likelihood.argmax()])
     is_highest_at_low_end, is_above_cap = (
         bool(log_likelihood[0] >= log_likelihood.max() - EQUAL_LOG_LIKELIHOOD),

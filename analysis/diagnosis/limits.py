@@ -48,16 +48,16 @@ LEVELS_TO_STRATIFY = 2  # levels from which each is split; principle: the end of
 LEVELS_TO_HOLD_ONE_BACK = 3
 CHOOSE_SHARE = 0.25  # share of the fitting time, from its end, to choose by where no level can be held back for that
 TEST_SHARE = 0.25  # share of the time, or of each part's motion, from its end, to test by where no segment has a role
-AT_REST = 0.02  # share of a response's range within which it counts as at rest at the end of a part
-LONGEST_TAIL = 0.05  # share of a part: longest rest at its end that needs no other split and gives the rest value
+REST_RANGE_SHARE = 0.02  # share of a response's range within which it counts as at rest at the end of a part
+LONGEST_TAIL_SHARE = 0.05  # share of a part: longest rest at its end that needs no other split and gives the rest value
 STILL_SHARE = 0.01  # share of the mean square of the fitted motion, below which motion is rest and tests nothing
 
 # Which error measure suits (`error_measure_rule`, `closed_loop`). By hand.
 FED_BACK_SHARE = 0.1  # share of the command's rms by which it must differ from the recorded excitation in a closed loop
 # closed loop: responses reduce a command's prediction error from its own past to this share (Granger 1969)
 PREDICTED_SHARE = 0.05
-# share of the longest record: largest time constant of a plant that counts as stable by itself
-SELF_STABLE_DECAY_SHARE = 1 / 3
+# share of the longest record, below which the slowest time constant of a plant lets its free motion decay in it
+LONGEST_DECAY_SHARE = 1 / 3
 SETTLED_CONSTANTS = 5.0  # time constants after which a motion has decayed; principle: exp(-5) is below 1 %
 MOST_OMITTED_SHARE = 0.25  # largest share of a recording that may be left out until an initial motion has decayed
 REST_SHARE = 0.5  # share of a channel's rms, and of the rms of its changes, above which its start is not at rest
@@ -71,7 +71,7 @@ RETUNING_BOUND = 4.0  # standard deviations of the calibration
 # the same for the repeated search, where a mismatch remains (`repeat_with_wider_bound`). Bank 101700, pairs
 WIDER_RETUNING_BOUND = 12.0
 UNSTATED_SHARE = 0.1  # standard deviation without a stated tolerance, relative to the largest parameter at any axis
-UNSTATED_MODES = 0.02  # relative standard deviation of a mode's frequency without a stated tolerance
+UNSTATED_MODE_SHARE = 0.02  # relative standard deviation of a mode's frequency without a stated tolerance
 # relative standard deviation of damping and stiffness, and of mass, of a fitted rigid model
 RIGID_SHARE, RIGID_MASS_SHARE = 0.25, 0.05
 # inertial force of a body that shows none, relative to the force's rms; principle: far below any error
@@ -127,7 +127,7 @@ SHORT_SHARE = 0.7  # share of kept samples above which the whole recording is si
 # Whether a further effect is looked for, and added (`explain`). By hand.
 MOST_EFFECTS = 3  # effects in one explanation
 NOISE_ALONE = 1.05  # error that counts as noise alone
-HELD_OUT_SURPRISE = 1.15  # held-out error of the re-tuned model, from which an effect is searched for in any case
+HELD_OUT_MISMATCH_ERROR = 1.15  # held-out error of the re-tuned model, from which an effect is searched for in any case
 ADDED_SHARE = 0.15  # share of the error above the noise that an effect must remove to be added
 ADDED_GAIN = 0.003  # least gain of an effect to be added
 
@@ -217,12 +217,12 @@ LAW_BLOCKS = 6  # least number of stretches over which held-out errors are compu
 LAW_POWER_KEPT = 0.999  # share of the commands' power within the band in which laws are ranked
 LAW_STARTS_REFINED, LAW_BEAM = 6, 4  # starts whose free parameters are fitted; sums that are kept (beam search)
 LAW_MOST_TERMS = 2  # terms along one axis in one sum; more are added in further rounds
-LAW_MAIN_PART = 0.3  # share of the misfit that one term may leave; with more, a sum is searched for
+LAW_REMAINDER_SHARE = 0.3  # share of the misfit that one term may leave; with more, a sum is searched for
 LAW_NOISE_POWER = 1.1  # held-out error power along an axis, 1 = noise, below which no law is searched for
 LAW_WORTH_SHARE = 0.4  # share of the error left above the noise that a further term must remove
 LAW_AXES_SHARE = 0.3  # share of the largest held-out misfit that a second axis needs to be searched in the same round
-LAW_FITTED = 3  # most sums that are fitted by output error, without a rival of other variables
-LAW_FITTED_WITHIN = 3.0  # largest ratio of the excess error of a fitted sum to that of the best one
+MOST_FITTED_SUMS = 3  # most sums that are fitted by output error, without a rival of other variables
+FITTED_SUM_ERROR_RATIO = 3.0  # largest ratio of the excess error of a fitted sum to that of the best one
 LAW_MOST_ROUNDS = 3  # most laws that are added one after the other
 # relative distance from a simple exponent, and relative increase of the cost, up to which a law is rounded
 LAW_ROUNDING_TOLERANCE = 0.003
@@ -255,11 +255,11 @@ SLEW_REACHED_SHARE = 0.25
 # In which band forces are balanced, and on which samples (`band`, `balances`, `motion`, `blocks`). By hand.
 # largest share of the noise in the mean square of the acceleration: about the relative bias of an estimated mass
 ACCELERATION_NOISE_SHARE = 0.01
-BAND_WIDEST = 0.2  # largest upper end of the band, relative to the sample rate
+HIGHEST_BAND_END_RATIO = 0.2  # largest upper end of the band, relative to the sample rate
 BAND_NARROWEST_CYCLES = 20.0  # least upper end of the band, in cycles per recording
 SECOND_BAND_SHARE = 0.5  # share of the noise-limited band, below which the motion's band is balanced as well
 # share of the samples in which the device moves, below which a second balance uses only these samples
-MOVES_MOST_OF_THE_TIME = 0.5
+MOVING_TIME_SHARE = 0.5
 MOVING_BAND_SHARE = 0.99  # share of the speed's mean square below the upper end of the band in which the device moves
 MOTION_OVERSAMPLED = 4.0  # samples kept per period of the band's upper end
 # periods of the band's upper end that are left out at both ends of a part, where the filter reaches beyond the data
@@ -297,7 +297,7 @@ LEAST_JUDGED_BLOCKS = 4  # least number of test blocks by which laws are judged
 # largest standard deviation of a law's own force, relative to that of the recorded force: a larger one is cancelled by
 # other columns of the regression
 LARGEST_LAW_FORCE = 2.0
-BOOTSTRAP_DRAWS, BOOTSTRAP_SEED = 2000, 1  # resampled blocks of an interval
+BOOTSTRAP_DRAWS, BOOTSTRAP_SEED = 2000, 1  # number of draws of resampled blocks for an interval, and their seed
 BOOTSTRAP_LEVEL = 0.025  # quantile that is an interval's lower end
 
 # How a simulation must confirm the laws that a balance named (`confirm`). By hand.
@@ -404,4 +404,4 @@ NOISE_STRETCHES = 6  # about the number of stretches of a part in which the nois
 REVERSAL_SHARE = 0.05  # share of a gap by which a reading must go back to count as a reversal
 LARGEST_CLOCK_ERROR = 0.05  # largest relative rate error of a clock
 DELAY_STEP = 0.25  # rows between the delays that are tried around the delay of a cross-correlation
-LONGEST_DELAY = 0.3  # largest delay, over the period of the command's median frequency
+LONGEST_DELAY_PERIODS = 0.3  # largest delay, over the period of the command's median frequency
