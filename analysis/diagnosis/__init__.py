@@ -5,7 +5,7 @@ Data pass through `noise`, `data` (measured signals) -> `balance` (regression of
 `contrast` (comparison with clean recordings) -> `forces`, `first_model` (where none is given), `errors` (error of a
 model) -> `localisation` (where the error is) -> `search` (missing effects, run by `search_by_simulation`), `confirm`,
 `reference` -> `discovery` (symbolic regression of laws outside the catalogue) -> `next_experiment`, `result`
-(findings), `real_answer`; each folder uses only those before it. `document` is the format of the answer, `settings`
+(findings), `real_answer`; each folder uses only those before it. `document` is the format of the answer, `limits`
 holds all limits, `types` the shared type aliases, `effect_words` and `unit_wording` the wording. Used by
 `study.workflows.diagnosis` and `study.evaluation`. Begin at `diagnose.py`.
 """

@@ -4,6 +4,7 @@ The view is a full screen, lines, or the present state once. Loaded by its name 
 """
 
 import json
+import shlex
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -28,8 +29,8 @@ def watch(
     session: Annotated[
         str,
         typer.Argument(
-            help="Session folder, or its name in the data folder. Default: the one that changed last; to stop, pause "
-            "or note: the one that runs."
+            help="Session folder, or its name in the data folder. Default: the one that changed last; to pause "
+            "or note: the one that runs; to stop: all that run."
         ),
     ] = "",
     data: DataOption = Path("data"),
@@ -45,11 +46,12 @@ def watch(
 ) -> None:
     """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
     is_request = bool(stop or pause or note or adverse)
-    find_unnamed = _find_running if is_request else _find_last_changed
-    folder = _find_folder(session, data) if session else find_unnamed(data)
     if is_request:
-        _send_requests(folder, stop, pause, ((note, False), (adverse, True)))
-    elif once or as_json:
+        folders = (_find_folder(session, data),) if session else _find_running(data)
+        _send_requests(folders, stop, pause, ((note, False), (adverse, True)))
+        return
+    folder = _find_folder(session, data) if session else _find_last_changed(data)
+    if once or as_json:
         _print_state(folder, as_json)
     elif plain or not (sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()):
         _follow_in_lines(folder)
@@ -80,24 +82,28 @@ def _find_last_changed(data: Path) -> Path:
     return logs[-1].parent.resolve()
 
 
-def _find_running(data: Path) -> Path:
-    """Find the folder of the session in `data` for which a request without a name is: the one that runs, or where none
-    is known to run, the one that changed last. Raises WrongUseError where there is none, or several run: a stop that
-    reached another session would leave the force on, and say that it is off."""
+def _find_running(data: Path) -> tuple[Path, ...]:
+    """Find the folders of the sessions in `data` that run; where none is known to run, that of the session that changed
+    last. Raises WrongUseError where there is none."""
     from study.store.sessions.log_lock import is_log_locked
 
-    running = [log.parent for log in sorted(data.glob(f"*/{LOG_NAME}")) if is_log_locked(log)]
-    if len(running) > 1:
+    running = tuple(log.parent.resolve() for log in sorted(data.glob(f"*/{LOG_NAME}")) if is_log_locked(log))
+    return running or (_find_last_changed(data),)
+
+
+def _require_single(folders: tuple[Path, ...]) -> Path:
+    """Return the only folder. Raises WrongUseError where there are several."""
+    if len(folders) > 1:
         from analysis.wording import conjoin
         from study.errors import WrongUseError
 
         raise WrongUseError(
             "Several sessions are running",
-            f"{conjoin([folder.name for folder in running])} are running in {data}; nothing was sent to any of them.",
-            f"Repeat it with a name, as in: hapteq watch {running[0].name} --stop. If a handle moves: hand off, and "
-            "switch the device off.",
+            f"A pause or a note is for one of them, and {conjoin([folder.name for folder in folders])} are running.",
+            f"Repeat it with the session's folder, such as {shlex.quote(str(folders[0]))}. To end all of them: --stop.",
+            saved="No pause and no note was sent.",
         )
-    return running[0].resolve() if running else _find_last_changed(data)
+    return folders[0]
 
 
 def _show_screen(folder: Path) -> None:
@@ -153,22 +159,46 @@ def _follow_in_lines(folder: Path) -> None:
         clock.sleep(PLAIN_UPDATE_INTERVAL_S)
 
 
-def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
-    """Send the requests to the session in the order stop, notes, pause. notes: text (an empty one is not sent), and
-    whether it is an adverse event."""
+def _send_requests(folders: tuple[Path, ...], stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
+    """Send the requests in the order stop, notes, pause: the stop to all sessions, because a handle must not go on
+    moving where the name was left out; the others to a single session. notes: text (an empty one is not sent), and
+    whether it is an adverse event. Raises WrongUseError for notes or a pause to several sessions."""
     from study.cli.note import write_note
-    from study.session.watching.requests import PauseAsked, StopAsked
+    from study.session.watching.requests import PauseAsked
     from study.store.sessions.archive import SessionFolder
 
-    session = SessionFolder(folder)
     if stop:
-        _send_request(session, StopAsked("experimenter"), "The force is off and the sitting ends.")
-        typer.echo(f"Continue with: {_format_resume_command(session)}", err=True)
+        _stop_all(tuple(SessionFolder(folder) for folder in folders))
+    if not (pause or any(text for text, _ in notes)):
+        return
+    session = SessionFolder(_require_single(folders))
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)
     if pause:
         _send_request(session, PauseAsked("experimenter"), "Paused. The participant continues at their own screen.")
+
+
+def _stop_all(sessions: tuple["SessionFolder", ...]) -> None:
+    """Stop the sessions at the same time, each also where another does not respond. Raises the last StudyError."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    from study.errors import StudyError
+    from study.session.watching.requests import StopAsked
+
+    def stop(session: "SessionFolder") -> StudyError | None:
+        """Stop one session; returns the error where that fails."""
+        try:
+            _send_request(session, StopAsked("experimenter"), f"{session.name}: the force is off, the sitting ends.")
+        except StudyError as error:
+            return error
+        typer.echo(f"Continue with: {_format_resume_command(session)}", err=True)
+        return None
+
+    with ThreadPoolExecutor(len(sessions)) as pool:
+        errors = [error for error in pool.map(stop, sessions) if error is not None]
+    if errors:
+        raise errors[-1]
 
 
 def _send_request(session: "SessionFolder", request: "Request", confirmation: str) -> None:

@@ -110,7 +110,9 @@ def judge_laws(search: StructureSearch) -> Balance:
     candidates = tuple(entry for entry in search.ranked if not _find_shared_channels(regression, entry.laws))
     best = min(candidates, key=lambda structure: structure.error, default=search.linear)
     simpler_balance = judge_structure(search, choose_simplest_structure(replace(search, ranked=candidates, best=best)))
-    return simpler_balance if len(simpler_balance.named) > len(balance.named) else balance
+    other_names = {law.law.key for law in balance.named if law.law.effect not in find_family("coulomb_friction")}
+    has_more = len(simpler_balance.named) > len(balance.named)
+    return simpler_balance if has_more and other_names <= {law.law.key for law in simpler_balance.named} else balance
 
 
 def _find_shared_channels(regression: Regression, law_indices: Sequence[int]) -> set[int]:

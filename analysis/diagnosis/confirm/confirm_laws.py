@@ -228,7 +228,7 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
                 "linear": np.inf,
             }[parameter.scale]
             if any_suffices or parameter.none is not None:
-                undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance)
+                undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance < np.inf)
             if claim.effect.simpler and parameter.scale == "signed":
                 zero_by_name[parameter.name] = INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance
         if index >= constant_count and (

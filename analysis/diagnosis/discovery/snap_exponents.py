@@ -104,7 +104,7 @@ def _drop_short_lag(law: Law, sample_s: float) -> Law:
 
 def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
     """Round exponents near half or whole numbers (0.5 at least) to these in the formula: within their 95 % interval, or
-    relatively within the tolerance of `settings`; where no exponent changes, simplify the soft limit. errors: standard
+    relatively within the tolerance of `limits`; where no exponent changes, simplify the soft limit. errors: standard
     errors of their logarithms."""
     simplified = law
     for index, role in sorted(find_parameter_roles(law.tree).items(), reverse=True):

@@ -147,8 +147,8 @@ def fit_first_linear_model(
 
 def _find_stated_band(recordings: Sequence[Recording]) -> tuple[float, float] | None:
     """Find the band in Hz that all recordings state as usable (`meta`, key "band_hz"), as the noise of an accelerometer
-    hides the response at low frequencies; None where none states one, or their bands have no common part. Raises
-    NothingToDiagnoseError where a value is not two rising frequencies."""
+    hides the response at low frequencies; None where none states one. Raises NothingToDiagnoseError where a value is
+    not two rising frequencies, or the bands have no common part."""
     bands = [band for recording in recordings if (band := recording.meta.get("band_hz")) is not None]
     for band in bands:
         is_pair = isinstance(band, Sequence) and len(band) == 2
@@ -159,7 +159,11 @@ def _find_stated_band(recordings: Sequence[Recording]) -> tuple[float, float] | 
     if not bands:
         return None
     low_hz, high_hz = max(float(band[0]) for band in bands), min(float(band[1]) for band in bands)
-    return (low_hz, high_hz) if low_hz < high_hz else None
+    if not low_hz < high_hz:
+        raise NothingToDiagnoseError(
+            (f"the bands that the recordings state ({bands}) have no common part; diagnose them separately",)
+        )
+    return low_hz, high_hz
 
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:

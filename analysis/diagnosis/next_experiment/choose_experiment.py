@@ -205,7 +205,7 @@ def _compute_deviation_column(
     bench: Bench, rival: Fitted, index: int, experiment: Experiment, rival_signals: FloatArray
 ) -> FloatArray:
     """Compute (n c,): change of the rival's prediction by one standard deviation of a parameter of the model, by its
-    index; backwards where the model is not valid with the step forwards, 0 where neither is. rival_signals: the
+    index; backwards where the model is not valid with the step forwards, NaN where neither is. rival_signals: the
     prediction."""
     for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
         displaced_deviations = rival.deviations.copy()
@@ -213,7 +213,7 @@ def _compute_deviation_column(
         with suppress(MechanicalModelError, np.linalg.LinAlgError):
             signals = _simulate(bench, displaced_deviations, rival.hypothesis, rival.hypothesis.point, experiment)
             return np.asarray((signals - rival_signals) / step)
-    return np.zeros_like(rival_signals)
+    return np.full_like(rival_signals, np.nan)
 
 
 def _retune_rival(

@@ -1,7 +1,7 @@
 """The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it.
 
 Errors are rms errors over rms noise (`FitScore`), or over chance variation where band powers are compared. The limits
-are in `settings`.
+are in `limits`.
 """
 
 from collections.abc import Sequence

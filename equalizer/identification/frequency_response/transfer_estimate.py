@@ -166,7 +166,7 @@ def _check_compatible(recordings: Sequence[Recording]) -> None:
     first_recording = recordings[0]
     for recording_number, recording in enumerate(recordings[1:], start=2):
         for property_name, expected, value in (
-            ("sample rate", f"{float(first_recording.sample_rate_hz)} Hz", f"{float(recording.sample_rate_hz)} Hz"),
+            ("sample rate", f"{first_recording.sample_rate_hz:.12g} Hz", f"{recording.sample_rate_hz:.12g} Hz"),
             ("command channels", _describe_channels(first_recording.command), _describe_channels(recording.command)),
             ("response channels", _describe_channels(first_recording.response), _describe_channels(recording.response)),
         ):

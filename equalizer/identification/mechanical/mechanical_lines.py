@@ -164,15 +164,17 @@ def split_fit_and_test(
     recordings: Sequence[Recording],
 ) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
     """Split the driven segments into those to fit and those held out for a test. Held out are the segments with the
-    role "test"; where all or none of them have it, the last of more than 2 m segments (m commands), or the last third
-    of a single segment that is not periodic, else none."""
+    role "test"; where all segments or no driven ones have it, the last of more than 2 m segments (m commands), or the
+    last third of a single segment that is not periodic, else none."""
     driven_segments = [
         (recording, segment) for recording in recordings for segment in _iterate_driven_segments(recording)
     ]
     test_segments = [(recording, segment) for recording, segment in driven_segments if segment.role == "test"]
     fit_segments = [(recording, segment) for recording, segment in driven_segments if segment.role != "test"]
-    if (test_segments and fit_segments) or not driven_segments:
+    if test_segments and any(segment.role != "test" for recording in recordings for segment in recording.segments):
         return fit_segments, test_segments
+    if not driven_segments:
+        return [], []
     fit_segments = driven_segments
     if len(fit_segments) > 2 * fit_segments[0][0].command.samples.shape[1]:
         return fit_segments[:-1], fit_segments[-1:]

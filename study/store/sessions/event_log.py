@@ -41,10 +41,13 @@ class EventLog:
     def create(cls, path: Path) -> "EventLog":
         """Create an empty log. Raises StudyError where it exists or cannot be created, or another program has locked
         it."""
+        descriptor = -1
         try:
             descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
             sync_folder(path.parent)
         except OSError as problem:
+            if descriptor >= 0:
+                os.close(descriptor)
             raise StudyError(
                 "The session log cannot be made",
                 f"{path.name} in {path.parent.name}: {problem.strerror}.",

@@ -49,7 +49,8 @@ class WithdrawalIntent:
 
 
 def write_intent(data_folder: Path, intent: WithdrawalIntent) -> None:
-    """Write the intent, replacing an earlier one, and sync it to the disk. Raises CannotWriteError where that fails."""
+    """Write the intent, replacing an earlier one, and sync it to the disk. Raises CannotWriteError or NotSyncedError
+    where that fails."""
     path = locate_withdrawal_record(data_folder, intent.subject)
     write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
 
@@ -75,7 +76,7 @@ def read_intent(data_folder: Path, subject: str) -> WithdrawalIntent | None:
 
 def write_tombstone(folder: SessionFolder, withdrawn_utc: str, participant: SessionParticipant | None) -> None:
     """Write the tombstone into the session's folder; an existing one is unchanged. participant: None if it is not
-    known. Raises CannotWriteError where it cannot be written."""
+    known. Raises CannotWriteError or NotSyncedError where it cannot be written."""
     if not is_real_file(folder.tombstone):
         document = {
             "session": folder.name,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import CannotWriteError, NotSyncedError
 from study.store.disk.real_folder import is_real_file
 from study.store.sessions.archive import FOLDER_PATTERN
 
@@ -43,7 +43,7 @@ def note_written_folder(source: Path, folder: Path, even_if_searched: bool = Fal
     if is_searched or folder in noted_folders:
         return
     text = "".join(str(path).replace("\n", LINE_BREAK_REPLACEMENT) + "\n" for path in (*noted_folders, folder))
-    with suppress(CannotWriteError):
+    with suppress(CannotWriteError, NotSyncedError):
         # fsencode keeps the bytes of a name as the system has them: they need not be UTF-8.
         write_atomically(data_folder / WRITTEN_ELSEWHERE_NAME, os.fsencode(text), overwrite=True)
 

@@ -75,12 +75,12 @@ class ScreenLink:
 
     def wait_for_reply(self, timeout_s: float) -> Reply | None:
         """Wait for the next reply, of any number; None if no reply came within `timeout_s` (s). Raises
-        KeyboardInterrupt if the screen's process has ended."""
-        if self.ended:
-            raise KeyboardInterrupt
+        KeyboardInterrupt if the screen's process has ended and no reply is left, such as a withdrawal sent before."""
         try:
-            return self._replies.get(timeout=timeout_s)
+            return self._replies.get(timeout=0.0 if self.ended else timeout_s)
         except Empty:
+            if self.ended:
+                raise KeyboardInterrupt from None
             return None
 
     def drop_replies(self) -> None:

@@ -70,12 +70,13 @@ def export_study(
     `out_folder` exists and is not an empty folder, or cannot be written."""
     require_new_folder(out_folder)
     metadata, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
+    # Before the folder exists, so that a withdrawal names it even if the program ends here.
+    note_written_folder(data, out_folder, even_if_searched=True)
     with create_new_folder(out_folder) as folder:
         files = WRITERS[form](
             folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), metadata, answers
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
-    note_written_folder(data, out_folder, even_if_searched=True)
     return ExportResult(out_folder, names, len(collected.trials), collected.exclusions)
 
 

@@ -81,7 +81,8 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     # Notes that were taken since the log was last written are logged. `_run_actions` has sealed a finished session
     # before the goodbye, so that it is sealed even if the program ends there; later notes get a further seal. A session
     # that was closed without being finished (refusal, exclusion) is sealed here for the first time.
-    session_end = replace(session_end, state=write_notes(session_end.state, sitting))
+    if not session_end.withdrawn:  # else the log is erased, and a full disk must not hide the withdrawal
+        session_end = replace(session_end, state=write_notes(session_end.state, sitting))
     if session_end.state.closed:
         seal_log(sitting.folder.log)
     return session_end
@@ -211,10 +212,10 @@ def _log_sitting_end(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
 
 
 def _end_withdrawn_sitting(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
-    """Log and return the end of a sitting whose participant withdrew. Returned also where the log cannot be written:
-    the data are erased, and the withdrawal must not be lost."""
+    """Log and return the end of a sitting whose participant withdrew. Returned also where the log cannot be written,
+    and after an interruption: the data are erased, and the withdrawal must not be lost."""
     session_end = SessionEnd(outcome.state, outcome.end_reason)
-    with contextlib.suppress(StudyError):
+    with contextlib.suppress(StudyError, KeyboardInterrupt):
         session_end = _log_sitting_end(outcome, sitting)
     return replace(session_end, withdrawn=True)
 

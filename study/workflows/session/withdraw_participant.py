@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from study.errors import StudyError, WrongUseError
+from study.store.disk.file_errors import CannotWriteError, NotSyncedError
 from study.store.disk.real_folder import OpenedFolder, is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, locate_withdrawal_record
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
@@ -108,6 +109,9 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
             data_folder.sync()
     except OSError as problem:
         raise _make_incomplete_error(data, withdrawal, problem) from problem
+    except (CannotWriteError, NotSyncedError) as failure:
+        cause = failure.__cause__ if isinstance(failure.__cause__, OSError) else OSError(str(failure))
+        raise _make_incomplete_error(data, withdrawal, cause) from failure
 
 
 def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:

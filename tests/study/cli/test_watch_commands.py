@@ -91,7 +91,7 @@ def test_plain_lines_end_with_the_sitting(capsys, data):
 @pytest.mark.parametrize(
     ("option", "asked", "said"),
     [
-        ("--stop", StopAsked("experimenter"), "The force is off and the sitting ends. Continue with: hapteq resume"),
+        ("--stop", StopAsked("experimenter"), "the force is off, the sitting ends. Continue with: hapteq resume"),
         ("--pause", PauseAsked("experimenter"), "Paused."),
     ],
 )
@@ -124,13 +124,27 @@ def test_a_stop_without_a_name_reaches_the_session_that_runs(capsys, data, runni
     assert running == [StopAsked("experimenter")]
 
 
-def test_a_stop_without_a_name_is_refused_where_several_sessions_run(capsys, data, running, newer):
+@pytest.fixture
+def busy(newer):
+    """The newer session runs, too, and takes no request."""
     log = EventLog.reopen(newer / LOG_NAME)
-    code, _out, err = run(capsys, data, "watch", "--stop")
+    yield RequestInbox(newer)
     log.close()
+
+
+def test_a_stop_without_a_name_reaches_all_sessions_that_run(capsys, data, running, busy):
+    code, _out, err = run(capsys, data, "watch", "--stop", "--note", "the handle moved")
     said = " ".join(err.split())
-    assert (code, "S1_001 and S2_001" in said, "hapteq watch S1_001" in said) == (2, True, True)
-    assert running == [] and RequestInbox(newer).take() == ()
+    assert (code, "S1_001: the force is off" in said, "S2_001 accepted no request" in said) == (1, True, True)
+    assert (running, busy.take()) == ([StopAsked("experimenter")], (StopAsked("experimenter"),))
+
+
+@pytest.mark.parametrize("request_", [("--pause",), ("--note", "lower chair")])
+def test_a_pause_or_note_without_a_name_is_refused_where_several_sessions_run(capsys, data, running, busy, request_):
+    code, _out, err = run(capsys, data, "watch", *request_)
+    said = " ".join(err.split())
+    assert (code, "S1_001 and S2_001 are running" in said) == (2, True)
+    assert (running, busy.take()) == ([], ())
 
 
 def test_after_a_stop_the_command_names_the_real_device(capsys, data, running, monkeypatch):

@@ -44,3 +44,9 @@ def test_the_model_is_fitted_in_the_stated_band(recording):
 def test_a_band_that_is_none_is_refused(recording, band):
     with pytest.raises(NothingToDiagnoseError, match="two frequencies in Hz, the lower one first"):
         fit_first_linear_model([replace(recording, meta={"band_hz": band})], lambda share: None)
+
+
+def test_bands_without_a_common_part_are_refused(recording):
+    recordings = [replace(recording, meta={"band_hz": band}) for band in ([5.0, 20.0], [30.0, 400.0])]
+    with pytest.raises(NothingToDiagnoseError, match="have no common part; diagnose them separately"):
+        fit_first_linear_model(recordings, lambda share: None)

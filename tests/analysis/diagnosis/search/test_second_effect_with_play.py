@@ -183,7 +183,7 @@ def test_a_search_for_play_that_ends_early_is_reported(monkeypatch, calls, said)
     fitting = SimpleNamespace(chosen=SimpleNamespace(floors=()))
     settings = SimpleNamespace(time_left=CountedBudget(calls))
     search = search_by_simulation._ImpactSearch(fitting, CATALOGUE, settings, lambda said, share: None)
-    context, explanation = SimpleNamespace(certain=()), SimpleNamespace(steps=())
+    context, explanation = SimpleNamespace(certain=(), guard=Guard()), SimpleNamespace(steps=())
     result = search.explain_at_end(SearchResult(context, explanation, Judgement("unexplained", named=False)))
     assert (result.judgement.verdict, result.remarks) == ("unexplained", said)
 

@@ -25,3 +25,14 @@ def test_a_list_that_cannot_be_read_is_not_replaced(tmp_path):
     assert read_written_folders(tmp_path / "data") == ()
     with list_path.open("rb") as file:
         assert file.readline() == os.fsencode(tmp_path / "old") + b"\n"
+
+
+def test_a_list_whose_folder_cannot_be_synced_ends_nothing(tmp_path, monkeypatch):
+    (tmp_path / "data").mkdir()
+
+    def fail(folder):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr("study.store.disk.atomic_write.sync_folder", fail)
+    note_written_folder(tmp_path / "data", tmp_path / "out")
+    assert read_written_folders(tmp_path / "data") == (tmp_path / "out",)

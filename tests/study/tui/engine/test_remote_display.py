@@ -212,6 +212,17 @@ def test_a_withdrawal_that_was_sent_while_a_stop_came_counts(screen, reply, deci
     assert screen.display.pause(PauseNotice("a reason", 3), lambda: False) is decision
 
 
+def test_a_reply_that_was_sent_before_the_screen_ended_is_not_lost(screen):
+    screen.fall_silent()
+    time.sleep(0.15)
+    screen.pipe.send(Reply(1, AfterPause.WITHDRAW))
+    screen.pipe.close()
+    assert screen.link.wait_for_command() is None
+    assert screen.link.wait_for_reply(1.0) == Reply(1, AfterPause.WITHDRAW)
+    with pytest.raises(KeyboardInterrupt):
+        screen.link.wait_for_reply(1.0)
+
+
 def test_an_engine_that_understands_nothing_any_more_stops_its_device_and_ends(screen, capfd):
     stopped = threading.Event()
     screen.link.stop_device = stopped.set
