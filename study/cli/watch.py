@@ -215,12 +215,16 @@ def _format_resume_command(session: "SessionFolder") -> str:
     because a stop must not depend on that."""
     from study.errors import StudyError
     from study.session.facts.events import SessionOpened
-    from study.session.views.resume_command import SIMULATED_DEVICE, find_device_option, format_resume_command
+    from study.session.views.resume_command import (
+        SIMULATED_DEVICE,
+        format_logged_resume_command,
+        format_resume_command,
+    )
     from study.store.sessions import event_log
 
-    device_name = SIMULATED_DEVICE
     with suppress(StudyError, OSError):
         session_opened = event_log.read_opening(session.log)
         if isinstance(session_opened, SessionOpened):
-            device_name = find_device_option(session_opened.device.name, session_opened.device.simulated)
-    return format_resume_command(str(session.path), device_name)
+            device = session_opened.device
+            return format_logged_resume_command(str(session.path), device.name, device.simulated)
+    return format_resume_command(str(session.path), SIMULATED_DEVICE)

@@ -31,6 +31,8 @@ from analysis.diagnosis.limits import FREE_LAW_GAIN, MOST_SUMMED_LAWS, PLAINER_S
 
 MOST_COMPARED_SUMS = 12
 """Number of sums whose nonlinear parameters are refined. Chosen: there are eleven free laws."""
+CONTACTS = {"end_stop", "contact_beyond_position"}
+"""Laws of a contact that closes at a position, in the catalogue and outside."""
 
 
 def compare_with_free_laws(balance: Balance, excluded: frozenset[str]) -> Balance:
@@ -80,7 +82,7 @@ def _list_sums(regression: Regression, chosen: Structure) -> tuple[Regression, l
         for law_index, law in enumerate(regression.laws)
         if law.effect in FREE_LAWS
         for kept_laws in ((), chosen.laws, *(_omit_law(chosen.laws, omitted) for omitted in range(len(chosen.laws))))
-        if len(kept_laws) < MOST_SUMMED_LAWS
+        if len(kept_laws) < MOST_SUMMED_LAWS and not any(_close_together(regression, law_index, k) for k in kept_laws)
     }
     best_by_effects: dict[tuple[str, ...], Structure] = {}
     for laws in laws_of_sums:
@@ -92,6 +94,18 @@ def _list_sums(regression: Regression, chosen: Structure) -> tuple[Regression, l
     promising = [s for s in sums if None not in fit_values(regression, s.laws)]
     refined = refine_parameters(regression, promising)
     return refined, [_cross_validate_sum(refined, structure.laws) for structure in promising]
+
+
+def _close_together(regression: Regression, first_index: int, second_index: int) -> bool:
+    """Whether two laws (indices) are contacts along one channel that are closed at the same samples: the second would
+    only correct the place of the first, whose refinement takes finite steps, and share its stiffness."""
+    first, second = regression.laws[first_index], regression.laws[second_index]
+    if not {first.effect, second.effect} <= CONTACTS or first.channel != second.channel:
+        return False
+    return any(
+        bool(np.any(first.make_columns(motion, first.numbers) * second.make_columns(motion, second.numbers)))
+        for motion in regression.motions
+    )
 
 
 def _omit_law(laws: tuple[int, ...], omitted: int) -> tuple[int, ...]:

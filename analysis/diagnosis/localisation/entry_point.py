@@ -8,7 +8,7 @@ entries are nearly parallel.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -169,8 +169,10 @@ def rank_entries(
         explained_shares = 1 - unexplained_powers[index][is_above_noise] / total_power[is_above_noise]
         entry = entries[index]
         share = float(np.median(explained_shares))
-        entry_score = EntryScore(entry.name, entry.place, entry.axis, scores[index], share, p_value, equivalents)
-        ranking.append(replace(entry_score, is_position_error=entry.is_position_error))
+        place = entry.name, entry.place, entry.axis
+        ranking.append(
+            EntryScore(*place, scores[index], share, p_value, equivalents, is_position_error=entry.is_position_error)
+        )
     return EntryPoint(tuple(ranking), sensor_comparison, int(is_above_noise.sum()))
 
 

@@ -13,6 +13,12 @@ def find_device_option(logged_name: str, simulated: bool) -> str:
     return SIMULATED_DEVICE if simulated else logged_name.replace(".", "")
 
 
+def format_logged_resume_command(session_path: str, logged_name: str, simulated: bool) -> str:
+    """Format the command `hapteq resume` on the device that the session's log names. session_path: path of the
+    session's folder."""
+    return format_resume_command(session_path, find_device_option(logged_name, simulated))
+
+
 def format_resume_command(session_path: str, device_name: str) -> str:
     """Format the command `hapteq resume`. session_path: path of the session's folder; device_name: as `open_device`
     takes it. Both are quoted for a POSIX shell where needed."""

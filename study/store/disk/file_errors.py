@@ -72,6 +72,7 @@ class CannotWriteError(StudyError):
             saved="Nothing was changed: no half-written file remains, and existing files are unchanged.",
             do_now=remedy,
         )
+        self.problem = problem
 
 
 class NotSyncedError(StudyError):
@@ -84,6 +85,7 @@ class NotSyncedError(StudyError):
             saved=f"{path.name} is in place and complete.",
             do_now="Check the disk and the permissions of the folder, and keep a copy elsewhere.",
         )
+        self.problem = problem
 
 
 class AlreadyExistsError(StudyError):

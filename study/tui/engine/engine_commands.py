@@ -21,6 +21,7 @@ from study.errors import StudyError, WrongUseError
 from study.local_clock import convert_to_machine_zone
 from study.session.views.archive_views import HomeView
 from study.session.views.forms import make_words
+from study.session.views.resume_command import format_logged_resume_command
 from study.store.disk.privacy import format_data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
@@ -126,12 +127,12 @@ class EngineCommands:
         simulated participant."""
         folder = find_session(command.session, Path(command.data))
         folded_session = fold_session(folder)
-        observer = folded_session.state.opened.observer
+        observer, device = folded_session.state.opened.observer, folded_session.state.opened.device
         if observer is not None:
             raise WrongUseError(
                 "This session belongs to a simulated participant",
                 f"'{observer}' began {folder.name}; a person's answers must not be added to it.",
-                f"Continue it with: hapteq resume {folder.path}",
+                "Continue it with: " + format_logged_resume_command(str(folder.path), device.name, device.simulated),
                 saved="Nothing was changed.",
             )
         if folder_warning := format_data_folder_warning(folder.path.parent):

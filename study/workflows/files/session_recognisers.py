@@ -30,14 +30,12 @@ from study.store.sessions.withdrawal_files import (
     describe_unfinished_withdrawal,
 )
 from study.workflows.files.file_content import FileContent
+from study.workflows.results.analysis_files import STATISTICS_FORMAT, STATISTICS_VERSION
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import find_result_problems
 
 SESSION_KIND = "session"
 """Name of a session folder or log in messages."""
-
-STATISTICS_FORMAT, STATISTICS_VERSION = "hapteq-anova", 1
-"""Name and version of the format of the statistics of a study, `study_analysis.make_anova_document`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,8 @@ FIGURE_NAME_PATTERNS = (
 )
 """Name patterns of the figures of an analysis."""
 
+STATISTICS_FORMAT, STATISTICS_VERSION = "hapteq-anova", 1
+"""Name and version of the format of the statistics, of `study_analysis.make_anova_document`."""
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
 """Names of the document with the statistics and of the HTML report."""
 ANALYSIS_FILE_NAMES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
@@ -38,7 +40,7 @@ def is_analysis_of(folder: Path, log: Path) -> bool:
     if not (folder / PAGE_NAME).is_file():
         return False
     try:
-        provenance = read_json(folder / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
+        provenance = read_json(folder / STATISTICS_NAME, STATISTICS_FORMAT, STATISTICS_VERSION).get("provenance")
         parents = provenance.get("parents") if isinstance(provenance, dict) else None
         return isinstance(parents, list) and {"file": log.name, "sha256": compute_sha256(log)} in parents
     except StudyError:

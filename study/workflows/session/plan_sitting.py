@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.session.views.resume_command import find_device_option, format_resume_command
+from study.session.views.resume_command import format_logged_resume_command
 from study.store.disk.privacy import format_data_folder_warning
 from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, check_subject, list_session_folders
@@ -97,4 +97,4 @@ def plan_sitting(
 def _format_resume_command(folder: SessionFolder) -> str:
     """Format the command that continues an unfinished session on the device on which it was begun."""
     device = fold_session(folder).state.opened.device
-    return format_resume_command(str(folder.path), find_device_option(device.name, device.simulated))
+    return format_logged_resume_command(str(folder.path), device.name, device.simulated)

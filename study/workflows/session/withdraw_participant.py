@@ -110,8 +110,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
     except OSError as problem:
         raise _make_incomplete_error(data, withdrawal, problem) from problem
     except (CannotWriteError, NotSyncedError) as failure:
-        cause = failure.__cause__ if isinstance(failure.__cause__, OSError) else OSError(str(failure))
-        raise _make_incomplete_error(data, withdrawal, cause) from failure
+        raise _make_incomplete_error(data, withdrawal, failure.problem) from failure
 
 
 def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:

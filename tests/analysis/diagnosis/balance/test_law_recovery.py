@@ -33,7 +33,7 @@ NUMBERS = {
 PD = (600.0, 10.0)
 BY_FEW_GRIPS = ("stribeck_friction", "position_dependent_friction")
 """In an open loop the axis sticks at each turn: they are then told from dry friction as a class alone."""
-OPEN = ("coulomb_friction", "cogging")
+OPEN = ("coulomb_friction", "cogging", "end_stop")
 CLOSED = ("hardening_stiffness",)
 IMPOSED = ("stribeck_friction", "position_dependent_friction")
 
