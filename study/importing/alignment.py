@@ -28,13 +28,15 @@ class Logger:
     """Times of its samples."""
 
     def compute_values(self, expression: str) -> Value:
-        """Compute the values (n,) of an expression over the arrays. Raises ImportProblemError for another shape, or a
-        length other than that of the clock's time stamps."""
+        """Compute the values (n,) of an expression over the arrays. Raises ImportProblemError for another shape, no
+        value, or a length other than that of the clock's time stamps."""
         values = self.namespace.compute_value(expression, self.base)
         if values.ndim != 1:
             raise ImportProblemError(
                 f"clock '{self.clock.name}': {expression} has the shape {values.shape}, not one row"
             )
+        if not len(values):
+            raise ImportProblemError(f"clock '{self.clock.name}': {expression} holds no samples")
         if self.base.stamps_s is not None and len(values) != len(self.base.stamps_s):
             raise ImportProblemError(
                 f"clock '{self.clock.name}': {expression} has {len(values)} samples, "

@@ -5,7 +5,7 @@ onto one time grid (`resample_part`). The parts are then concatenated and conver
 segments, they are found if the excitation repeats. Begin at `build_recording`.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,9 @@ from study.importing.map_format.import_map import ChannelMap, ComputedMap, Impor
 from study.importing.map_format.map_errors import ImportProblemError, ImportRefusedError
 from study.importing.map_format.map_files import PartFiles, assign_files
 from study.importing.map_format.map_segments import place_segments
+from study.importing.map_remarks import list_name_remarks, list_unit_remarks, list_unused_segments
 from study.importing.part_signals import ChannelKey, PartSignals, resample_part
-from study.importing.time_base import PLACEHOLDER_RATE_HZ, drop_doubled_rows, make_time_base
+from study.importing.time_base import drop_doubled_rows, make_time_base
 
 _MAX_LISTED_PARTS = 3
 """Largest number of parts that a sentence names. Chosen."""
@@ -106,7 +107,8 @@ def build_recording(
         recording,
         (
             *notes,
-            *_list_unit_remarks(import_map),
+            *list_unit_remarks(import_map),
+            *list_unused_segments(import_map, [(part.file.name, part.part.prefix) for part in planned_parts]),
             *filter(None, (_describe_rate_problem(recording), repetition_remark)),
         ),
     )
@@ -141,7 +143,7 @@ def _build_part(
             arrays_by_path[path], {**import_map.let, **files.part.let}, files.part.prefix, budget
         )
         reduced_namespace, remark = drop_doubled_rows(clock, namespace)
-        notes += [remark] if remark else []
+        notes += [*list_name_remarks(import_map, clock, namespace), *filter(None, (remark,))]
         loggers.append(Logger(clock, reduced_namespace, make_time_base(clock, reduced_namespace)))
 
     def report_sentence(sentence: str) -> None:
@@ -184,20 +186,6 @@ def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     except UnknownUnitError as error:
         raise ImportProblemError(f"channel '{channel.name}': {error}") from error
     return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or find_quantity(unit.si))
-
-
-def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
-    """List remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
-    for computed in (entry for entry in import_map.computed if entry.role != "helper"):
-        yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or NO_UNIT}."
-    channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
-    unitless = [
-        f"{entry.role} '{entry.name}'" for entry in channels if entry.role != "helper" and not entry.unit.strip()
-    ]
-    if unitless:
-        yield f"No unit is stated for {', '.join(unitless)}: the numbers are kept as they are (unit {NO_UNIT})."
-    if any(clock.unknown for clock in import_map.clock):
-        yield f"No time is known: samples are numbered, at {PLACEHOLDER_RATE_HZ:g} Hz."
 
 
 def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]) -> Recording:

@@ -22,7 +22,14 @@ from study.importing.arrays.read_arrays import (
     read_arrays,
 )
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
-from study.importing.map_format.import_map import ChannelMap, ClockMap, CsvMap, ImportMap, PartMap
+from study.importing.map_format.import_map import (
+    LONGEST_CHANNEL_NAME,
+    ChannelMap,
+    ClockMap,
+    CsvMap,
+    ImportMap,
+    PartMap,
+)
 from study.importing.map_format.map_errors import ImportRefusedError
 from study.importing.map_format.signal_words import (
     ParsedName,
@@ -32,11 +39,10 @@ from study.importing.map_format.signal_words import (
     may_be_imposed_motion,
     parse_signal_name,
     propose_roles,
-    split_bracketed_unit,
     split_unit_at_end,
     strip_units,
 )
-from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, find_rates, find_surplus_arrays
+from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, find_rates, find_surplus_arrays, read_factor
 
 _TIME_NAME = re.compile(
     rf"((elapsed|running|test|total|relative|absolute|system|sample)[ _]?)?({'|'.join(sorted(CLOCK_WORDS))}|time stamp)"
@@ -185,7 +191,18 @@ def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
             for question in list_open_roles([column for column in columns if not _is_time(column)])
         ),
         *(f"several columns are called '{name}'" for name in duplicates),
+        *(
+            f"the name '{name}' has {len(name)} characters; that of a channel has up to {LONGEST_CHANNEL_NAME}"
+            for name in strip_units(columns)
+            if len(name) > LONGEST_CHANNEL_NAME
+        ),
     )
+
+
+def describe_header_problems(arrays: Arrays) -> str:
+    """Describe, in clauses, what the names do not determine, and the columns that were left out: their names may."""
+    omissions = (note.rstrip(".").replace("Left out", "left out") for note in arrays.notes if "Left out" in note)
+    return "; ".join((*find_header_problems(arrays), *omissions))
 
 
 def _split_time_columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
@@ -207,12 +224,11 @@ def _is_time(column: ParsedName) -> bool:
 
 
 def _select_rates(arrays: Arrays) -> list[str]:
-    """Select the expressions for the sample rate (Hz): single numbers in hertz, or else the inverse of a step in
-    seconds."""
+    """Select the expressions for the sample rate (Hz): single numbers with a unit of frequency, or else the inverse of
+    a step with a unit of time."""
     rate_names = find_rates(arrays)
-    units = {rate: split_bracketed_unit(name)[1] or split_unit_at_end(name)[1] for rate, name in rate_names.items()}
-    rates = [rate for rate, name in rate_names.items() if rate == name and units[rate] == "Hz"]
-    return rates or [rate for rate, name in rate_names.items() if rate != name and units[rate] == "s"]
+    rates = [rate for rate, name in rate_names.items() if read_factor(name, "Hz")]
+    return rates or [rate for rate, name in rate_names.items() if read_factor(name, "s")]
 
 
 def _find_first_time_problem(

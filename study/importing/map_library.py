@@ -17,7 +17,7 @@ from study.importing.arrays.read_arrays import read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import find_names
 from study.importing.expressions.namespace import make_namespace
-from study.importing.header_map import find_header_problems, make_header_map, read_without_map
+from study.importing.header_map import describe_header_problems, make_header_map, read_without_map
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggest_name
 from study.importing.map_format.map_files import assign_files
@@ -87,12 +87,22 @@ def read_map(name: str) -> MapFile:
     return MapFile(path.stem, parse_map(text, path), text, path)
 
 
+def list_data_files(folder: Path) -> list[Path]:
+    """List the files of a folder that may hold data, sorted by name: not maps, notes, nor hidden ones, which file
+    managers write (`.DS_Store`, `._run1.csv`). Raises OSError where the folder cannot be listed."""
+    return sorted(
+        path
+        for path in folder.iterdir()
+        if path.is_file() and path.suffix.lower() not in NON_DATA_SUFFIXES and not path.name.startswith(".")
+    )
+
+
 def find_maps_for_folder(folder: Path) -> tuple[FoundMap, ...]:
     """Find the maps for the recordings in a folder: those in the folder or, without any, shipped maps that match file
     names and arrays; empty if none matches. A TOML file that cannot be read counts as no map. Raises UnusableFileError
     for an invalid map, OSError where the folder cannot be listed."""
-    paths = sorted(path for path in folder.iterdir() if path.is_file())
-    map_paths = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
+    paths = list_data_files(folder)
+    map_paths = sorted(path for path in folder.glob("*.toml") if path.is_file() and _is_map_file(path))
     if map_paths:
         folder_maps = [read_map(str(path)) for path in map_paths]
         return tuple(found_map for map_file in folder_maps for found_map in _match_recordings(map_file, paths))
@@ -121,10 +131,7 @@ def make_map_from_headers(folder: Path) -> FoundMap:
     """Make a map from headers, for a folder without a map. Raises WrongUseError for no files, for hapteq recordings, or
     for file names that differ by more than numbers; MapNeededError where the header of the first file does not
     suffice; CannotReadError and ImportRefusedError as `read_without_map`; OSError where the folder cannot be listed."""
-    data_paths = sorted(
-        (path for path in folder.iterdir() if path.is_file() and path.suffix not in NON_DATA_SUFFIXES),
-        key=_make_natural_sort_key,
-    )
+    data_paths = sorted(list_data_files(folder), key=_make_natural_sort_key)
     no_map_text = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
     if not data_paths:
         raise _make_ambiguity_error(f"{no_map_text}.", "Give the files.")
@@ -143,7 +150,7 @@ def make_map_from_headers(folder: Path) -> FoundMap:
     import_map = make_header_map(arrays)
     if import_map is None:
         raise MapNeededError(
-            folder.name, f"{no_map_text}; {'; '.join(find_header_problems(arrays))}", make_map_skeleton(arrays)
+            folder.name, f"{no_map_text}; {describe_header_problems(arrays)}", make_map_skeleton(arrays)
         )
     return FoundMap(MapFile(folder.name, import_map, "", folder), tuple(data_paths))
 
@@ -170,10 +177,7 @@ def _is_map_file(path: Path) -> bool:
 def _match_recordings(map_file: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
     """Match the files to the patterns of a map and yield its recordings: with `separate` one per matching file,
     otherwise one of all matching files, if every pattern matches at least one file."""
-    data_paths = [path for path in paths if path.suffix not in NON_DATA_SUFFIXES]
-    paths_by_pattern = [
-        [path for path in data_paths if fnmatchcase(path.name, pattern)] for pattern in map_file.map.files
-    ]
+    paths_by_pattern = [[path for path in paths if fnmatchcase(path.name, pattern)] for pattern in map_file.map.files]
     matching_paths = tuple(dict.fromkeys(path for pattern_matches in paths_by_pattern for path in pattern_matches))
     if map_file.map.separate:
         yield from (FoundMap(map_file, (path,)) for path in matching_paths)

@@ -4,7 +4,6 @@ Clocks, channels and runs are proposed from names, units, shapes and data; `hold
 Other unknown values are left empty or described in a comment.
 """
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +14,9 @@ from study.importing.arrays.array_groups import RunGroups, find_runs
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import CELL_ENTRY_PREFIX, suggest_conversion
 from study.importing.arrays.read_arrays import Array, Arrays, find_unread_reason
+from study.importing.expressions.expression import quote_name
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
+from study.importing.map_format.map_toml import format_text
 from study.importing.map_format.signal_words import (
     may_be_imposed_motion,
     parse_signal_name,
@@ -29,7 +30,6 @@ from study.importing.surplus_arrays import (
     find_surplus_arrays,
     has_time_line,
     is_growing_time,
-    quote_name,
 )
 
 _FORCE_QUANTITIES = ("force", "torque")
@@ -38,6 +38,8 @@ _MAX_LISTED_RUNS = 4
 """Largest number of arrays of further runs that a comment of the map names; dots stand for the rest. Chosen."""
 _ROLE_SUFFIX = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
+_CONTROL_CHARACTER = re.compile(r"(?!^\n)[\x00-\x1f\x7f]")
+"""A control character of a name in a comment; not the line feed with which a line may begin."""
 _TIME_UNITS = ("s", "ms", "us", "min")
 """Units of time stamps, by the last part of a name."""
 
@@ -45,7 +47,7 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 def make_map_skeleton(arrays: Arrays) -> str:
     """Make the map as TOML text. The device, and an unknown role or unit of time, are empty texts, with which an import
     fails and names the key; an empty unit of a channel stands for a plain number."""
-    return "\n".join(_write_lines(arrays)) + "\n"
+    return "\n".join(_CONTROL_CHARACTER.sub(" ", line) for line in _write_lines(arrays)) + "\n"
 
 
 def _write_lines(all_arrays: Arrays) -> Iterator[str]:
@@ -213,7 +215,7 @@ def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
         yield "\n# Several runs are in the file: their arrays are named without the prefix above."
     for prefix in prefixes:
         yield "\n[[part]]"
-        yield f"prefix = {json.dumps(prefix)}"
+        yield f"prefix = {format_text(prefix)}"
 
 
 def _write_ungrouped_runs(ungrouped_names: Sequence[str], run_groups: RunGroups) -> Iterator[str]:
@@ -229,7 +231,7 @@ def _write_ungrouped_runs(ungrouped_names: Sequence[str], run_groups: RunGroups)
     for prefix, slash, name in (full_name.partition("/") for full_name in ungrouped_names):
         if (stem := _ROLE_SUFFIX.sub("", name)) in name_by_stem:
             definitions_by_run.setdefault(prefix + slash, []).append(
-                f"{name_by_stem[stem]} = {json.dumps(quote_name(name))}"
+                f"{name_by_stem[stem]} = {format_text(quote_name(name))}"
             )
     for prefix, definitions in list(definitions_by_run.items())[-1:]:
         yield f'# Such a run is added by [[part]] with prefix = "{prefix}" and let = {{ {", ".join(definitions)} }}'
@@ -246,15 +248,16 @@ def _write_clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
         suffix = stem.rpartition("_")[2]
         yield "\n[[clock]]"
         if len(clocks) > 1:
-            yield f"name = {json.dumps(name)}"
-        yield f"time = {json.dumps(name)}"
-        yield f'time_unit = {json.dumps(unit or (suffix if suffix in _TIME_UNITS else ""))}            # "s", "ms"'
+            yield f"name = {format_text(name)}"
+        yield f"time = {format_text(name)}"
+        yield f'time_unit = {format_text(unit or (suffix if suffix in _TIME_UNITS else ""))}            # "s", "ms"'
     if clocks:
         return
     yield "\n[[clock]]"
     rates = find_rates(arrays)
     for rate, name in list(rates.items())[:1]:
-        yield f"rate = {json.dumps(rate)}           # in hertz{'' if rate == name else f', {name} in seconds'}"
+        remark = f", {name} in seconds" if rate.startswith("1 / ") else ""
+        yield f"rate = {format_text(rate)}           # in hertz{remark}"
     if not rates:
         yield "# rate_hz = 1000, or unknown = true"
 
@@ -280,13 +283,13 @@ def _write_channel(names: tuple[str, str, str], shape: str, clock: str, role: st
     parsed_name = parse_signal_name(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
-    yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
-    yield f"name = {json.dumps(parsed_name.name if name == header else name)}"
-    yield f"value = {json.dumps(value)}"
+    yield f"role = {format_text(role):20s} # command, response, position, excitation, condition, helper"
+    yield f"name = {format_text(parsed_name.name if name == header else name)}"
+    yield f"value = {format_text(value)}"
     unit, doubt = parsed_name.unit, f"{parsed_name.doubt}; " if parsed_name.doubt else ""
-    yield f'unit = {json.dumps(unit):20s} # {doubt}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
+    yield f'unit = {format_text(unit):20s} # {doubt}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
-        yield f"clock = {json.dumps(clock)}"
+        yield f"clock = {format_text(clock)}"
 
 
 def _describe_shape(shape: tuple[int, ...]) -> str:

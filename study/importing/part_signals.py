@@ -99,6 +99,8 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
         raise ImportProblemError(f"{label}: {channel.value} holds infinite values; a missing sample is NaN")
     if values.ndim == 0:
         return np.full(count or 1, float(values))
+    if not len(values):
+        raise ImportProblemError(f"{label}: {channel.value} holds no samples")
     if count and len(values) != count:
         clock_text = f"clock '{logger.clock.name}'"
         raise ImportProblemError(f"{label}: {channel.value} has {len(values)} samples, but {clock_text} has {count}")

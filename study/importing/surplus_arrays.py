@@ -11,7 +11,8 @@ import numpy as np
 
 from equalizer.signals.units import UnknownUnitError, parse_unit
 from study.importing.arrays.read_arrays import Array, Arrays
-from study.importing.map_format.signal_words import FOREIGN_WORDS, split_bracketed_unit
+from study.importing.expressions.expression import quote_name
+from study.importing.map_format.signal_words import FOREIGN_WORDS, split_bracketed_unit, split_unit_at_end
 
 LEAST_SAMPLES = 16
 """Least number of samples of a signal; arrays with fewer are taken as constants."""
@@ -87,21 +88,26 @@ def _extract_last_part(name: str) -> str:
 
 def find_rates(arrays: Arrays) -> Mapping[str, str]:
     """Find the single numbers that are named as a sample rate or sampling interval; returns the name of the number by
-    the expression for the rate, rates first."""
+    the expression for the rate in hertz, rates first. A number without a unit is in hertz or seconds."""
     single_values = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
-    named_rates = {
-        name: name for name in single_values if _RATE_NAME.fullmatch(" ".join(_split_words(_extract_last_part(name))))
+    named_rates = [
+        name for name in single_values if _RATE_NAME.fullmatch(" ".join(_split_words(_extract_last_part(name))))
+    ]
+    intervals = [name for name in single_values if split_name_words(name) & _SAMPLING_INTERVAL_WORDS]
+    factors = {name: read_factor(name, "Hz") or 1.0 for name in named_rates}
+    return {
+        **{name if factors[name] == 1 else f"{factors[name]:.15g} * {quote_name(name)}": name for name in named_rates},
+        **{f"{1 / (read_factor(name, 's') or 1.0):.15g} / {quote_name(name)}": name for name in intervals},
     }
-    inverse_intervals = {
-        f"1 / {quote_name(name)}": name for name in single_values if split_name_words(name) & _SAMPLING_INTERVAL_WORDS
-    }
-    return {**named_rates, **inverse_intervals}
 
 
-def quote_name(name: str) -> str:
-    """Write the expression of the map language for an array: its name, or `array('name')` where that is no
-    identifier."""
-    return name if name.isidentifier() else f"array('{name}')"
+def read_factor(name: str, si: str) -> float | None:
+    """Read the factor from the unit in a name, in brackets or at its end, to an SI unit; None without such a unit."""
+    try:
+        unit = parse_unit(split_bracketed_unit(name)[1] or split_unit_at_end(name)[1])
+    except UnknownUnitError:
+        return None
+    return unit.factor if unit.si == si else None
 
 
 def _is_all_nan(array: Array) -> bool:

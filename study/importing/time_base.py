@@ -14,6 +14,7 @@ import numpy.typing as npt
 from equalizer.signals.resampling import Samples
 from equalizer.signals.units import UnknownUnitError, parse_unit
 from study.importing.arrays.read_arrays import Array
+from study.importing.expressions.expression import quote_name
 from study.importing.expressions.functions import Value
 from study.importing.expressions.namespace import Namespace, NoTime
 from study.importing.map_format.import_map import ClockMap
@@ -161,7 +162,7 @@ def _make_base_from_stamps(clock: ClockMap, namespace: Namespace) -> TimeBase:
 def _format_stamps_expression(array_name: str, namespace: Namespace) -> str:
     """Format the stamps as an expression that a map can contain: the name of an array that is no identifier is written
     as array('…')."""
-    return f"array('{array_name}')" if array_name in namespace.arrays and not array_name.isidentifier() else array_name
+    return quote_name(array_name) if array_name in namespace.arrays else array_name
 
 
 def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) -> str:

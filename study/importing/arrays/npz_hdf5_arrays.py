@@ -24,6 +24,10 @@ _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compressions that numpy.savez and numpy.savez_compressed write; no other one is read."""
 _CELL_DESCRIPTION = "a cell, which is read where the file was saved with -v7"
 """Description of a Matlab cell, which an HDF5 file stores as references."""
+_OTHER_DESCRIPTION = (
+    "of a type that is not read, such as rows of several columns; each column is read from a dataset of its own"
+)
+"""Description of a dataset of compound, complex or other types."""
 _NON_NUMERIC = np.array(None, dtype=object)
 """Placeholder for the values of HDF5 texts and objects that are listed but not read."""
 
@@ -91,21 +95,17 @@ def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
     """Read datasets by path, as in `run1/force`. transposed: a file of Matlab 7.3, whose dimensions are reversed; names
     then have dots in place of slashes. Texts, cells and objects are replaced by placeholders, except one-dimensional
-    arrays of texts, which may be dates. Left out are datasets without a shape, other types such as compound ones, and
-    names that begin with "#" (internal to Matlab). Raises UnusableFileError where the file cannot be read."""
+    arrays of texts, which may be dates, and other types such as compound ones. Left out are datasets without a shape,
+    and names that begin with "#" (internal to Matlab). Raises UnusableFileError where the file cannot be read."""
     arrays: dict[str, Array] = {}
     with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in iterate_datasets(file):
             if name.startswith("#") or entry.shape is None:
                 continue
-            matlab_class = entry.attrs.get("MATLAB_class", b"")
-            if matlab_class == b"cell" or "MATLAB_object_decode" in entry.attrs:
-                placeholder_text = (
-                    f"an object of the class {matlab_class.decode('utf-8', 'replace')}"
-                    if matlab_class != b"cell"
-                    else _CELL_DESCRIPTION
-                )
-                values = np.array(placeholder_text, dtype=object)
+            if reason := _describe_unread_class(entry):
+                values = np.array(reason, dtype=object)
+            elif entry.attrs.get("MATLAB_empty", 0):
+                values = np.empty(0)  # the dataset holds the dimensions of an empty array
             elif entry.dtype.kind in "fiub":
                 values = np.asarray(entry[()])
             elif h5py.check_string_dtype(entry.dtype) is not None and entry.ndim == 1 and len(entry):
@@ -113,6 +113,16 @@ def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
             elif entry.dtype.kind in "SUO":
                 values = _NON_NUMERIC
             else:
-                continue
+                values = np.array(_OTHER_DESCRIPTION, dtype=object)
             arrays[name.replace("/", ".") if transposed else name] = values.T if transposed else values
     return arrays
+
+
+def _describe_unread_class(entry: Any) -> str:
+    """Describe a dataset of a Matlab class that is not read (cell, text, object); empty for any other dataset."""
+    matlab_class = entry.attrs.get("MATLAB_class", b"")
+    if matlab_class == b"cell":
+        return _CELL_DESCRIPTION
+    if "MATLAB_object_decode" in entry.attrs:
+        return f"an object of the class {matlab_class.decode('utf-8', 'replace')}"
+    return "a text" if matlab_class == b"char" else ""  # stored as the numbers of its characters

@@ -107,10 +107,13 @@ def _has_delimiter_comma(header: str, decimal: str, column_count: int) -> bool:
 
 def _find_marks_with_text_columns(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
     """Find the marks with the most columns of numbers, where other columns may hold words; None if no marks fit. Only
-    the lower half of the rows is used, which is below any header."""
+    the lower half of the rows is used, which is below any header; without lines of words of another width, which may
+    stand below the rows."""
     max_number_columns, marks = 0, None
     for delimiter, decimal in _list_mark_pairs(sample, settings):
-        rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
+        lower_rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
+        width = Counter(map(len, lower_rows)).most_common(1)[0][0]
+        rows = [row for row in lower_rows if len(row) == width or not all(map(is_text, filter(None, row)))]
         columns = list(zip(*rows, strict=True)) if len({len(row) for row in rows}) == 1 else []
         text_columns = frozenset(column for column, fields in enumerate(columns) if any(map(is_text, fields)))
         are_texts = all(is_text(field) or is_empty(field) for column in text_columns for field in columns[column])

@@ -67,9 +67,10 @@ def read_text(path: Path, encoding: str) -> TableText:
 
 
 def _decode(data: bytes, encoding: str) -> str:
-    """Decode strictly. Raises ValueError for an unknown encoding or bytes that are invalid in it."""
+    """Decode strictly, without the byte order mark. Raises ValueError for an unknown encoding or bytes that are invalid
+    in it."""
     try:
-        return data.decode(encoding)
+        return data.decode(encoding).removeprefix("\ufeff")
     except LookupError as error:
         raise ValueError(
             f"there is no encoding '{encoding}'; usual are utf-8, cp1252, {', '.join(_LEGACY_ENCODINGS)}"

@@ -9,6 +9,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from keyword import iskeyword
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,13 @@ def find_names(text: str) -> set[str]:
     function_nodes = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in function_nodes}
     quoted = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
-    return (identifiers | quoted) - {"pi", "clock_s", "rate_hz"}
+    return (identifiers - {"pi", "clock_s", "rate_hz"}) | quoted
+
+
+def quote_name(name: str) -> str:
+    """Write the expression for an array: its name, or `array('name')` where that is no identifier of its own."""
+    is_own_identifier = name.isidentifier() and not iskeyword(name) and name != "pi"
+    return name if is_own_identifier else f"array({name!r})"
 
 
 @lru_cache(maxsize=1024)

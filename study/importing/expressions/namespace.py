@@ -1,5 +1,7 @@
 """Look up the names in the expressions of an import map: arrays of a file, and definitions ([let]) of the map."""
 
+import unicodedata
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,9 +12,10 @@ import numpy.typing as npt
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import suggest_conversion
 from study.importing.arrays.read_arrays import Arrays, find_unread_reason
+from study.importing.arrays.table_cells import is_unit
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import evaluate
-from study.importing.expressions.functions import Clock, Value
+from study.importing.expressions.functions import FUNCTIONS, Clock, Value
 from study.importing.map_format.map_errors import ImportProblemError, suggest_name
 from study.importing.map_format.signal_words import split_bracketed_unit
 
@@ -49,8 +52,11 @@ class Namespace:
         """Compute a value that the map states: the array whose exact name `expression` is (it may contain any
         characters), else the value of the expression. clock: gives the times for it. Raises ImportProblemError where it
         cannot be computed."""
-        if expression in self.arrays:
-            return self._convert_to_float(expression)
+        if (name := self._resolve_name(expression)) in self.arrays:
+            return self._convert_to_float(name)
+        stem, unit = split_bracketed_unit(expression)
+        if unit != "1" and is_unit(unit) and stem not in FUNCTIONS and not self.has_name(unit):
+            raise self._make_unknown_error(expression)  # a name with its unit, not an index or an argument
         return evaluate(expression, lambda name: self.look_up_value(name, clock), clock, self.budget)
 
     def compute_number(self, expression: str) -> float:
@@ -64,20 +70,34 @@ class Namespace:
     def look_up_value(self, name: str, clock: Clock) -> Value:
         """Look up the value of an array or a definition. clock: gives the times for the expression of a definition.
         Raises ImportProblemError for an unknown name, and for a value that cannot be computed."""
+        name = self._resolve_name(name)
         if name in self.arrays:
             return self._convert_to_float(name)
         if name in self.definitions:
             return self._evaluate_definition(name, clock)
         if name == "clock_s":
             raise ImportProblemError("clock_s is known in [[computed]] channels only, on the recording's grid")
+        raise self._make_unknown_error(name)
+
+    def _make_unknown_error(self, name: str) -> ImportProblemError:
+        """Make the error for an unknown name."""
         names = [*self.arrays, *self.definitions]
-        raise ImportProblemError(
+        return ImportProblemError(
             f"there is no array '{name}' in {self.file_name}{suggest_name(name, names)}; there are {self.list_names()}"
         )
 
     def has_name(self, name: str) -> bool:
         """Whether there is an array or a definition of this name."""
         return name in self.arrays or name in self.definitions
+
+    def _resolve_name(self, name: str) -> str:
+        """Find the name of an array or a definition that is written with other code points for the same letters: the
+        parser changes `µ` (U+00B5) in an expression to the Greek letter. Unchanged without such a name."""
+        if self.has_name(name):
+            return name
+        normal_form = unicodedata.normalize("NFKC", name)
+        known_names = (*self.arrays, *self.definitions)
+        return next((known for known in known_names if unicodedata.normalize("NFKC", known) == normal_form), name)
 
     def list_names(self) -> str:
         """List the names of the first `_MAX_LISTED_ARRAYS` arrays with their shapes, and how many more there are, for
@@ -121,11 +141,13 @@ class Namespace:
 
 def make_namespace(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
     """Make the namespace of a file. Names that begin with the prefix are also known without it, or without their unit
-    (`fx [N]` as `fx`), but not without both. Of equal names, that without the prefix has precedence, then the name in
-    the file, then that without the unit. The budget is extended by the number of values of the file. Raises
-    ImportProblemError if a prefix is given and no name begins with it."""
+    (`fx [N]` as `fx`, unless there is an `fx` in another unit), but not without both. Of equal names, that without the
+    prefix has precedence, then the name in the file, then that without the unit. The budget is extended by the number
+    of values of the file. Raises ImportProblemError if a prefix is given and no name begins with it."""
     unprefixed = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
-    unitless = {split_bracketed_unit(name)[0]: array for name, array in arrays.by_name.items()}
+    stems = {name: split_bracketed_unit(name)[0] for name in arrays.by_name}
+    stem_counts = Counter(stems.values())
+    unitless = {stems[name]: array for name, array in arrays.by_name.items() if stem_counts[stems[name]] == 1}
     if prefix and not unprefixed:
         names_text = Namespace(arrays.by_name, {}, arrays.name, budget).list_names()
         raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {names_text}")

@@ -13,6 +13,8 @@ from pydantic.dataclasses import dataclass
 TABLE_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 """Validation of every table of a map: unknown keys, NaN and infinity are refused."""
 
+LONGEST_CHANNEL_NAME = 64
+"""Longest name of a channel (characters). Chosen."""
 Resampling = Literal["", "held", "band-limited", "linear"]
 """Interpolation of samples at the times of the recording's grid; empty: the samples must lie on the grid."""
 SignalRole = Literal["command", "response", "position", "excitation", "condition", "helper"]
@@ -95,7 +97,9 @@ class ChannelMap:
             "`helper` is used by computed channels only and is not written."
         ),
     ]
-    name: Annotated[str, Field(min_length=1, max_length=64, description="Name of the channel in the recording.")]
+    name: Annotated[
+        str, Field(min_length=1, max_length=LONGEST_CHANNEL_NAME, description="Name of the channel in the recording.")
+    ]
     value: Annotated[str, Field(description="Name of an array, or an expression with arrays.")]
     unit: Annotated[
         str, Field(description="Unit of `value`; converted to SI. Default `1`: not stated, a plain number.")
@@ -118,7 +122,9 @@ class ComputedMap:
     """One channel that is computed from other channels on the grid of the recording, in the units of the map."""
 
     role: Annotated[SignalRole, Field(description="As for a channel.")]
-    name: Annotated[str, Field(min_length=1, max_length=64, description="Name of the channel in the recording.")]
+    name: Annotated[
+        str, Field(min_length=1, max_length=LONGEST_CHANNEL_NAME, description="Name of the channel in the recording.")
+    ]
     value: Annotated[str, Field(description="Expression with channels, by name; `clock_s` is the reference time.")]
     unit: Annotated[str, Field(description="Unit of `value`. Default `1`: not stated, a plain number.")] = ""
     quantity: Annotated[str, Field(description="As for a channel.")] = ""

@@ -21,15 +21,20 @@ def place_segments(
     """Convert the map's segments to those of one part, in the order of the map. part: name of its file, and its prefix.
     command: (samples, channels), in the unit of the map, which amplitudes also have. Raises ImportProblemError with the
     number of the segment in the map, from 1."""
-    file, prefix = part
     for number, segment_map in enumerate(segment_maps, start=1):
-        if fnmatchcase(file, segment_map.file) and (
-            segment_map.prefix == "*" or fnmatchcase(prefix, segment_map.prefix)
-        ):
+        if is_segment_of(segment_map, part):
             try:
                 yield from _place_segment(segment_map, command, rate_hz)
             except ImportProblemError as error:
-                raise ImportProblemError(f"segment[{number}] in {file}: {error}") from error
+                raise ImportProblemError(f"segment[{number}] in {part[0]}: {error}") from error
+
+
+def is_segment_of(segment_map: SegmentMap, part: tuple[str, str]) -> bool:
+    """Whether a part, by the name of its file and its prefix, matches the patterns of a segment."""
+    file, prefix = part
+    return fnmatchcase(file, segment_map.file) and (
+        segment_map.prefix == "*" or fnmatchcase(prefix, segment_map.prefix)
+    )
 
 
 def _place_segment(segment_map: SegmentMap, command: FloatArray, rate_hz: float) -> Iterator[Segment]:

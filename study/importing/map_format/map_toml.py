@@ -52,6 +52,11 @@ def is_map(values: dict[str, Any]) -> bool:
     return isinstance(values.get("channel"), list)
 
 
+def format_text(text: str) -> str:
+    """Write a text in quotes. TOML's are those of JSON, but without escaped surrogates and a bare delete character."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
     """Describe each validation error of pydantic (`ValidationError.errors()`) in a clause."""
     for error in errors:
@@ -115,6 +120,8 @@ def _find_contradictions(import_map: ImportMap) -> Iterator[str]:
     yield from _find_missing_roles(import_map)
     yield from _find_hold_contradictions(import_map)
     yield from _find_clock_contradictions(import_map)
+    if len(import_map.csv.delimiter) > 1:
+        yield f"csv.delimiter is '{import_map.csv.delimiter}'; it must be a single character"
     if import_map.part and any(clock.file for clock in import_map.clock):
         yield "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other"
 
@@ -136,8 +143,23 @@ def _find_segment_contradictions(import_map: ImportMap) -> Iterator[str]:
             yield f"segment[{number}] is stated in samples and in seconds; state one of them"
 
 
+_SET_META_KEYS = ("title", "parts", "import", "provenance")
+"""Keys of the metadata that the import sets."""
+_SET_PART_KEYS = ("file", "prefix", "start", "stop", "clock_start_s", "clock_offsets_s")
+"""Keys of the metadata of a part that the import sets."""
+
+
 def _find_meta_problems(import_map: ImportMap) -> Iterator[str]:
-    """Find numbers in the metadata that JSON cannot hold (NaN, infinity); yields at most one clause."""
+    """Find names that the import gives to values of its own, which would replace those of the map, and numbers in the
+    metadata that JSON cannot hold (NaN, infinity); yields a clause for each name, and at most one for the numbers."""
+    has_time = bool(import_map.clock[0].time) or any(clock.unknown for clock in import_map.clock)
+    for key in (*_SET_META_KEYS, *(("time",) if has_time else ())):
+        if key in import_map.meta:
+            advice = "write it at the top of the map" if key == "title" else "give it another name"
+            yield f"meta.{key} is set by the import; {advice}"
+    for key in _SET_PART_KEYS:
+        if key in import_map.numbers:
+            yield f"numbers.{key} is set by the import; give it another name"
     try:
         json.dumps(import_map.meta, allow_nan=False)
     except ValueError:

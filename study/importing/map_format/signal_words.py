@@ -110,7 +110,7 @@ def strip_units(columns: Sequence[ParsedName]) -> list[str]:
 def _strip_unit(column: ParsedName) -> str:
     """Remove the unit at the end of a name where it is the unit of a certain interpretation."""
     stem, unit = split_unit_at_end(column.name)
-    return stem if unit and unit == column.unit and not column.doubt else column.name
+    return stem if stem and unit and unit == column.unit and not column.doubt else column.name
 
 
 @lru_cache(_CACHE_SIZE)

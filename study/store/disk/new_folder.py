@@ -22,14 +22,15 @@ def require_new_folder(folder: Path) -> None:
     where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable, or the folder or
     its parent cannot be examined."""
     try:
+        parent = _follow_links(folder).parent
         is_empty, exists, has_parent = (
             folder.is_dir() and not any(folder.iterdir()),
             folder.exists(),
-            folder.absolute().parent.is_dir(),
+            parent.is_dir(),
         )
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    if has_parent and not os.access(folder.absolute().parent, os.W_OK):
+    if has_parent and not os.access(parent, os.W_OK):
         raise CannotWriteError(folder, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
     if is_empty:
         return
@@ -44,7 +45,7 @@ def require_new_folder(folder: Path) -> None:
     if not has_parent:
         raise StudyError(
             "The results need a folder of their own",
-            f"There is no folder {folder.parent} to make {folder.name} in.",
+            f"There is no folder {parent if folder.is_symlink() else folder.parent} to make {folder.name} in.",
             "Make it first, or choose another name with --out.",
             saved="Nothing was written.",
         )
@@ -52,12 +53,13 @@ def require_new_folder(folder: Path) -> None:
 
 @contextmanager
 def create_new_folder(folder: Path) -> Iterator[Path]:
-    """Yield a temporary folder for the results, which is renamed to `folder` at the end of the context; after an
-    exception in the context it is removed. Raises StudyError as `require_new_folder` does, at the beginning and before
-    renaming, CannotWriteError where a folder cannot be created, synced or renamed, and NotSyncedError where only the
-    folder that holds it cannot be synced."""
+    """Yield a temporary folder for the results, which is renamed to `folder`, or to where a link of this name leads, at
+    the end of the context; after an exception in the context it is removed. Raises StudyError as `require_new_folder`
+    does, at the beginning and before renaming, CannotWriteError where a folder cannot be created, synced or renamed,
+    and NotSyncedError where only the folder that holds it cannot be synced."""
     require_new_folder(folder)
-    temporary_folder = folder.absolute().with_name(f".{folder.absolute().name}.{secrets.token_hex(4)}.part")
+    folder = _follow_links(folder)
+    temporary_folder = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.part")
     try:
         make_folder(temporary_folder)
     except OSError as problem:
@@ -67,9 +69,14 @@ def create_new_folder(folder: Path) -> Iterator[Path]:
         require_new_folder(folder)
         try:
             sync_folder(temporary_folder)
-            temporary_folder.rename(folder.absolute())
+            temporary_folder.rename(folder)
         except OSError as problem:
             raise CannotWriteError(folder, problem) from problem
         sync_entry(folder)
     finally:
         shutil.rmtree(temporary_folder, ignore_errors=True)
+
+
+def _follow_links(folder: Path) -> Path:
+    """Return the absolute path to which a path leads; a link that leads in a circle is returned as it is."""
+    return Path(os.path.realpath(folder))

@@ -15,6 +15,7 @@ from typing import Any
 
 from study.regular_file import open_regular
 from study.store.disk.file_errors import CannotReadError
+from study.store.disk.text_file import replace_invalid_bytes
 
 PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels")
 """Packages whose versions a result states, in addition to that of Python."""
@@ -81,11 +82,6 @@ def list_versions() -> dict[str, str]:
 def anonymise_arguments(arguments: Sequence[str]) -> tuple[str, ...]:
     """Reduce paths in arguments to file names, because paths may identify the computer and its owner."""
     return tuple(_remove_folders(argument) for argument in arguments)
-
-
-def replace_invalid_bytes(name: str) -> str:
-    """Make a file name valid text: bytes that are not UTF-8 (surrogates in Python) are replaced."""
-    return name.encode(errors="replace").decode()
 
 
 def compute_sha256(path: Path) -> str:

@@ -66,3 +66,8 @@ def find_long_key(text: str) -> str:
             line = text.count("\n", 0, token.start()) + 1
             return f"line {line} has a key of more than {MAX_KEY_PARTS} parts"
     return ""
+
+
+def replace_invalid_bytes(name: str) -> str:
+    """Make a file name valid text: bytes that are not UTF-8 (surrogates in Python) are replaced."""
+    return name.encode(errors="replace").decode()

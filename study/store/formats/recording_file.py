@@ -27,6 +27,7 @@ from study.store.disk.hdf5_attributes import (
 )
 from study.store.disk.hdf5_file import ProblemCollector, open_hdf5, read_float_dataset, write_hdf5
 from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import replace_invalid_bytes
 from study.store.formats.recording_layout import FORMAT, KIND, SEGMENT_FIELDS, VERSION
 
 _SEGMENT_TYPE = np.dtype(
@@ -100,7 +101,8 @@ def write_recording(
         file.create_dataset("segments", data=rows)
         meta = file.create_group("meta")
         for key, value in recording.meta.items():
-            meta.attrs[key] = json.dumps(value, allow_nan=False)
+            # The name of an imported file may hold bytes that are no text, which JSON cannot be read with.
+            meta.attrs[key] = replace_invalid_bytes(json.dumps(value, allow_nan=False, ensure_ascii=False))
 
     write_hdf5(Path(path), write_contents, overwrite=overwrite)
 

@@ -68,10 +68,10 @@ LAW_SECTION = "\n\n".join(
         "a command, it is that of zero signals.",
         "**Signals.** `x`, `vx`, `ax`, `fx` are position, velocity, acceleration and command of the x axis; y and z "
         "likewise. `t` is the time from the first sample, in seconds. The recording's own channel names are allowed, "
-        "too. If these do not end in x, y, z, the axes are named x, y, z in their order. A law of the force may also "
-        "use the recording's conditions. They are named `c1`, `c2`, … if a condition's channel is not a valid name, or "
-        "has another meaning. A law of a command may use commands and `t`; a law of a response may use responses and "
-        "`t`.",
+        "too, unless they are one of these names. If channel names do not end in x, y, z, the axes are named x, y, z "
+        "in their order. A law of the force may also use the recording's conditions. They are named `c1`, `c2`, … if a "
+        "condition's channel is not a valid name, or has another meaning. A law of a command may use commands and `t`; "
+        "a law of a response may use responses and `t`.",
         "**Free parameters.** Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters: a fit may "
         f"change them. Whole numbers (`2`) are part of the form. A formula has at most {MAX_CHARACTERS} characters, "
         f"{MAX_NODES} parts, and {STACK_SIZE} numbers at once.",
@@ -132,7 +132,7 @@ LIVE_STATE_DESCRIPTION = "`live.json`, the present state of a running session; r
 """What the file of the live state contains, in the same list."""
 
 REQUEST_DESCRIPTION = (
-    "a file in a session's folder `requests/`: a request of another program to the session, removed when it is read. A "
-    "file name that begins with `stop` is a request to stop, with any content"
+    "a file in a session's folder `requests/`: a request of another program to the session, removed when it is read, a "
+    "note when it is in the log. A file name that begins with `stop` is a request to stop, with any content"
 )
 """What the file of a request contains, in the same list."""

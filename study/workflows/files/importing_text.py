@@ -147,7 +147,8 @@ _CHANNELS = f"""\
 ## Channels, names and units
 
 * **Units** are never guessed. A channel without a unit keeps its numbers and has the unit `1`, which is reported. The
-  assumed unit of each computed channel is reported, too.
+  assumed unit of each computed channel is reported, too, and so is a unit that differs from the one in the name of the
+  array, such as `N` in the map for `force [kN]`: the map is followed.
   {UNITS_CLAUSE[0].upper()}{UNITS_CLAUSE[1:]}; `lb` and `oz` are masses.
   In headers other spellings are understood (`RPM`, `rad/sec`, `m/sec2`, `m/s²`, `°/s`, `kgf·cm`, `oz-in`, `lbf-in`,
   `force / N`, `force, N`). `ms-2` is m/s^2; `m/s-2` is refused. Numbers in `A rms` or `A (peak)` are kept unchanged,
@@ -182,9 +183,9 @@ _TIME = f"""\
   clock that was set back or ahead by an hour, or a counter that restarts, is refused, with the expression that corrects
   it: `time = "t + 3600 * cumsum(diff(t) < 0)"` under `[[clock]]`. Stamps with and without a zone must not be mixed.
 * **Rate.** If no column is the time, a single number in hertz with the name of a sample rate is the rate (`fs_Hz`,
-  `rate [Hz]`, `sampling frequency [Hz]`, not `excitation rate [Hz]`), or one in seconds (`Ts_s`, `dt [s]`) is the step;
-  this is reported. In a table the number stands in the first row, with nothing below it. The proposed map accepts `fs`
-  and `Ts` without a unit, too.
+  `rate [kHz]`, `sampling frequency [Hz]`, not `excitation rate [Hz]`), or one in seconds (`Ts_s`, `dt [ms]`) is the
+  step; this is reported. In a table the number stands in the first row, with nothing below it. The proposed map
+  accepts `fs` and `Ts` without a unit, too.
 * **Usable band.** `band_hz = [25, 1500]` in `[meta]` states the lowest and the highest frequency (Hz) at which the
   recording is valid, for instance because an accelerometer's noise hides the motion below. Where a diagnosis fits a
   first linear model to frequency responses, it fits it there.
@@ -194,8 +195,8 @@ _TIME = f"""\
   within the rounding of their last decimal (such as whole milliseconds at 400 Hz). Stamps are also uniform if steps
   occasionally differ from the usual step by a single unit of a fine last decimal (at most 2 % of a step), such as 9.9
   and 10.1 among 10.0 ms, and no stamp is half a step from the grid. A change of rate is not uniform. If all steps are
-  multiples of the shortest, and at most about 2 % are longer (in a short table, a few), rows were skipped. The
-  deviation of stamps from the grid is reported.
+  multiples of the shortest, and at most 2 % are longer, rows were skipped; if more are longer, as after one gap in a
+  table of 40 rows, the stamps are not uniform. The deviation of stamps from the grid is reported.
 * **Missing samples** are NaN. Rows that a uniform logger skipped, and gaps in non-uniform stamps, become NaN; the
   samples next to them are unchanged. If nothing is missing between distant stamps, as in a log of changes, `gap_s` of
   the clock states the step from which on there is a gap; the channels then need `resample`.
@@ -234,9 +235,10 @@ INTRODUCTION = "\n\n".join((_COMMANDS_AND_RESULT, _FILES, _CHANNELS, _TIME, _PAR
 EXPRESSIONS = (
     "An expression may contain numbers, names of arrays, `+ - * / ** %`, comparisons (1 where true, 0 where not), "
     "parts of arrays as in `u[:10]`, `u[::2]`, `y[0]`, and the functions below. `pi` is a constant. `array('NAME')` is "
-    "an array whose name is not an identifier. A column `fx [N]` is also available as `fx`. Matlab structures are "
-    "`array('data.u')`, HDF5 datasets `array('run1/force')`. In computed channels `clock_s` is the reference time and "
-    "`rate_hz` the rate. Other syntax is refused: an expression cannot run code.",
+    "an array whose name is not an identifier. A column `fx [N]` is also available as `fx`, unless there are several. "
+    "Matlab structures are `array('data.u')`, HDF5 datasets `array('run1/force')`. In computed channels `clock_s` is "
+    "the reference time and `rate_hz` the rate. An array has precedence over a definition (`let`) of its name, which "
+    "is reported. Other syntax is refused: an expression cannot run code.",
     "Limits for all expressions of an import together, definitions included: "
     f"{HELD_NUMBERS:.0e} numbers at once, plus {HELD_PER_NUMBER} for each number in the files (at most "
     f"{MAX_HELD_NUMBERS:.0e}); {COMPUTED_NUMBERS:.0e} computed numbers, plus {COMPUTED_PER_NUMBER} for each number in "

@@ -14,7 +14,7 @@ from analysis.look.driven_band import find_silent_segments
 from equalizer.plant.model_quality import write_quality_brief
 from equalizer.signals.recording import Recording
 from equalizer.signals.units import NO_UNIT, UnknownUnitError, check_quantity, parse_unit
-from equalizer.tracking.feedforward.trajectory import TRAJECTORY
+from equalizer.tracking.feedforward.trajectory import TABLE_KINDS, TRAJECTORY
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.loading import ProtocolError
 from protocols.document.schema import ADAPTERS, make_protocol_schema
@@ -205,12 +205,17 @@ def recognise_reproduction(content: FileContent) -> str | None:
 
 
 def recognise_trajectory(content: FileContent) -> str | None:
-    """Recognise a CSV table of a trajectory, forces or a transient by the first column of its header."""
-    if content.header[:1] != TRAJECTORY.header[:1]:
+    """Recognise a CSV table of a trajectory, forces or a transient by the first column of its header and any other."""
+    # A table of another program may begin with the same time.
+    if content.header[:1] != TRAJECTORY.header[:1] or not set(content.header[1:]) & _TRAJECTORY_COLUMNS:
         return None
     trajectory = read_trajectory(content.path)
     signal = trajectory.signal
     return f"{trajectory.kind.name}, {signal.duration_s:g} s at {signal.sample_rate_hz:g} Hz ({trajectory.kind.unit})"
+
+
+_TRAJECTORY_COLUMNS = {name for kind in TABLE_KINDS for name in kind.header[1:]}
+"""Names of the columns after the time of all tables of trajectories and forces."""
 
 
 def recognise_trials(content: FileContent) -> str | None:

@@ -14,7 +14,7 @@ from analysis.look.driven_band import find_silent_segments
 from study.errors import StudyError
 from study.importing.arrays.read_arrays import FOREIGN_ENDINGS, HDF5_ENDINGS, JSON_ENDINGS, TABLE_ENDINGS
 from study.regular_file import MAX_DOCUMENT_BYTES
-from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.disk.privacy import format_privacy_warning
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import MAX_TOML_BYTES, find_long_key
@@ -91,13 +91,20 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     except UnusableFileError as error:
         return Validation(path, error.kind, error.sentences)
     except StudyError as error:
+        # A table in another encoding than UTF-8 is no file of hapteq, but an import reads it.
+        if isinstance(error.__cause__, UnicodeDecodeError) and path.suffix.lower() in TABLE_ENDINGS:
+            return _validate_foreign(path, "unreadable", (error.happened,))
         return Validation(path, "unreadable", (error.happened,))
+    except OSError as error:  # such as a folder of another account
+        return Validation(path, "unreadable", (CannotReadError(path, error).happened,))
     kind, problem = _describe_unknown(content)
     unknown_validation = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
     may_be_foreign = path.is_file() and path.suffix.lower() in (*FOREIGN_ENDINGS, *HDF5_ENDINGS)
-    if not may_be_foreign or content.hdf5_format or content.json_format:
+    if not may_be_foreign:
         return unknown_validation
-    return _validate_foreign(path, kind, unknown_validation.problems)
+    foreign_validation = _validate_foreign(path, kind, unknown_validation.problems)
+    states_format = bool(content.hdf5_format or content.json_format)
+    return unknown_validation if states_format and foreign_validation.problems else foreign_validation
 
 
 def _is_foreign(path: Path) -> bool:

@@ -17,7 +17,12 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.read_arrays import Arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map, read_without_map
+from study.importing.header_map import (
+    describe_header_choices,
+    describe_header_problems,
+    make_header_map,
+    read_without_map,
+)
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import (
     NOTHING_WRITTEN,
@@ -26,10 +31,10 @@ from study.importing.map_format.map_errors import (
     MapNeededError,
 )
 from study.importing.map_library import (
-    NON_DATA_SUFFIXES,
     MapFile,
     find_map_for_files,
     find_maps_for_folder,
+    list_data_files,
     make_map_from_headers,
     read_map,
 )
@@ -124,19 +129,15 @@ def read_foreign(
 
 
 def _expand_folders(files: Sequence[Path], import_map: ImportMap) -> tuple[Path, ...]:
-    """Replace a folder by the files in it that the map applies to, except maps and notes; files and empty folders are
-    kept. Raises ImportRefusedError where none is left."""
+    """Replace a folder by the data files in it that the map applies to; files and folders without data are kept. Raises
+    ImportRefusedError where none is left."""
     data_files: list[Path] = []
     for path in files:
-        folder_files = sorted(path.iterdir()) if path.is_dir() else ()
+        folder_files = list_data_files(path) if path.is_dir() else []
         matching_files = [
             file for file in folder_files if any(fnmatchcase(file.name, pattern) for pattern in import_map.files)
         ]
-        data_files += (
-            [file for file in matching_files if file.is_file() and file.suffix not in NON_DATA_SUFFIXES]
-            if folder_files
-            else [path]
-        )
+        data_files += matching_files if folder_files else [path]
     if not data_files:
         raise ImportRefusedError(
             files[0].name,
@@ -206,7 +207,7 @@ def _import_by_header(files: Sequence[Path], on_progress: ProgressCallback) -> F
             notes=(f"Imported by our map '{shipped_map.name}', which fits these files.", *foreign_recording.notes),
         )
     if import_map is None:
-        raise MapNeededError(files[0].name, "; ".join(find_header_problems(arrays)), make_map_skeleton(arrays))
+        raise MapNeededError(files[0].name, describe_header_problems(arrays), make_map_skeleton(arrays))
     return _import_by_header_map(import_map, arrays, files, on_progress)
 
 

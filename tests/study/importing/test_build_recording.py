@@ -75,3 +75,12 @@ def test_a_channel_that_is_evaluated_for_the_number_of_samples_is_named(files):
     """The single number before it is repeated as often as the other channel has samples."""
     text = map_text().replace('value = "u"', 'value = "0"').replace('value = "y"', 'value = "yy"')
     assert "Channel 'ax': there is no array 'yy'" in refusal(text, files())
+
+
+@pytest.mark.parametrize("name", ["u [N]", "u (N)", "u [m/s^2]"])
+def test_a_name_with_its_unit_that_is_not_in_the_file_is_named_as_a_whole(files, name):
+    text = map_text().replace('value = "u"', f'value = "{name}"')
+    sentence = f"Channel 'fx': there is no array '{name}' in a.npz"
+    assert sentence in refusal(text, files(**{"u [kN]": U, "y": Y}))
+    with_index = built(map_text().replace('value = "u"', 'value = "u[m]"'), files(u=np.stack([U, Y]), y=Y, m=1.0))
+    np.testing.assert_array_equal(with_index.recording.command.samples[:, 0], Y)

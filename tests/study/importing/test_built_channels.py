@@ -125,3 +125,36 @@ def test_amplitudes_of_commands_of_different_units_are_measured_in_si(files):
     assert found.command.unit == ("N", "N m")
     assert found.segments[0].amplitude == pytest.approx(np.abs(U).max())
     assert "units of different size; leave amplitude out" in refusal(map_text(end=TORQUE + "amplitude = 2\n"), files())
+
+
+@pytest.mark.parametrize("value", ["u[400:]", "empty"])
+def test_a_channel_without_samples_is_named(files, value):
+    text = map_text().replace('value = "u"', f'value = "{value}"')
+    assert f"Channel 'fx': {value} holds no samples." in refusal(text, files(u=U, y=Y, empty=U[:0]))
+
+
+def test_of_two_columns_that_differ_by_their_unit_none_is_taken_without_it(files):
+    path = files(**{"u [N]": U, "u [mm]": Y, "y": Y})
+    assert "Channel 'fx': there is no array 'u' in a.npz" in refusal(map_text(), path)
+    found = built(map_text().replace('value = "u"', 'value = "u [N]"'), path).recording
+    np.testing.assert_array_equal(found.command.samples[:, 0], U)
+
+
+def test_a_unit_or_a_definition_that_the_file_contradicts_is_reported(files):
+    path = files(**{"u [kN]": U, "y": Y, "t [ms]": np.arange(N)})
+    found = built(map_text('time = "t"\ntime_unit = "s"', top='let = { y = "2 * y", gain = "3" }\n'), path)
+    assert [note for note in found.notes if "rate" not in note] == [
+        "[let] y is not used: a.npz has an array of this name, which has precedence.",
+        "'t [ms]' of a.npz states ms, but the map s; the map was followed.",
+        "'u [kN]' of a.npz states kN, but the map N; the map was followed.",
+    ]
+    text = map_text('time = "t"\ntime_unit = "ms"').replace('"N"', '"kN"')
+    assert built(text, path).notes == ()
+
+
+def test_a_segment_that_no_part_has_is_reported(files):
+    end = '[[segment]]\nkind = "noise"\nfile = "rum.npz"\n[[segment]]\nkind = "rest"\nprefix = "a_"\n'
+    assert built(map_text(end=end), files()).notes == (
+        "segment[1] is not used: no part matches 'rum.npz'.", "segment[2] is not used: no part matches '* a_'.",
+    )  # fmt: skip
+    assert built(map_text(end=end, top="separate = true\n"), files()).notes == ()

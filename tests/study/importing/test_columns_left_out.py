@@ -71,3 +71,21 @@ def test_a_long_field_is_shortened_in_the_remark(tmp_path):
     path = table(tmp_path, "t;u;y;;", "x1" * 500)
     made = built(map_text(clock=CLOCK), path)
     assert max(map(len, made.notes)) < 300
+
+
+def test_a_column_of_words_is_named_where_without_it_a_map_is_needed(tmp_path):
+    rows = "".join(f"{k / 100},{k % 7},- {k % 5}.5\n" for k in range(40))
+    (tmp_path / "a.csv").write_text(f"time [s],force [N],position [mm]\n{rows}")
+    with pytest.raises(MapNeededError, match=r"; left out: 'position \[mm\]' holds words, not numbers\."):
+        read_foreign((tmp_path / "a.csv",), None)
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_column_of_words_and_a_line_of_words_below_the_rows_are_both_left_out(tmp_path, mark):
+    rows = [f"{k / 50:.2f};{k % 7};{k % 5},5;{'warm' if k % 3 else 'ok'}".replace(".", ",") for k in range(N)]
+    lines = ("time [s];force [N];position [mm];state", *rows, "End of file")
+    (tmp_path / "a.csv").write_text("\n".join(lines).replace(";", mark))
+    found = read_foreign((tmp_path / "a.csv",), None)
+    np.testing.assert_allclose(found.recording.response.samples[:, 0], [(k % 5 + 0.5) / 1000 for k in range(N)])
+    assert "Left out: 'state' holds words, not numbers." in found.notes
+    assert f"Left out: line {N + 2}, 'End of file'." in found.notes

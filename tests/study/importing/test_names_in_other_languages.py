@@ -1,5 +1,7 @@
 """Headers in Spanish, German and French, and names whose unit or words are joined by underscores."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from study.importing.arrays.read_arrays import Arrays
 from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.signal_words import parse_signal_name
 from study.importing.map_skeleton import make_map_skeleton
+from tests.recording_maps import U, Y, built, map_text
 
 
 def arrays(tmp_path, *names):
@@ -55,3 +58,18 @@ def test_the_output_of_a_loop_is_proposed_and_what_it_measures_stays_open(tmp_pa
 def test_an_input_among_other_words_is_no_command(tmp_path):
     wanted = make_header_map(arrays(tmp_path, "time [s]", "torque [Nm]", "input angle [rad]", "output speed [rpm]"))
     assert [channel.role for channel in wanted.channel] == ["command", "position", "response"]
+
+
+@pytest.mark.parametrize(("header", "expression"), [("x_µm", "2 * x_µm"), ("de\u0301bit", "d\u00e9bit")])
+def test_the_same_letters_of_other_code_points_are_the_same_name(files, header, expression):
+    text = map_text().replace('value = "y"', f'value = "{expression}"')
+    found = built(text, files(**{"u": U, header: Y})).recording
+    np.testing.assert_allclose(found.response.samples[:, 0], (2 if "2" in expression else 1) * 9.80665 * Y)
+
+
+@pytest.mark.parametrize("name", ["𝜔", "Größe", "line\nrole = 'break'", "delete\x7f", 'say "no"', "back\\slash"])
+def test_the_proposed_map_is_toml_with_any_name(tmp_path, name):
+    values = {
+        channel["value"] for channel in tomllib.loads(make_map_skeleton(arrays(tmp_path, "t_s", name)))["channel"]
+    }
+    assert values == {name}

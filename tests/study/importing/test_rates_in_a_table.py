@@ -67,3 +67,15 @@ def test_a_proposed_map_takes_it_and_is_right(tmp_path, name, first, line):
     assert line in needed.value.skeleton
     assert needed.value.skeleton.count("[[channel]]") == 2
     assert built(map_text(line), path).recording.sample_rate_hz == pytest.approx(250, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "rate"), [("fs_kHz", "0.25", "1000 * fs_kHz"), ("dt_ms", "4", "1000 / dt_ms"),
+                                ("Ts [us]", "4000", "1000000 / array('Ts [us]')")]
+)  # fmt: skip
+def test_its_unit_counts(tmp_path, name, first, rate):
+    found = read_foreign((table(tmp_path, f"force [N],travel [mm],{name}", first),), None)
+    assert found.recording.sample_rate_hz == pytest.approx(250, rel=1e-12)
+    with pytest.raises(MapNeededError) as needed:
+        read_foreign((table(tmp_path, f"u,y,{name}", first),), None)
+    assert f'rate = "{rate}"           # in hertz\n' in needed.value.skeleton

@@ -95,6 +95,7 @@ def test_without_the_offset_the_two_do_not_agree(loggers):
         ('align = "u * 0 + 1"\nalign_to = "y"', "Clock 'drive' cannot be aligned: the two signals agree nowhere"),
         ('trigger = "sync"\ntrigger_level = 9.0\nreference_trigger = "y"', "sync never passes the trigger level of 9"),
         ('align = "u[0]"\nalign_to = "y"', "Clock 'drive': u[0] has the shape (), not one row"),
+        ('align = "u[:0]"\nalign_to = "y"', "Clock 'drive': u[:0] holds no samples"),
         ('align = "speeed"\nalign_to = "y"', "There is no array 'speeed' in drive.npz; did you mean 'speed'"),
     ],
 )

@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays.read_arrays import READABLE_ENDINGS
+from study.importing.arrays.read_arrays import READABLE_ENDINGS, find_unread_reason, read_arrays
+from study.importing.header_map import find_header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from study.store.disk.file_errors import CannotReadError
@@ -138,3 +139,21 @@ def test_a_file_with_no_arrays_is_refused(tmp_path):
 def test_a_file_that_is_not_there_is_reported(tmp_path):
     with pytest.raises(CannotReadError, match="There is no file"):
         read(tmp_path / "a.npz")
+
+
+def test_empty_arrays_and_texts_of_matlab_7_3_are_not_read_as_numbers(tmp_path):
+    """Matlab stores the dimensions of an empty array, and the codes of the letters of a text."""
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file["bias"], file["note"] = np.zeros(2, "u8"), np.arange(40, dtype="u2")[:, None]
+        file["bias"].attrs.update({"MATLAB_class": np.bytes_("double"), "MATLAB_empty": np.uint8(1)})
+        file["note"].attrs["MATLAB_class"] = np.bytes_("char")
+    found = read(tmp_path / "a.mat")
+    assert found["bias"].shape == (0,)
+    assert find_unread_reason(found["note"]) == "a text"
+
+
+def test_a_dataset_of_rows_of_several_columns_is_named(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["table"] = np.zeros(40, dtype=[("t_s", "f8"), ("force_N", "f8")])
+    problems = find_header_problems(read_arrays(tmp_path / "a.h5", CsvMap()))
+    assert "'table' is of a type that is not read, such as rows of several columns" in problems[0]

@@ -73,3 +73,8 @@ def test_a_long_table_with_foreign_words_in_each_row_is_read(tmp_path, ahead):
 def test_an_encoding_that_cannot_be_is_named(tmp_path, stated, said):
     with pytest.raises(ImportRefusedError, match=said):
         read(tmp_path, "t,µ,v", "cp1252", stated)
+
+
+@pytest.mark.parametrize(("encoding", "stated"), [("utf-8-sig", "utf-8"), ("utf-16", "utf-16-le")])
+def test_a_byte_order_mark_is_no_part_of_a_name_where_the_encoding_is_stated(tmp_path, encoding, stated):
+    assert list(read(tmp_path, "t,u,v", encoding, stated).by_name) == ["t", "u", "v"]

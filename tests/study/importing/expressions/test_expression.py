@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study.importing.expressions.budget import Budget
-from study.importing.expressions.expression import evaluate, find_names
+from study.importing.expressions.expression import evaluate, find_names, quote_name
 from study.importing.expressions.functions import FUNCTIONS
 from study.importing.expressions.namespace import Namespace
 from study.importing.map_format.map_errors import ImportProblemError
@@ -187,3 +187,10 @@ def test_a_larger_file_may_cost_more():
     budget.add_allowance(3_000_000)
     text = "(-u + " * 10 + "u" + ")" * 10
     Namespace({"u": np.zeros(3_000_000)}, {}, "a.npz", budget).compute_value(text, Millisecond())
+
+
+@pytest.mark.parametrize("name", ["motor's state", "a\\b", 'say "no"', "in", "pi", "fx [N]", "force"])
+def test_the_expression_for_an_array_names_it(name):
+    assert find_names(quote_name(name)) == {name}
+    space = Namespace({name: LONG}, {}, "a.npz", Budget())
+    np.testing.assert_array_equal(space.compute_value(f"{quote_name(name)}[:2]", Millisecond()), LONG[:2])

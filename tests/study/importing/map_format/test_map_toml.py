@@ -106,6 +106,10 @@ def test_what_is_wrong_with_a_map_is_reported_by_key(old, new, problem):
             "segment[1].split must have shares that sum to 1, none below 0",
         ),
         ('[[segment]]\nkind = "noise"\nstart = 1\nstart_s = 1.0', "segment[1] is stated in samples and in seconds"),
+        ('[csv]\ndelimiter = "::"', "csv.delimiter is '::'; it must be a single character"),
+        ('[meta]\ntitle = "a"', "meta.title is set by the import; write it at the top of the map"),
+        ("[meta]\nparts = 3", "meta.parts is set by the import; give it another name"),
+        ('[numbers]\nstart = "u[0]"', "numbers.start is set by the import; give it another name"),
         ('[[segment]]\nkind = "loud"', 'segment[1].kind is "loud"; it must be "multisine", "sweep"'),
     ],
 )

@@ -64,6 +64,19 @@ def test_where_only_the_folder_above_is_not_synced_the_results_are_said_to_be_th
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_link_is_filled_where_it_leads(tmp_path, is_there):
+    """Such as a link to another disk."""
+    (tmp_path / "disk" / "real").mkdir(parents=True)
+    (tmp_path / "out").symlink_to(tmp_path / "disk" / "real")
+    if not is_there:
+        (tmp_path / "disk" / "real").rmdir()
+    with create_new_folder(tmp_path / "out") as folder:
+        (folder / "a").write_text("1")
+    assert [path.name for path in (tmp_path / "disk").iterdir()] == ["real"]
+    assert (tmp_path / "out").is_symlink() and (tmp_path / "disk" / "real" / "a").read_text() == "1"
+
+
 def test_the_folder_above_must_be_there(tmp_path):
     with pytest.raises(StudyError, match="There is no folder"):
         require_new_folder(tmp_path / "no" / "out")

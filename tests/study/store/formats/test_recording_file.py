@@ -141,3 +141,10 @@ def test_units_become_si_channel_by_channel(written):
     assert read.response.samples[0, 0] == pytest.approx(9.80665 * given_g)
     assert read.position.samples[0] == pytest.approx(given_mm * [1e-3, np.pi / 180])
     assert read.segments[0].amplitude == pytest.approx(1.5e-3)
+
+
+def test_a_file_name_that_is_no_text_does_not_spoil_the_recording(tmp_path):
+    signal = Signal(np.zeros((2, 1)), 1000.0, "force", "N", ("fx",))
+    meta = {"parts": [{"file": "messung_\udce4.csv"}], "operator": "Jörg"}
+    write_recording(tmp_path / "a.h5", Recording("rig", signal, signal, meta=meta))
+    assert read_recording(tmp_path / "a.h5").meta == {"parts": [{"file": "messung_?.csv"}], "operator": "Jörg"}

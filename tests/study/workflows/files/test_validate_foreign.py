@@ -2,11 +2,13 @@
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 from openpyxl import Workbook
 
 from study.workflows.files.validate import validate_file
+from study.workflows.recording.read_any_recording import read_any_recording
 
 NAMES = ("time [s]", "force [N]", "speed [mm/s]")
 ROWS = [(k / 100, float(k % 7), float(k % 5)) for k in range(50)]
@@ -54,3 +56,32 @@ def test_a_document_that_says_a_format_is_not_read_as_a_table(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps({"format": "another", "t": [0, 1], "u": [1, 2]}))
     found = validate_file(tmp_path / "a.json")
     assert found.problems == ("Its format, 'another', is not known here.",)
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-16"])
+def test_a_table_in_another_encoding_is_read_as_by_an_import(tmp_path, encoding):
+    rows = "\n".join(";".join(map(str, row)) for row in (("time [s]", "force [N]", "angle [°]"), *ROWS))
+    (tmp_path / "a.csv").write_bytes(rows.encode(encoding))
+    assert (found := validate_file(tmp_path / "a.csv")).problems == ()
+    assert found.kind == KIND
+
+
+def test_a_table_of_others_may_begin_with_the_time_of_our_own_tables(tmp_path):
+    found = validate_file(write(tmp_path / "a.txt", ("time_s", "force_N", "speed_mm/s")))
+    (tmp_path / "b.csv").write_text("time_s,force_N,speed_mm/s\n" + "\n".join(",".join(map(str, r)) for r in ROWS))
+    assert [(each.kind, each.problems) for each in (found, validate_file(tmp_path / "b.csv"))] == [(KIND, ())] * 2
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a.json"])
+def test_a_recording_of_others_may_state_a_format(tmp_path, name):
+    columns = dict(zip(("t_s", "force_N", "speed_rpm"), np.array(ROWS).T, strict=True))
+    if name == "a.json":
+        (tmp_path / name).write_text(json.dumps({"format": "lab 2", **{key: list(v) for key, v in columns.items()}}))
+    else:
+        with h5py.File(tmp_path / name, "w") as file:
+            file.attrs["format"] = "lab 2"
+            for key, samples in columns.items():
+                file[key] = samples
+    found = validate_file(tmp_path / name)
+    assert (found.kind, found.problems) == (KIND, ())
+    assert read_any_recording(tmp_path / name)[0].sample_rate_hz == 100

@@ -8,7 +8,7 @@ from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.formats.recording_file import read_recording, write_recording
-from study.workflows.recording.import_recording import ImportPlan, import_recording
+from study.workflows.recording.import_recording import ImportPlan, import_recording, read_foreign
 from study.workflows.recording.read_any_recording import read_any_recording
 
 T = np.arange(200) / 1000
@@ -228,3 +228,26 @@ def test_tables_whose_command_repeats_get_segments_with_period_and_level(tmp_pat
 def test_without_a_file_nothing_is_imported(tmp_path, map_name):
     with pytest.raises(WrongUseError, match="No file was given"):
         import_recording(ImportPlan((), map_name, tmp_path / "r.h5"))
+
+
+def test_hidden_files_of_a_folder_are_no_recordings(tmp_path):
+    write_runs(tmp_path / "fold", "rec_2.csv", "rec_1.csv")
+    for name in (".DS_Store", "._rec_1.csv"):
+        (tmp_path / "fold" / name).write_bytes(b"\0\5\x16\7")
+    header = 'value = "fx [N]"', 'value = "ax [g]"', 'time = "time"\ntime_unit = "s"'
+    text = MAP.replace("value = \"array('data.u')\"", header[0]).replace('value = "data.y"', header[1])
+    (tmp_path / "m.toml").write_text(text.replace('rate = "data.fs"', header[2]))
+    for map_name in (None, str(tmp_path / "m.toml")):
+        found = read_foreign((tmp_path / "fold",), map_name).recording
+        assert [part["file"] for part in found.meta["parts"]] == ["rec_1.csv", "rec_2.csv"]
+
+
+def test_a_header_name_that_is_too_long_for_a_channel_needs_a_map(tmp_path):
+    (tmp_path / "a.csv").write_text(TABLE.replace("fx [N]", f"{'force of the crosshead ' * 3}[N]"))
+    with pytest.raises(MapNeededError, match="has 68 characters; that of a channel has up to 64"):
+        import_recording(ImportPlan((tmp_path / "a.csv",), None, tmp_path / "r.h5"))
+
+
+def test_a_header_name_that_is_only_a_unit_keeps_it(tmp_path):
+    (tmp_path / "a.csv").write_text(TABLE.replace("ax [g]", "_rad"))
+    assert read_any_recording(tmp_path / "a.csv")[0].response.channels == ("_rad",)
