@@ -34,16 +34,16 @@ def withdraw(
     plan = plan_withdrawal(folder)
     derived_text = ", ".join(str(data_folder / name) for name in plan.derived_roots)
     analysis_note = f", and the analysis in {derived_text}" if derived_text else ""
-    typer.echo(f"To be erased for good: {', '.join(plan.sessions)}{analysis_note}", err=True)
+    typer.echo(f"To be erased for good, in {data_folder}: {', '.join(plan.sessions)}{analysis_note}", err=True)
     for sentence in plan.doubtful:
         typer.echo(f"Not to be erased: {sentence}", err=True)
     if not yes and not typer.confirm("Erase them?", err=True):
         typer.echo("Nothing was erased.", err=True)
         return
-    copy_notes = list_remaining_copies(data_folder, plan)
-    erase(data_folder, plan, RealClock().utc())
-    typer.echo(f"Erased: {', '.join(plan.sessions)}")
-    if derived_text:
+    erased = erase(data_folder, plan, RealClock().utc())
+    typer.echo(f"Erased: {', '.join(erased.sessions)}")
+    if derived_text := ", ".join(str(data_folder / name) for name in erased.derived_roots):
         typer.echo(f"Erased too, because it was made from them: {derived_text}. Run hapteq analyze again.", err=True)
-    for sentence in copy_notes:
+    found_later = (f"Not erased: {sentence}" for sentence in erased.doubtful if sentence not in plan.doubtful)
+    for sentence in (*found_later, *list_remaining_copies(data_folder, erased)):
         typer.echo(sentence, err=True)

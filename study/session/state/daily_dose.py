@@ -31,14 +31,14 @@ def find_dose_elsewhere(
     moved_sessions = {name: sitting for name, sitting in current_states.items() if sitting.still_s is not None}
     counted_sessions: dict[str, SittingState] = {}
     # Times before now (s): `still_s` since the last vibration of a session, `earliest_start_s` since the first
-    # vibration of the earliest session counted so far.
+    # vibration of its day, in any sitting of the sessions counted so far.
     earliest_start_s = 0.0
     for name, sitting in sorted(moved_sessions.items(), key=lambda item: item[1].still_s or 0.0):
         still_s = sitting.still_s or 0.0
         if still_s - earliest_start_s >= DAILY_REST_S:
             break
         counted_sessions[name] = sitting
-        earliest_start_s = max(earliest_start_s, sitting.sitting_elapsed_s or still_s)
+        earliest_start_s = max(earliest_start_s, sitting.day_s or still_s)
     counted_sessions.pop(current_session, None)
     if not counted_sessions:
         return DoseElsewhere((), 0.0, 0.0, 0.0, 0.0, unread_sessions) if unread_sessions else None

@@ -26,6 +26,8 @@ class DailyRest:
     """Duration (s) of the rest without movement of the handle."""
     dose: Dose
     """Dose of the session before the rest."""
+    day_s: float
+    """Time (s) from the first movement of the day before the rest to the first movement after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,8 @@ class SittingState:
     """Number of demonstration stimuli played in the session."""
     debriefed: bool = False
     last_moment: Moment = Moment("")  # noqa: RUF009 - frozen
-    """Time of the last log entry, or later (`pass_time`); `sitting_elapsed_s` and `still_s` are given for it."""
+    """Time of the last log entry, or later (`pass_time`), for which `sitting_elapsed_s`, `still_s` and `day_s` are
+    given."""
     sitting_elapsed_s: float | None = None
     """Seconds since the handle first moved in this sitting; None before."""
     busy_voids: int = 0
@@ -58,6 +61,9 @@ class SittingState:
     still_s: float | None = None
     """Seconds since the handle last moved, in any sitting of this session or in the sessions of `other_sessions_dose`;
     None before."""
+    day_s: float | None = None
+    """Seconds since the handle first moved in this session after the last rest of `DAILY_REST_H` or more, in any
+    sitting; None before. Too long, never too short, where a clock was set forward and back between sittings."""
     dose: Dose = NO_DOSE
     """Dose of this session since the last rest of `DAILY_REST_H` or more."""
     other_sessions_dose: Dose = NO_DOSE
@@ -136,6 +142,7 @@ def pass_time(sitting: SittingState, moment: Moment, resumed: bool = False) -> S
         probing=replace(sitting.probing, since_probe_s=None if since_probe_s is None else since_probe_s + elapsed_s),
         sitting_elapsed_s=None if sitting.sitting_elapsed_s is None else sitting.sitting_elapsed_s + elapsed_s,
         still_s=None if sitting.still_s is None else sitting.still_s + elapsed_s,
+        day_s=None if sitting.day_s is None else sitting.day_s + elapsed_s,
     )
     return advanced_sitting if step is None else _apply_clock_step(advanced_sitting, step)
 
@@ -157,7 +164,12 @@ def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
     daily_rest = replace(corrected_sitting.daily_rest, still_s=corrected_sitting.daily_rest.still_s - overcounted_s)
     if daily_rest.still_s >= DAILY_REST_S:
         return replace(corrected_sitting, daily_rest=daily_rest)
-    return replace(corrected_sitting, daily_rest=None, dose=sum_doses(daily_rest.dose, corrected_sitting.dose))
+    return replace(
+        corrected_sitting,
+        daily_rest=None,
+        dose=sum_doses(daily_rest.dose, corrected_sitting.dose),
+        day_s=daily_rest.day_s + (corrected_sitting.day_s or 0.0),
+    )
 
 
 def _sum_steps_s(steps: tuple[ClockStep, ...]) -> float:
@@ -169,10 +181,9 @@ def start_motion(sitting: SittingState) -> SittingState:
     """Return the state after the handle begins to move, which resets the dose to zero after a rest of `DAILY_REST_H` or
     more, and begins the duration of the sitting at its first motion."""
     if sitting.still_s is not None and sitting.still_s >= DAILY_REST_S:
-        sitting = replace(
-            sitting, daily_rest=DailyRest(sitting.still_s, sitting.dose), dose=NO_DOSE, other_sessions_dose=NO_DOSE
-        )
-    return replace(sitting, sitting_elapsed_s=sitting.sitting_elapsed_s or 0.0, still_s=0.0)
+        daily_rest = DailyRest(sitting.still_s, sitting.dose, sitting.day_s or 0.0)
+        sitting = replace(sitting, daily_rest=daily_rest, dose=NO_DOSE, other_sessions_dose=NO_DOSE, day_s=0.0)
+    return replace(sitting, sitting_elapsed_s=sitting.sitting_elapsed_s or 0.0, still_s=0.0, day_s=sitting.day_s or 0.0)
 
 
 def compute_daily_dose(sitting: SittingState) -> Dose:

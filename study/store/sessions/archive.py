@@ -5,7 +5,9 @@ tombstone (a small file that states the withdrawal) in place of the data, so tha
 """
 
 import contextlib
+import os
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,8 +63,9 @@ class SessionFolder:
 
     @property
     def withdrawn(self) -> bool:
-        """Whether the session was withdrawn, or its withdrawal has begun."""
-        return self.tombstone.exists() or self.withdrawal.exists()
+        """Whether the session was withdrawn, or its withdrawal has begun; False where its folder cannot be read, so
+        that reading the log reports that."""
+        return os.path.exists(self.tombstone) or os.path.exists(self.withdrawal)  # noqa: PTH110 - Path.exists raises
 
     @property
     def erasure_status(self) -> str:
@@ -86,6 +89,19 @@ class SessionWithdrawnError(StudyError):
         )
 
 
+def require_consent(folders: Iterable[SessionFolder]) -> None:
+    """Raise StudyError where a session was withdrawn while its data were analysed or exported: the withdrawal may not
+    have found what was written in the meantime."""
+    for folder in folders:
+        if folder.withdrawn:
+            raise StudyError(
+                "A participant withdrew in the meantime",
+                f"{folder.name} was withdrawn while its data were read.",
+                "Run the same command again: it leaves this session out.",
+                saved="Nothing of this run was kept.",
+            )
+
+
 def check_subject(code: str) -> str:
     """Return the participant code if it is valid (`is_code`); otherwise raise WrongUseError, so that names of persons
     and e-mail addresses do not become names of folders."""
@@ -100,20 +116,22 @@ def check_subject(code: str) -> str:
 
 def create_session_folder(data: Path, subject: str) -> SessionFolder:
     """Create the participant's next session folder, numbered from 1. An existing folder is never used, even if two
-    programs create one at the same time. Raises WrongUseError for an invalid code, StudyError if the folder cannot be
-    created, or if 1000 times (chosen) in turn another program created the folder of the next number first."""
+    programs create one at the same time; a name that is taken otherwise (by a file, a dangling link, or another case of
+    the letters where the file system ignores it) is skipped. Raises WrongUseError for an invalid code, StudyError if
+    the folder cannot be created, or the next 1000 names (chosen) are taken."""
     check_subject(subject)
     try:
         is_new = not data.exists()
         make_folder(data, private=True)
         restrict_data_folder(data)
-        for _ in range(1000):
-            used_numbers = [
-                parse_session_number(session_folder.name)
-                for session_folder in list_session_folders(data)
-                if session_folder.subject == subject
-            ]
-            path = data / f"{subject}_{max(used_numbers, default=0) + 1:03d}"
+        used_numbers = [
+            parse_session_number(session_folder.name)
+            for session_folder in list_session_folders(data)
+            if session_folder.subject == subject
+        ]
+        first_number = max(used_numbers, default=0) + 1
+        for number in range(first_number, first_number + 1000):
+            path = data / f"{subject}_{number:03d}"
             try:
                 path.mkdir(mode=PRIVATE_FOLDER)
             except FileExistsError:
@@ -131,16 +149,35 @@ def create_session_folder(data: Path, subject: str) -> SessionFolder:
             f"In {data}: {error.strerror}.",
             "Choose another folder with --data, or make room and check its permissions.",
         ) from error
-    raise StudyError("The session folder cannot be made", f"{data} is changing all the time.", "Try again.")
+    raise StudyError(
+        "The session folder cannot be made",
+        f"In {data}, 1000 names from {subject}_{first_number:03d} on are taken by something else than a session.",
+        "Look at them, or choose another folder with --data.",
+    )
 
 
 def list_session_folders(data: Path) -> tuple[SessionFolder, ...]:
     """List all session folders in the data folder, withdrawn ones included, in alphabetical order; empty without that
-    folder."""
+    folder. A folder without log and tombstone is listed where its name has a participant code: results_2026 has none.
+    """
     if not data.is_dir():
         return ()
+    folders = (SessionFolder(path) for path in sorted(data.iterdir()))
     return tuple(
-        SessionFolder(path) for path in sorted(data.iterdir()) if path.is_dir() and FOLDER_PATTERN.fullmatch(path.name)
+        folder
+        for folder in folders
+        if folder.path.is_dir()
+        and FOLDER_PATTERN.fullmatch(folder.name)
+        and (is_code(folder.subject) or holds_session(folder.path))
+    )
+
+
+def holds_session(folder: Path) -> bool:
+    """Whether a folder is that of a session: it has the name of one, and a log or a tombstone. The name alone does not
+    prove it: an analysis may be called results_2026, a data folder study_001."""
+    session_folder = SessionFolder(folder)
+    return FOLDER_PATTERN.fullmatch(folder.name) is not None and any(
+        os.path.lexists(path) for path in (session_folder.log, session_folder.tombstone)
     )
 
 
@@ -150,15 +187,36 @@ def parse_session_number(name: str) -> int:
     return int(match["number"]) if match else 0
 
 
+def require_single_folder(session: str, data: Path) -> None:
+    """Raise WrongUseError where both the current folder and the data folder hold a folder of this name: a command must
+    not change, or erase, the session of another study."""
+    here, there = Path(session), data / session
+    if here.is_dir() and there.is_dir() and not here.samefile(there):
+        raise WrongUseError(
+            "Two sessions have this name",
+            f"{here.resolve()} and {there.resolve()} could both be meant.",
+            "Give the path of the session's folder.",
+            saved="Nothing was changed.",
+        )
+
+
 def find_session(session: str, data: Path) -> SessionFolder:
     """Find a session by the path of its folder or by its name within `data`. Raises SessionWithdrawnError for a
-    withdrawn session, WrongUseError if there is no such folder with an event log."""
-    for path in (Path(session), data / session):
-        folder = SessionFolder(path.resolve())
+    withdrawn session, WrongUseError if there is no such folder with an event log, or two."""
+    require_single_folder(session, data)
+    folders = [SessionFolder(path.resolve()) for path in (Path(session), data / session)]
+    for folder in folders:
         if folder.withdrawn:
             raise SessionWithdrawnError(folder)
         if folder.log.exists():
             return folder
+    for folder in folders:
+        if FOLDER_PATTERN.fullmatch(folder.name) and folder.path.is_dir():
+            raise WrongUseError(
+                "This session has no log",
+                f"{folder.path} holds no {LOG_NAME}: the program died while it was made, or the log was removed.",
+                f"If it holds recordings or tables, restore {LOG_NAME} from a copy; otherwise begin a new session.",
+            )
     session_names = (
         ", ".join(session_folder.name for session_folder in list_session_folders(data) if not session_folder.withdrawn)
         or "none"

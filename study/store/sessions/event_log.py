@@ -234,6 +234,10 @@ def _parse_next_line(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Even
                 "Use the hapteq that began it, or a newer one.",
                 saved="Nothing was changed.",
             ) from problem
+        title, remedy = (
+            "The session log is damaged",
+            "Keep the folder as it is and restore the file from a copy; nothing was changed.",
+        )
         clause, saved_text = (
             "is not an event that this version knows",
             f"The {line_number - 1} lines before it are whole.",
@@ -244,12 +248,11 @@ def _parse_next_line(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Even
                 line_number > 1 and not chain.first_checksum_line
             ):  # This checksum covers earlier lines without a checksum, too.
                 clause, saved_text = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
-        raise StudyError(
-            "The session log is damaged",
-            f"Line {line_number} of {path.name} in {path.parent.name} {clause}.",
-            "Keep the folder as it is and restore the file from a copy; nothing was changed.",
-            saved=saved_text,
-        ) from problem
+        elif verify_checksum(chain, line)[1] != line:  # it has a checksum, which is right
+            title = "The session log holds an unknown event"
+            remedy = "It is not damaged: use the newer hapteq that wrote it. If it was edited, restore it from a copy."
+        happened = f"Line {line_number} of {path.name} in {path.parent.name} {clause}."
+        raise StudyError(title, happened, remedy, saved=saved_text) from problem
 
 
 def _has_newer_version(line: bytes) -> bool:

@@ -12,6 +12,7 @@ import os
 import secrets
 import stat
 import time
+from contextlib import suppress
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_args
@@ -34,7 +35,9 @@ REQUEST_CLASSES: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAs
 _STOP_PREFIX = "stop"
 """Beginning of the name of a request to stop: it counts even if its content cannot be read."""
 _NOTE_PREFIX = "note-"
-"""Beginning of the name of a note: unread notes are kept from one sitting to the next."""
+"""Beginning of the name of a note: notes that are not logged yet are kept from one sitting to the next."""
+_TAKEN_PREFIX = ".taken-"
+"""Put before the name of a note that was taken and is not logged yet, so that it survives the end of the program."""
 _SOURCES = get_args(RequestSource)
 """Origins of requests (`who`) that a reader accepts."""
 _MAX_REQUEST_BYTES = 1 << 16
@@ -56,18 +59,26 @@ class RequestInbox:
 
     def send(self, request: Request) -> str:
         """Write a request. Returns its name, for `is_unread` and `take_back`. Raises StudyError if it cannot be
-        written."""
+        written, or is larger than the session reads."""
         kind = next(
             kind_name for kind_name, request_class in REQUEST_CLASSES.items() if isinstance(request, request_class)
         )
         unique_key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_request_counter):06d}-{secrets.token_hex(4)}"
         name = f"{kind}-{unique_key}.json"
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
+        content = f"{json.dumps(document)}\n".encode()
+        if len(content) > _MAX_REQUEST_BYTES:
+            raise StudyError(
+                f"This {kind} is too long for a running session",
+                f"It has {len(content)} bytes as it is sent, and up to {_MAX_REQUEST_BYTES} are read.",
+                "Send it in parts, or when the session has ended.",
+                saved="Nothing was sent.",
+            )
         temporary_path = self._folder / f".{name}.part"
         try:
             self._make_folder()
             # No fsync: a request concerns only the running session and need not survive a power failure.
-            write_private(temporary_path, f"{json.dumps(document)}\n".encode())
+            write_private(temporary_path, content)
             temporary_path.replace(self._folder / name)
         except OSError as problem:
             raise StudyError(
@@ -90,32 +101,41 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """Remove all files but unread notes, such as old requests to stop or pause and unusable requests, at the start
-        of a sitting. Notes are kept for the log. Never raises."""
-        try:
+        """Remove all files but notes, such as old requests to stop or pause and unusable requests, at the start of a
+        sitting. Notes are kept for the log; those that were taken, but not logged because the program ended, become
+        unread again. Never raises."""
+        with suppress(OSError):
             self._make_folder()
-            names = os.listdir(self._folder)  # noqa: PTH208
-        except OSError:
-            return
-        for name in names:
-            if not name.startswith(_NOTE_PREFIX):
+        for name in self._list_names():
+            if name.startswith(_TAKEN_PREFIX + _NOTE_PREFIX):
+                self._rename(name, name.removeprefix(_TAKEN_PREFIX))
+            elif not name.startswith(_NOTE_PREFIX):
+                self._remove(name)
+
+    def forget_logged(self) -> None:
+        """Remove the notes that were taken: all of them are in the log now. Never raises."""
+        for name in self._list_names():
+            if name.startswith(_TAKEN_PREFIX):
                 self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
         """Take and remove up to `_MAX_TAKEN_PER_CALL` requests, stops first, then oldest first; invalid ones other than
-        stops are set aside. Never raises."""
-        try:
-            # listdir takes half the time of Path.iterdir.
-            file_names = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
-        except OSError:
-            return ()
+        stops are set aside. The file of a note is kept under another name until `forget_logged`. Never raises."""
         names = sorted(
-            (file_name for file_name in file_names if file_name[0] != "." and file_name not in self._ignored_names),
+            (name for name in self._list_names() if name[0] != "." and name not in self._ignored_names),
             key=_make_sort_key,
         )
         return tuple(
             request for name in names[:_MAX_TAKEN_PER_CALL] if (request := self._take_request(name)) is not None
         )
+
+    def _list_names(self) -> list[str]:
+        """List the names of the files in the folder; empty where it is missing, a link, or cannot be read."""
+        try:
+            # listdir takes half the time of Path.iterdir.
+            return os.listdir(self._folder) if is_real_folder(self._folder) else []  # noqa: PTH208
+        except OSError:
+            return []
 
     def _make_folder(self) -> None:
         """Create the folder. Raises OSError, also for a symbolic link, which may lead outside the session."""
@@ -129,10 +149,13 @@ class RequestInbox:
         request = _parse_request(_read_content(self._folder / name))
         if request is None and name.startswith(_STOP_PREFIX):
             request = StopAsked("experimenter")
-        if request is None:
-            self._set_aside(name)
-        else:
-            self._remove(name)
+        match request:
+            case None:
+                self._rename(name, f".unusable-{name}")  # set aside, for later inspection
+            case NoteAsked():
+                self._rename(name, _TAKEN_PREFIX + name)
+            case _:
+                self._remove(name)
         return request
 
     def _remove(self, name: str) -> None:
@@ -142,10 +165,10 @@ class RequestInbox:
         except OSError:
             self._ignored_names.add(name)
 
-    def _set_aside(self, name: str) -> None:
-        """Rename to a hidden name, for later inspection; where that fails, ignore the file from now on."""
+    def _rename(self, name: str, new_name: str) -> None:
+        """Rename a file of the folder; where that fails, ignore it from now on."""
         try:
-            (self._folder / name).rename(self._folder / f".unusable-{name}")
+            (self._folder / name).rename(self._folder / new_name)
         except OSError:
             self._ignored_names.add(name)
 

@@ -13,7 +13,7 @@ from typing import Any
 from study.errors import StudyError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.real_folder import is_real_file, is_real_folder, open_folder
-from study.store.sessions.archive import FOLDER_PATTERN, SessionFolder, locate_withdrawal_record
+from study.store.sessions.archive import FOLDER_PATTERN, SessionFolder, holds_session, locate_withdrawal_record
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 
 TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
@@ -68,7 +68,7 @@ def read_intent(data_folder: Path, subject: str) -> WithdrawalIntent | None:
             for name, participant_document in document["sessions"].items()
             if _is_session_of_subject(name, subject)
         }
-        derived = tuple(str(name) for name in document["derived"] if _is_erasable_path(str(name)))
+        derived = tuple(str(name) for name in document["derived"] if _is_erasable_path(data_folder, str(name)))
         return WithdrawalIntent(subject, str(document["withdrawn_utc"]), sessions, derived)
     except (StudyError, AttributeError, KeyError, TypeError):
         return None
@@ -147,10 +147,10 @@ def _is_session_of_subject(name: Any, subject: str) -> bool:
     return match is not None and match["subject"] == subject
 
 
-def _is_erasable_path(name: str) -> bool:
+def _is_erasable_path(data_folder: Path, name: str) -> bool:
     """Whether a path stays within the data folder and outside all session folders, so that it may be erased."""
     path = PurePosixPath(name)
     if not path.parts or path.is_absolute() or ".." in path.parts:
         return False
     # Files in a session folder are erased with that folder, or belong to another participant.
-    return FOLDER_PATTERN.fullmatch(path.parts[0]) is None
+    return not holds_session(data_folder / path.parts[0])

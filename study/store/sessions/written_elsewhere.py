@@ -9,10 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
-from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import CannotWriteError, NotSyncedError
+from study.store.disk.privacy import PRIVATE_FILE
 from study.store.disk.real_folder import is_real_file
-from study.store.sessions.archive import FOLDER_PATTERN
+from study.store.sessions.archive import holds_session
 
 WRITTEN_ELSEWHERE_NAME = "written_elsewhere.txt"
 """Name of the file in the data folder; one absolute path per line."""
@@ -29,7 +28,7 @@ def note_written_folder(source: Path, folder: Path, even_if_searched: bool = Fal
     a withdrawal does not recognise.
     """
     folder, source = folder.resolve(), source.resolve()
-    data_folder = source.parent if FOLDER_PATTERN.fullmatch(source.name) else source
+    data_folder = source.parent if holds_session(source) else source
     try:
         noted_folders = _read_list(data_folder)
     except OSError:
@@ -38,14 +37,13 @@ def note_written_folder(source: Path, folder: Path, even_if_searched: bool = Fal
     is_searched = (
         not even_if_searched
         and relative_parts is not None
-        and (len(relative_parts) < 2 or FOLDER_PATTERN.fullmatch(relative_parts[0]) is not None)
+        and (len(relative_parts) < 2 or holds_session(data_folder / relative_parts[0]))
     )
-    if is_searched or folder in noted_folders:
-        return
-    text = "".join(str(path).replace("\n", LINE_BREAK_REPLACEMENT) + "\n" for path in (*noted_folders, folder))
-    with suppress(CannotWriteError, NotSyncedError):
-        # fsencode keeps the bytes of a name as the system has them: they need not be UTF-8.
-        write_atomically(data_folder / WRITTEN_ELSEWHERE_NAME, os.fsencode(text), overwrite=True)
+    if not is_searched and folder not in noted_folders:
+        with suppress(OSError):
+            # fsencode keeps the bytes of a name as the system has them: they need not be UTF-8.
+            line = os.fsencode(str(folder).replace("\n", LINE_BREAK_REPLACEMENT) + "\n")
+            _append_line(data_folder / WRITTEN_ELSEWHERE_NAME, line)
 
 
 def read_written_folders(data_folder: Path) -> tuple[Path, ...]:
@@ -55,6 +53,17 @@ def read_written_folders(data_folder: Path) -> tuple[Path, ...]:
         return _read_list(data_folder)
     except OSError:
         return ()
+
+
+def _append_line(list_path: Path, line: bytes) -> None:
+    """Append a line with its end, on a line of its own, and sync it to the disk; a link in the place of the list is
+    replaced. By appending, programs that export at the same time do not lose each other's lines. Raises OSError."""
+    if list_path.is_symlink():
+        list_path.unlink()
+    with os.fdopen(os.open(list_path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE_FILE), "r+b", 0) as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - 1))
+        file.write((b"" if file.read(1) in (b"", b"\n") else b"\n") + line)
+        os.fsync(file.fileno())
 
 
 def _read_list(data_folder: Path) -> tuple[Path, ...]:

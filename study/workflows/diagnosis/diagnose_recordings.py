@@ -170,18 +170,18 @@ def _read_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisIn
 
 
 def write_result_folder(diagnosis: UnwrittenDiagnosis, on_progress: Progress) -> DiagnosedRecordings:
-    """Write document, improved model, figures and page atomically (second part of `diagnose_recordings`)."""
+    """Write document, improved model, figures and page atomically (second part of `diagnose_recordings`). Raises
+    StudyError where a file cannot be written or the participant of a diagnosed session withdrew meanwhile."""
     # Imported here because plotting is slow to import, and the answer comes first.
-    from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
+    from study.store.sessions.archive import require_consent
+    from study.workflows.diagnosis.write_diagnosis import note_sessions, write_diagnosis_into
 
     on_progress("writing the report", DIAGNOSED_SHARE)
     plan = diagnosis.plan
-    for session_folder in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
-        from study.store.sessions.written_elsewhere import note_written_folder
-
-        note_written_folder(session_folder, plan.out)  # listed in the data folder, for a withdrawal
+    sessions = note_sessions((*plan.sources, *plan.clean), plan.out)
     with create_new_folder(plan.out) as folder:
         findings = write_diagnosis_into(folder, diagnosis.findings, diagnosis.parents)
+        require_consent(sessions)
     on_progress("done", 1.0)
     return DiagnosedRecordings(findings, plan.out)
 

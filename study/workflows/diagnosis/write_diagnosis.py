@@ -18,9 +18,20 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
 from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.forked_map import map_forked
 from study.workflows.picture_files import DrawnPicture, draw_picture, write_drawn_pictures
+
+
+def note_sessions(sources: Sequence[Path], out: Path) -> tuple[SessionFolder, ...]:
+    """Note the result's folder in the data folders of the sources that are sessions, so that a withdrawal names it.
+    Returns these sessions."""
+    session_folders = [source for source in sources if source.is_dir()]
+    for session_folder in session_folders:
+        note_written_folder(session_folder, out)
+    return tuple(SessionFolder(session_folder.resolve()) for session_folder in session_folders)
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:

@@ -5,6 +5,7 @@ hierarchical model, analysis of variance); the results are written with their pr
 """
 
 import errno
+from contextlib import suppress
 from pathlib import Path
 
 from analysis.figures.picture import Picture
@@ -15,7 +16,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
 from analysis.reports.primary_tables import describe_direction_limit, format_median_interval
 from analysis.reports.study_report import render_study_report
-from study.errors import StudyError
+from study.errors import StudyError, WrongUseError
 from study.local_clock import format_local_now
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
@@ -24,9 +25,10 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
+from study.store.sessions.archive import holds_session, require_consent
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.picture_files import write_pictures
-from study.workflows.results.analysis_files import PAGE_NAME, STATISTICS_NAME, list_analysis_outputs
+from study.workflows.results.analysis_files import ANALYSIS_NAME, PAGE_NAME, STATISTICS_NAME, list_analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.export_study import collect_exported, is_exported
@@ -38,9 +40,11 @@ def analyze_data(
 ) -> WrittenAnalysis:
     """Analyse the sessions in `data`; an earlier analysis in `out_folder` is replaced. data: folder of sessions, a
     single session, or an exported dataset. ellipsoid: recording whose acceleration ellipses the report shows.
-    protocol_name: protocol to analyse where sessions follow several. Raises StudyError where there is nothing to
-    analyse, rows contradict their protocol, ellipses cannot be computed, or files cannot be written."""
+    protocol_name: protocol to analyse where sessions follow several. Raises StudyError where `out_folder` is a session,
+    there is nothing to analyse, rows contradict their protocol, ellipses cannot be computed, files cannot be written,
+    or a participant withdrew meanwhile."""
     data, out_folder, ellipsoid = Path(data), Path(out_folder), None if ellipsoid is None else Path(ellipsoid)
+    _require_no_session(out_folder)
     collected_trials = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected_trials.trials, collected_trials.protocol, collected_trials.exclusions)
@@ -61,12 +65,24 @@ def analyze_data(
     _create_private_folder(out_folder, data)
     note_written_folder(data, out_folder)
     _write_files(out_folder, analysis, pictures, ellipses, provenance, collected_trials)
+    _remove_if_withdrawn(out_folder, collected_trials)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
         table=tuple(format_threshold_lines(analysis)),
         warnings=(*collected_trials.result_file_notes, *collected_trials.exclusions, *analysis.warnings),
         report=out_folder / PAGE_NAME,
     )
+
+
+def _require_no_session(out_folder: Path) -> None:
+    """Raise WrongUseError where the output folder is a session, whose own tables have the same names."""
+    if holds_session(out_folder.resolve()):
+        raise WrongUseError(
+            "Results cannot be written into a session",
+            f"{out_folder} is the folder of a session, and the analysis would replace its tables.",
+            f"Give another folder with --out; by default it is '{ANALYSIS_NAME}' in the analysed folder.",
+            saved="Nothing was written.",
+        )
 
 
 def format_threshold_lines(analysis: StudyAnalysis) -> list[str]:
@@ -173,6 +189,20 @@ def _write_files(
         analysis, pictures, origin, format_local_now(), ellipses, collected_trials.model_qualities
     )
     write_text(folder / PAGE_NAME, report_html, overwrite=True)
+
+
+def _remove_if_withdrawn(folder: Path, collected_trials: CollectedTrials) -> None:
+    """Remove the files of the analysis, and raise StudyError, where a participant withdrew since the sessions were
+    collected."""
+    try:
+        require_consent(collected_trials.sessions)
+    except StudyError:
+        for path in list_analysis_outputs(folder):
+            path.unlink(missing_ok=True)
+        for emptied_folder in (folder / "figures", folder):
+            with suppress(OSError):  # it holds files of others
+                emptied_folder.rmdir()
+        raise
 
 
 def _list_origin(provenance: Provenance, collected_trials: CollectedTrials) -> dict[str, str]:

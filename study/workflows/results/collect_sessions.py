@@ -16,7 +16,7 @@ from study.session.facts.events import FormFilled
 from study.session.state.state import SessionState
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.store.formats.answer_table import FORM_NAMES, FilledForm
-from study.store.sessions.archive import SessionFolder, list_session_folders
+from study.store.sessions.archive import SessionFolder, SessionWithdrawnError, holds_session, list_session_folders
 from study.store.sessions.event_log import LOG_NAME
 from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.fold_session import FoldedSession, fold_session
@@ -103,9 +103,12 @@ def _group_model_qualities(
 
 def _list_folders(data: Path) -> tuple[SessionFolder, ...]:
     """List the session folders in `data`, or `data` itself if it is a session. Raises WrongUseError where there are
-    none."""
+    none, SessionWithdrawnError for a session that was withdrawn."""
+    session = SessionFolder(data.resolve())
+    if holds_session(session.path) and session.withdrawn:
+        raise SessionWithdrawnError(session)
     if (data / LOG_NAME).exists():
-        return (SessionFolder(data.resolve()),)
+        return (session,)
     folders = list_session_folders(data)
     if not folders:
         raise WrongUseError(

@@ -31,7 +31,7 @@ from study.store.formats.psych_ds import (
     write_psych_ds,
 )
 from study.store.formats.trials_mat import write_trials_mat
-from study.store.sessions.archive import SessionFolder
+from study.store.sessions.archive import SessionFolder, require_consent
 from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.results.collected_trials import CollectedTrials
 
@@ -67,7 +67,7 @@ def export_study(
 ) -> ExportResult:
     """Write the dataset atomically into `out_folder`, new or empty. collected: the sessions of the data folder `data`
     that belong together. free_text: include answers that participants wrote in their own words. Raises StudyError where
-    `out_folder` exists and is not an empty folder, or cannot be written."""
+    `out_folder` exists and is not an empty folder, or cannot be written, and where a participant withdrew meanwhile."""
     require_new_folder(out_folder)
     metadata, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
     # Before the folder exists, so that a withdrawal names it even if the program ends here.
@@ -77,6 +77,7 @@ def export_study(
             folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), metadata, answers
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
+        require_consent(collected.sessions)  # again: a withdrawal may have begun since they were collected
     return ExportResult(out_folder, names, len(collected.trials), collected.exclusions)
 
 

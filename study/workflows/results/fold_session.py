@@ -16,7 +16,7 @@ from study.session.state.presentation_check import LogContradictionError
 from study.session.state.state import SessionState, begin_session
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
-from study.store.sessions.log_seal import check_seals
+from study.store.sessions.log_seal import check_seals, find_seals
 from study.store.sessions.session_summary import SUMMARY_NAME, read_closed_and_presentations, read_summary
 
 
@@ -46,11 +46,7 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
         raise SessionWithdrawnError(folder)
     log_contents = read_log(folder.log)
     if not log_contents.events or not isinstance(log_contents.events[0], SessionOpened):
-        raise StudyError(
-            "This session never began",
-            f"The log of {folder.name} has no opening line; the program died while it was made.",
-            "Start a new session; the folder holds no answers and may be deleted.",
-        )
+        raise _make_unopened_error(folder, log_contents)
     session_opened = log_contents.events[0]
     if (session_opened.session, session_opened.subject) != (folder.name, folder.subject):
         raise StudyError(
@@ -76,6 +72,24 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
     if not state.closed:
         _require_complete_log(state, folder)
     return FoldedSession(state, log_contents, sealed_lines)
+
+
+def _make_unopened_error(folder: SessionFolder, log_contents: LogContents) -> StudyError:
+    """Make the error for a log without opening line: of a session that never began, or a log whose beginning was lost,
+    where further lines, results or recordings exist."""
+    has_results = (folder.path / SUMMARY_NAME).exists() or bool(find_seals(folder.path))
+    if log_contents.events or has_results or any(folder.recordings.glob("*.h5")):
+        return StudyError(
+            "The beginning of this session's log is missing",
+            f"{folder.log.name} of {folder.name} has no opening line, but the folder holds data of a session.",
+            f"Keep the folder as it is, and restore {folder.log.name} from a copy.",
+            saved="Nothing was changed.",
+        )
+    return StudyError(
+        "This session never began",
+        f"The log of {folder.name} has no opening line; the program died while it was made.",
+        "Start a new session; the folder holds no answers and may be deleted.",
+    )
 
 
 def _require_complete_log(state: SessionState, folder: SessionFolder) -> None:

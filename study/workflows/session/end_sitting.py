@@ -83,11 +83,10 @@ def _make_unfinished_error(sitting: ConductedSitting) -> StudyError:
 
 def _erase_participant(sitting: ConductedSitting, utc: str) -> StudyError:
     """Erase all data of the participant. Returns the error to raise, which lists the erased sessions."""
-    data_folder, plan = sitting.folder.path.parent, plan_withdrawal(sitting.folder)
-    external_copies = list_remaining_copies(data_folder, plan)
-    withdraw(data_folder, plan, utc)
+    data_folder = sitting.folder.path.parent
+    erased = withdraw(data_folder, plan_withdrawal(sitting.folder), utc)
     return UserInterruptError(
         "The participant withdrew",
-        f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
-        " ".join((*plan.doubtful, *external_copies)),
+        f"Everything recorded of {erased.subject} was erased: {', '.join(erased.sessions)}.",
+        " ".join((*erased.doubtful, *list_remaining_copies(data_folder, erased))),
     )

@@ -12,6 +12,7 @@ import io
 import json
 import re
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 from study.regular_file import open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
-from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder
+from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, holds_session
 from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE_NAME
@@ -64,8 +65,14 @@ def find_traces(data: Path, subject: str, proved_names: Collection[str] = ()) ->
             doubtful += _describe_other_folder(path, subject)
         elif path.is_symlink() and path.name == ANALYSIS_NAME:
             doubtful.append(f"{path.name} is a link; what it leads to was not looked at.")
-    for folder in (data, *(entry for entry in sorted(data.iterdir()) if _may_hold_analysis(entry))):
-        proved_paths, doubtful_paths = _find_analysis_traces(folder, subject, is_separate=folder != data)
+    for folder in (data, *(entry for entry in sorted(data.iterdir()) if _may_hold_analysis(entry, subject))):
+        try:
+            proved_paths, doubtful_paths = _find_analysis_traces(folder, subject, is_separate=folder != data)
+        except OSError as problem:
+            if folder == data:
+                raise
+            doubtful.append(f"{folder.name} cannot be looked into: {problem.strerror}.")
+            continue
         derived += [path.relative_to(data).as_posix() for path in proved_paths]
         doubtful += [f"{path.relative_to(data)} does not say whose numbers it holds." for path in doubtful_paths]
     doubtful += [
@@ -129,12 +136,14 @@ def _describe_unproved_session(path: Path, subject: str) -> str:
     """Describe a folder or link that is named like a session of the subject, but is not proved to be one."""
     if path.is_symlink():
         return f"{path.name} is a link; neither it nor what it leads to was touched."
-    return f"{path.name} holds no log that says it is a session of {subject}."
+    return next(
+        _describe_other_folder(path, subject), f"{path.name} holds no log that says it is a session of {subject}."
+    )
 
 
 def _describe_other_folder(path: Path, subject: str) -> Iterator[str]:
-    """Describe a folder not named like a session that contains a log, or a diagnosis, of the subject, in one sentence;
-    yields nothing for other folders."""
+    """Describe a folder that contains a log of the subject and is not named like its session, or a diagnosis of the
+    subject, in one sentence; yields nothing for other folders."""
     identity = _read_opening(SessionFolder(path))
     if identity is not None and identity[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
@@ -142,13 +151,12 @@ def _describe_other_folder(path: Path, subject: str) -> Iterator[str]:
         yield f"{path.name} holds a diagnosis that names {subject}."
 
 
-def _may_hold_analysis(path: Path) -> bool:
-    """Whether the path is a real folder that is neither named like a session nor unfinished."""
-    return (
-        is_real_folder(path)
-        and FOLDER_PATTERN.fullmatch(path.name) is None
-        and UNFINISHED_PATTERN.fullmatch(path.name) is None
-    )
+def _may_hold_analysis(path: Path, subject: str) -> bool:
+    """Whether the path is a real folder that is neither that of a session, nor named like one of the subject, nor
+    unfinished."""
+    name_match = FOLDER_PATTERN.fullmatch(path.name)
+    is_session = holds_session(path) or (name_match is not None and name_match["subject"] == subject)
+    return is_real_folder(path) and not is_session and UNFINISHED_PATTERN.fullmatch(path.name) is None
 
 
 def _find_analysis_traces(folder: Path, subject: str, is_separate: bool) -> tuple[list[Path], list[Path]]:
@@ -215,7 +223,9 @@ def _has_session_name(path: Path, subject: str) -> bool:
     if session_pattern.search(path.name):
         return True
     if is_real_folder(path):
-        return any(_has_session_name(entry, subject) for entry in sorted(path.iterdir()))
+        with suppress(OSError):  # a folder that cannot be looked into is not proved to be the subject's
+            return any(_has_session_name(entry, subject) for entry in sorted(path.iterdir()))
+        return False
     return path.suffix in SEARCHED_EXTENSIONS and session_pattern.search(_read_text_file(path) or "") is not None
 
 

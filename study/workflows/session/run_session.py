@@ -60,6 +60,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     KeyboardInterrupt (Ctrl-C, a closed terminal) stops the device at once and is raised as UserInterruptError, or as
     DeviceError where the force may still be on; a session that is closed in the log, or whose participant is
     ineligible, ends normally instead. A StudyError is extended by the number of saved answers and the resume command.
+    In both cases notes that are not logged yet are logged first.
     """
     try:
         session_end = _run_sitting(state, sitting)
@@ -115,6 +116,7 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
         return SessionEnd(state, end_reason="")
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
+        write_notes(state, sitting)
         sitting.log.append(
             SessionInterrupted(
                 utc=sitting.clock.utc(),
@@ -140,6 +142,7 @@ def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
             error.saved = f"{format_answer_count(state.answers)} on disk."
             resume_command = format_resume_command(str(sitting.folder.path), sitting.device_name)
             error.do_now = f"{error.do_now} Then continue with: {resume_command}"
+        write_notes(state, sitting)
     return error
 
 

@@ -7,7 +7,9 @@ command continues an interrupted withdrawal.
 """
 
 import errno
+import glob
 import os
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -15,7 +17,13 @@ from pathlib import Path, PurePosixPath
 from study.errors import StudyError, WrongUseError
 from study.store.disk.file_errors import CannotWriteError, NotSyncedError
 from study.store.disk.real_folder import OpenedFolder, is_real_file, is_real_folder, open_folder
-from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, locate_withdrawal_record
+from study.store.sessions.archive import (
+    FOLDER_PATTERN,
+    TOMBSTONE_NAME,
+    SessionFolder,
+    locate_withdrawal_record,
+    require_single_folder,
+)
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import SESSION_LOCK_NAME, hold_session_lock
 from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
@@ -49,7 +57,8 @@ class Withdrawal:
 
 def find_session_to_withdraw(session: str, data: Path) -> SessionFolder:
     """Find the session by the path of its folder or by its name in `data`; it may be withdrawn already. Raises
-    WrongUseError for an unknown session, and for a symbolic link, which is not followed."""
+    WrongUseError for an unknown session, one of two of this name, and a symbolic link, which is not followed."""
+    require_single_folder(session, data)
     path = Path(session) if Path(session).is_dir() else data / session
     folder = SessionFolder(path.absolute().parent.resolve() / path.absolute().name)
     if folder.path.is_symlink():
@@ -85,25 +94,25 @@ def plan_withdrawal(session: SessionFolder) -> Withdrawal:
     return Withdrawal(subject, traces.sessions, tuple(dict.fromkeys(derived)), traces.doubtful)
 
 
-def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
-    """Erase the data of the plan and write the tombstones. utc: time of the withdrawal, not used if an interrupted one
-    is continued. Raises StudyError: before any data are erased if a session is running; at any time where the operating
-    system does not allow to erase or write a file."""
+def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> Withdrawal:
+    """Erase the data of the plan, and those that were written since it was made, and write the tombstones. Returns what
+    was erased. utc: time of the withdrawal, not used if an interrupted one is continued. Raises StudyError: before any
+    data are erased if a session is running; at any time where the operating system does not allow to erase or write a
+    file."""
     data, subject = data.resolve(), withdrawal.subject
-    folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
         with ExitStack() as locks, open_folder(data) as data_folder:
-            for folder in folders:
-                _lock_for_erasing(folder, locks)
-            intent = read_intent(data, subject)
-            participants_by_session = {folder.name: read_begun_participant(folder) for folder in folders}
-            withdrawn_utc = intent.withdrawn_utc if intent else utc
-            write_intent(data, WithdrawalIntent(subject, withdrawn_utc, participants_by_session, withdrawal.derived))
-            for name in withdrawal.derived:
+            _lock_for_erasing(data, withdrawal.sessions, locks)
+            _write_intent(data, withdrawal, utc)
+            # The intent keeps analyses and exports from being finished: what was finished before it is found now.
+            erased = _add_to_plan(withdrawal, plan_withdrawal(SessionFolder(data / f"{subject}_001")))
+            _lock_for_erasing(data, erased.sessions[len(withdrawal.sessions) :], locks)
+            intent = _write_intent(data, erased, utc)
+            for name in erased.derived:
                 _erase_derived(data_folder, name)
-            for folder in folders:
-                _erase_session(data_folder, folder)
-                write_tombstone(folder, withdrawn_utc, participants_by_session[folder.name])
+            for name, participant in intent.sessions.items():
+                _erase_session(data_folder, SessionFolder(data / name))
+                write_tombstone(SessionFolder(data / name), intent.withdrawn_utc, participant)
             data_folder.sync()
             data_folder.erase(locate_withdrawal_record(data, subject).name)
             data_folder.sync()
@@ -111,28 +120,92 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
         raise _make_incomplete_error(data, withdrawal, problem) from problem
     except (CannotWriteError, NotSyncedError) as failure:
         raise _make_incomplete_error(data, withdrawal, failure.problem) from failure
+    return erased
 
 
 def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     """List the analyses and exports that a withdrawal does not search and that name or may name the participant, a
     sentence each, as far as their folders were recorded when they were written (`note_written_folder`); the last
     sentence is a reminder of other copies."""
-    recorded_paths = [path for path in read_written_folders(data) if path.exists()]
-    naming_paths = [path for path in recorded_paths if is_subject_in_analysis(path, withdrawal.subject) is not False]
+    naming_paths = [path for path in _find_copies(data) if _may_name(path, withdrawal.subject)]
     return (*(f"Written with --out, and not erased: {path}" for path in naming_paths), COPIES_REMINDER)
 
 
-def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
-    """Lock session and log until `locks` is closed. Raises OSError unless a real folder is at the folder's path, and
-    StudyError if the session is running."""
-    if not is_real_folder(folder.path):
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
-    lock_path = folder.path / SESSION_LOCK_NAME
-    if lock_path.is_symlink():
-        lock_path.unlink()
-    locks.enter_context(hold_session_lock(folder.path))
-    if is_real_file(folder.log):
-        locks.enter_context(hold_log_lock(folder.log))
+def _find_copies(data: Path) -> tuple[Path, ...]:
+    """Find the recorded folders that exist, the unfinished ones of interrupted exports beside them, and what is
+    recorded in these folders in turn: analyses of an export."""
+    found: dict[Path, None] = {}
+    unread = [data]
+    while unread:
+        for recorded in read_written_folders(unread.pop()):
+            for path in (recorded, *_list_unfinished(recorded)):
+                if path not in found and not _is_gone(path):
+                    found[path] = None
+                    unread.append(path)
+    return tuple(found)
+
+
+def _list_unfinished(folder: Path) -> list[Path]:
+    """List the unfinished folders beside this one, which an interrupted export to it left (`create_new_folder`)."""
+    try:
+        return sorted(folder.parent.glob(f".{glob.escape(folder.name)}.*.part"))
+    except OSError:  # their folder cannot be seen: `folder` is named all the same
+        return []
+
+
+def _is_gone(path: Path) -> bool:
+    """Whether there is nothing at the path; False where that cannot be seen."""
+    try:
+        path.lstat()
+    except OSError as problem:
+        return isinstance(problem, FileNotFoundError | NotADirectoryError)
+    return False
+
+
+def _may_name(path: Path, subject: str) -> bool:
+    """Whether the analysis or export in a folder names the subject, or it cannot be determined."""
+    try:
+        return is_subject_in_analysis(path, subject) is not False
+    except OSError:
+        return True
+
+
+def _write_intent(data: Path, withdrawal: Withdrawal, utc: str) -> WithdrawalIntent:
+    """Write the intent of this plan; an earlier intent keeps its time. Returns it. Raises as `write_intent`."""
+    earlier_intent = read_intent(data, withdrawal.subject)
+    intent = WithdrawalIntent(
+        withdrawal.subject,
+        earlier_intent.withdrawn_utc if earlier_intent else utc,
+        {name: read_begun_participant(SessionFolder(data / name)) for name in withdrawal.sessions},
+        withdrawal.derived,
+    )
+    if intent != earlier_intent:
+        write_intent(data, intent)
+    return intent
+
+
+def _add_to_plan(plan: Withdrawal, later_plan: Withdrawal) -> Withdrawal:
+    """Add what a later plan found, after what the first plan has."""
+    return Withdrawal(
+        plan.subject,
+        tuple(dict.fromkeys((*plan.sessions, *later_plan.sessions))),
+        tuple(dict.fromkeys((*plan.derived, *later_plan.derived))),
+        later_plan.doubtful,
+    )
+
+
+def _lock_for_erasing(data: Path, names: Iterable[str], locks: ExitStack) -> None:
+    """Lock sessions and their logs until `locks` is closed. Raises OSError unless real folders are at their paths, and
+    StudyError if a session is running."""
+    for folder in (SessionFolder(data / name) for name in names):
+        if not is_real_folder(folder.path):
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
+        lock_path = folder.path / SESSION_LOCK_NAME
+        if lock_path.is_symlink():
+            lock_path.unlink()
+        locks.enter_context(hold_session_lock(folder.path))
+        if is_real_file(folder.log):
+            locks.enter_context(hold_log_lock(folder.log))
 
 
 def _erase_session(data: OpenedFolder, folder: SessionFolder) -> None:
@@ -171,6 +244,6 @@ def _make_incomplete_error(data: Path, withdrawal: Withdrawal, problem: OSError)
     return StudyError(
         "Not everything could be erased",
         f"Of {withdrawal.subject}: {problem.strerror or problem}{file_text}.",
-        f"Correct the permissions and continue with: hapteq withdraw {session_name} --data {data}",
+        f"Correct this and continue with: hapteq withdraw {session_name} --data {data}",
         saved="What remains is no longer used as data once erasing has begun.",
     )

@@ -18,6 +18,7 @@ from study.session.state.state import SessionState
 from study.session.watching.requests import NoteAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
+from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.trial.display import Display, Hand
 from study.workflows.trial.session_supervisor import SessionSupervisor
 
@@ -113,9 +114,12 @@ def notify_experimenter(sentence: str, sitting: Sitting) -> None:
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
     """Take pending requests, then log all notes since the last call."""
     sitting.supervisor.listen()
-    for note in sitting.supervisor.take_notes():
+    if not (notes := sitting.supervisor.take_notes()):
+        return state
+    for note in notes:
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
         state = log_and_apply(state, event, sitting)
+    RequestInbox(sitting.folder.path).forget_logged()
     return state
 
 

@@ -8,11 +8,12 @@ from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.facts.events import NoteTaken
 from study.session.watching.requests import NoteAsked
-from study.store.disk.provenance import replace_invalid_bytes
+from study.store.disk.text_file import replace_invalid_bytes
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, remove_incomplete_line
 from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.log_seal import seal_log
+from study.store.sessions.request_inbox import RequestInbox
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.send_request import send_request
@@ -22,7 +23,8 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     """Write a note. Returns True if it was appended to the log or the running session received it, False if it waits in
     the inbox of the running session.
 
-    Before it is appended, an incomplete last line of the log is removed; afterwards a closed session is sealed again.
+    Before it is appended, an incomplete last line of the log is removed, and notes are appended that an ended session
+    left in its inbox; afterwards a closed session is sealed again.
     Raises StudyError for an empty text or one that is not UTF-8, where the log cannot be read or written, and where
     another program holds the session's lock.
     """
@@ -35,8 +37,12 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             "Type it again.",
             saved="Nothing was changed.",
         )
-    if is_log_locked(folder.log):
-        return send_request(folder, note, clock)
+    is_sent = is_log_locked(folder.log) is True
+    if is_sent and send_request(folder, note, clock):
+        return True
+    if is_sent and is_log_locked(folder.log):
+        return False
+    # The session does not run, or ended before it received the note, which then waits in the inbox.
     with hold_session_lock(folder.path):
         log = EventLog.reopen(folder.log)
         try:
@@ -45,7 +51,12 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             if log_contents.torn:
                 remove_incomplete_line(folder.log, log_contents)
                 log.append(_make_program_note(f"a torn last line was cut off: {log_contents.torn}", clock))
-            log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
+            inbox = RequestInbox(folder.path)
+            inbox.clear()
+            waiting_notes = [request for request in inbox.take() if isinstance(request, NoteAsked)]
+            for each in waiting_notes if is_sent else (*waiting_notes, note):
+                log.append(NoteTaken(utc=clock.utc(), who=each.who, text=each.text, adverse=each.adverse))
+            inbox.forget_logged()
             if folded_session.state.closed:
                 seal_log(folder.log)
         finally:

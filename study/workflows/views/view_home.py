@@ -4,6 +4,7 @@ Nothing is changed. Damaged files are listed with a remark or left out.
 """
 
 import tomllib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from study.devices.opening import DEVICES
 from study.errors import StudyError
 from study.session.views.archive_views import HomeView, ProtocolLine, SessionLine
 from study.session.views.printable import make_printable, replace_unprintable
+from study.store.disk.file_errors import CannotReadError
 from study.store.disk.text_file import read_toml_text
 from study.store.formats.identified_model_file import confirm_identified_model, read_identified_model
 from study.store.formats.protocol_files import ProtocolRefusedError, list_shipped_protocols, read_protocol
@@ -102,13 +104,16 @@ def _is_identified_model(path: Path) -> bool:
 
 
 def make_home_view(data: Path) -> HomeView:
-    """Make the content of the start screen. A missing data folder is shown as empty. Control characters are replaced,
-    except in the paths of sessions, protocols and models, by which the files are opened."""
+    """Make the content of the start screen. A data folder that is missing or cannot be read is shown as empty. Control
+    characters are replaced, except in the paths of sessions, protocols and models, by which the files are opened."""
     model_paths = list_model_files(data)
     qualities = tuple((model_path, describe_model_quality(model_path)) for model_path in model_paths)
+    session_lines: tuple[SessionLine, ...] = ()
+    with suppress(StudyError):
+        session_lines = list_session_lines(data)
     return HomeView(
         replace_unprintable(str(data)),
-        list_session_lines(data),
+        session_lines,
         tuple(replace(make_printable(line), name=line.name) for line in list_protocol_lines(data)),
         DEVICES,
         model_paths,
@@ -117,11 +122,11 @@ def make_home_view(data: Path) -> HomeView:
 
 
 def list_session_lines(data: Path) -> tuple[SessionLine, ...]:
-    """List the lines of all sessions, the latest first; empty if the folder cannot be read. Unreadable sessions are
-    listed with a remark."""
+    """List the lines of all sessions, the latest first; empty without the folder. Unreadable sessions are listed with a
+    remark. Raises CannotReadError where the folder cannot be read."""
     try:
         folders = list_session_folders(data)
-    except OSError:
-        return ()
+    except OSError as problem:
+        raise CannotReadError(data, problem) from problem
     lines = (replace(make_printable(make_session_line(folder)), path=str(folder.path)) for folder in folders)
     return tuple(sorted(lines, key=lambda line: (line.begun_utc, line.name), reverse=True))

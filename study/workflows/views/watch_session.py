@@ -14,6 +14,7 @@ from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, verify_checksum
 from study.session.facts.log_time import compute_wall_clock_s
 from study.session.state.presentation_check import LogContradictionError
+from study.session.views.printable import make_printable
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
 from study.session.watching.live_state import LiveState
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
@@ -62,15 +63,15 @@ class Follower:
         self._drifts: DriftReader | None = None
 
     def look(self, now_utc: str) -> WatchView | None:
-        """Read the new lines and make the view at the time now_utc (ISO 8601); None while there is no log, or no
-        complete line in it. Raises StudyError where the log cannot be read, or its first line is invalid, before a line
-        has been applied. Later damage is reported in the view."""
+        """Read the new lines and make the view at the time now_utc (ISO 8601), with control characters of notes and
+        names replaced; None while there is no log, or no complete line in it. Raises StudyError where the log cannot be
+        read, or its first line is invalid, before a line has been applied. Later damage is reported in the view."""
         self._read_new_lines()
         if self._watched is None:
             return None
         live = read_live(self._folder.path)
         live_info = LiveInfo(live, self._has_writer(live, now_utc), self._problem, self._update_drifts(self._watched))
-        self._view = make_watch_view(self._watched, live_info, now_utc, self._view)
+        self._view = make_printable(make_watch_view(self._watched, live_info, now_utc, self._view))
         return self._view
 
     def _update_drifts(self, watched: FollowedSession) -> tuple[DriftRecord, ...]:

@@ -1,6 +1,8 @@
 """`hapteq sessions` and `hapteq show`: the same as on the screens, for a script or a screen reader."""
 
+import errno
 import json
+import os
 import shutil
 from datetime import datetime
 from pathlib import Path
@@ -156,3 +158,25 @@ def test_the_plan_says_who_is_done_and_who_comes_next(run, taken, tmp_path):
     assert f"next: {study['next']['code']}" in out
     code, _, err = run("study-plan", tmp_path / "nothing")
     assert code == 2 and "There is no study to plan" in err
+
+
+@pytest.mark.usefixtures("validated_here")
+def test_a_folder_that_cannot_be_read_is_named_and_not_called_empty(run, taken, tmp_path, monkeypatch):
+    data = Path(shutil.copytree(taken, tmp_path / "data"))
+    (name,) = (path.name for path in data.iterdir() if path.is_dir())
+    iterdir, stat = Path.iterdir, Path.stat
+
+    def refuse(path):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    with monkeypatch.context() as closed:
+        closed.setattr(Path, "iterdir", lambda path: refuse(path) if path == data else iterdir(path))
+        code, out, err = run("sessions", "--data", data)
+        assert (code, out) == (1, "")
+        assert f"You have no right to read {data}." in err
+    closed_folder = (data / name).resolve()
+    monkeypatch.setattr(
+        Path, "stat", lambda path, **how: refuse(path) if path.parent == closed_folder else stat(path, **how)
+    )
+    assert f"{name} cannot be used. events.jsonl in {name}: Permission denied." in run("analyze", data)[2]
+    assert f"unreadable: not valid\n  You have no right to read {data / name}." in run("validate", data / name)[1]

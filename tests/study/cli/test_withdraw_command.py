@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from study.cli.main import main
+
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
 
@@ -63,3 +65,40 @@ def test_a_session_that_is_being_written_is_not_withdrawn(run, data):
     assert code == 1
     assert "Another program is writing to P01_001" in err
     assert (data / "P01_001" / "trials.csv").exists()
+
+
+@pytest.mark.parametrize("where", ["data/analysis", "data/P01_001/analysis", "elsewhere"])
+def test_an_analysis_that_was_under_way_during_a_withdrawal_leaves_nothing(run, data, where, monkeypatch):
+    from study.workflows.results import analyze_data
+
+    write_pictures, out = analyze_data.write_pictures, data.parent / where
+
+    def withdraw_meanwhile(folder, pictures):
+        assert main(["withdraw", "P01_001", "--data", str(data), "--yes"]) == 0
+        folder.mkdir(parents=True, exist_ok=True)  # an analysis in the session's folder was erased with that
+        return write_pictures(folder, pictures)
+
+    monkeypatch.setattr(analyze_data, "write_pictures", withdraw_meanwhile)
+    code, _, err = run("analyze", data if where != "data/P01_001/analysis" else data / "P01_001", "--out", out)
+    assert (code, "P01_001 was withdrawn while its data were read." in err) == (1, True)
+    assert not out.exists()
+    assert run("validate", data / "P01_001")[0] == 0
+
+
+@pytest.mark.parametrize("form", ["psych-ds", "bids", "mat", "csv"])
+def test_an_export_that_was_under_way_during_a_withdrawal_leaves_nothing(run, data, form, monkeypatch):
+    from study.workflows.results import export_study
+
+    write, said = export_study.WRITERS[form], []
+
+    def withdraw_meanwhile(folder, *content):
+        files = write(folder, *content)
+        assert main(["withdraw", "P01_001", "--data", str(data), "--yes"]) == 0
+        said.append(folder)
+        return files
+
+    monkeypatch.setitem(export_study.WRITERS, form, withdraw_meanwhile)
+    code, _, err = run("export", data, "--out", data.parent / "ds", "--format", form)
+    assert (code, "P01_001 was withdrawn while its data were read." in err) == (1, True)
+    assert f"Written with --out, and not erased: {said[0]}" in err  # it was there at that time
+    assert not said[0].exists() and not (data.parent / "ds").exists()

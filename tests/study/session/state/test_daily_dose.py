@@ -5,7 +5,13 @@ from datetime import datetime, timedelta
 
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import find_dose_elsewhere, set_dose_elsewhere
-from study.session.state.sitting_state import SittingState, compute_daily_dose, pass_time, start_motion
+from study.session.state.sitting_state import (
+    SittingState,
+    compute_daily_dose,
+    pass_time,
+    resume_sitting,
+    start_motion,
+)
 from study.session.state.vibration_dose import Dose
 
 MORNING = datetime.fromisoformat("2026-01-01T08:00:00.000+00:00")
@@ -54,3 +60,18 @@ def test_what_was_found_counts_until_the_hand_has_rested_for_a_night():
     assert compute_daily_dose(shaken).vibrated_s == 25.0
     assert compute_daily_dose(pass_time(shaken, Moment(at(12.5)))).vibrated_s == 0.0
     assert set_dose_elsewhere(shaken, None).other_sessions_dose.vibrated_s == 0.0
+
+
+def test_a_session_joins_the_days_of_all_its_sittings():
+    """Ten hours without a movement never passed: late at night, in the morning, and in the evening."""
+    morning, evening = session(0, 1, 20.0), Moment(at(9))
+    resumed = start_motion(resume_sitting(pass_time(morning, evening, resumed=True), 0))
+    sessions = {"P01_001": session(-9, -8, 7.0), "P01_002": resumed}
+    found = find_dose_elsewhere(sessions, "P01_003", at(9.5))
+    assert found is not None
+    assert (found.sessions, found.vibrated_s) == (("P01_001", "P01_002"), 27.0)
+    rested = start_motion(resume_sitting(pass_time(morning, Moment(at(11)), resumed=True), 0))
+    assert rested.day_s == 0.0
+    found = find_dose_elsewhere({**sessions, "P01_002": rested}, "P01_003", at(11.5))
+    assert found is not None
+    assert found.sessions == ("P01_002",)

@@ -3,6 +3,7 @@ import pytest
 from study.errors import StudyError, WrongUseError
 from study.store.sessions.archive import check_subject, create_session_folder, find_session, list_session_folders
 from study.store.sessions.session_lock import PLACES_LOCK_NAME, hold_places_lock, hold_session_lock
+from study.workflows.session.withdraw_participant import find_session_to_withdraw
 
 
 def test_every_session_gets_a_folder_of_its_own(tmp_path):
@@ -72,3 +73,37 @@ def test_a_lock_that_cannot_be_made_is_said_so(tmp_path):
     (tmp_path / PLACES_LOCK_NAME).mkdir()
     with pytest.raises(StudyError, match="The data folder cannot be written to"), hold_places_lock(tmp_path):
         raise AssertionError("held")
+
+
+def test_a_name_that_something_else_has_taken_is_skipped(tmp_path):
+    """Such as a link to a disk that is not mounted, or another case of the letters where that is the same name."""
+    (tmp_path / "P01_001").symlink_to(tmp_path / "not_mounted" / "P01_001")
+    (tmp_path / "P01_002").write_text("")
+    assert create_session_folder(tmp_path, "P01").name == "P01_003"
+
+
+def test_a_session_without_a_log_is_not_said_to_be_missing(tmp_path):
+    folder = create_session_folder(tmp_path, "P01")
+    for session in ("P01_001", str(folder.path)):
+        with pytest.raises(WrongUseError, match="This session has no log.*P01_001 holds no events.jsonl"):
+            find_session(session, tmp_path)
+
+
+def test_a_name_that_two_studies_have_is_refused_unless_its_path_is_given(tmp_path, monkeypatch):
+    for study in ("mine", "theirs"):
+        create_session_folder(tmp_path / study, "P01").log.touch()
+    monkeypatch.chdir(tmp_path / "mine")
+    for find in (find_session, find_session_to_withdraw):
+        with pytest.raises(WrongUseError, match="Two sessions have this name"):
+            find("P01_001", tmp_path / "theirs")
+        for data in (tmp_path / "mine", tmp_path / "nothing"):
+            assert find("P01_001", data).path == tmp_path / "mine" / "P01_001"
+        assert find(str(tmp_path / "theirs" / "P01_001"), tmp_path / "mine").path == tmp_path / "theirs" / "P01_001"
+
+
+def test_results_that_are_called_like_a_session_are_none(tmp_path):
+    for name in ("results_2026", "P01_001"):
+        (tmp_path / name).mkdir()
+    assert [folder.name for folder in list_session_folders(tmp_path)] == ["P01_001"]
+    (tmp_path / "results_2026" / "events.jsonl").touch()  # an older version may have taken any code
+    assert [folder.name for folder in list_session_folders(tmp_path)] == ["P01_001", "results_2026"]

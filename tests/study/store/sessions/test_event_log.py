@@ -4,6 +4,7 @@ import pytest
 
 from study.errors import StudyError
 from study.session.facts.events import NoteTaken
+from study.session.facts.log_chain import append_checksum
 from study.store.sessions.event_log import EventLog, read_log, remove_incomplete_line
 
 
@@ -110,6 +111,16 @@ def test_a_log_of_a_newer_version_is_called_newer_and_not_damaged(tmp_path):
     path.write_text('{"event": "session_opened", "format": "hapteq-session", "version": 2}\n')
     with pytest.raises(StudyError, match="written by a newer hapteq"):
         read_log(path)
+
+
+def test_an_event_of_a_newer_version_is_not_called_damage(written):
+    line = append_checksum(read_log(written).chain, b'{"utc":"2026-01-01T00:00:00Z","event":"pulse_counted"}')[1]
+    written.write_bytes(written.read_bytes() + line)
+    with pytest.raises(StudyError) as told:
+        read_log(written)
+    assert told.value.title == "The session log holds an unknown event"
+    assert told.value.happened == "Line 3 of events.jsonl in P01_001 is not an event that this version knows."
+    assert told.value.do_now.startswith("It is not damaged: use the newer hapteq that wrote it.")
 
 
 @pytest.mark.parametrize("version", ["0", "-1", "true", '"2"', "null", "1.5"])

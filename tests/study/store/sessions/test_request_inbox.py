@@ -188,3 +188,23 @@ def test_an_inbox_that_is_a_link_is_neither_read_nor_emptied(tmp_path):
     with pytest.raises(StudyError, match="it is a link"):
         inbox.send(StopAsked("experimenter"))
     assert [path.name for path in elsewhere.iterdir()] == ["thesis.txt"]
+
+
+def test_a_note_that_was_taken_and_not_logged_comes_again_at_the_next_sitting(tmp_path, inbox, folder):
+    """The program may end between both: within a trial, a rest or a form."""
+    inbox.send(NOTE)
+    assert inbox.take() == (NOTE,)
+    again = RequestInbox(tmp_path)
+    again.clear()
+    assert again.take() == (NOTE,)
+    again.forget_logged()
+    assert list(folder.iterdir()) == []
+
+
+def test_a_note_that_no_session_would_read_is_refused(inbox, folder):
+    long_note = NoteAsked("experimenter", "麻" * 11_000)
+    with pytest.raises(StudyError, match="This note is too long for a running session"):
+        inbox.send(long_note)
+    assert list(folder.iterdir()) == []
+    inbox.send(NoteAsked("experimenter", "麻" * 10_000))
+    assert len(inbox.take()) == 1

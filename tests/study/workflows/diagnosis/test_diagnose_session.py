@@ -1,5 +1,6 @@
 """A session's folder is diagnosed against a model of the handle without the spring that held it."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from equalizer.plant.mechanical_model import MechanicalModel
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
+from study.errors import StudyError
 from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
+from study.store.sessions.archive import SessionFolder
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan
@@ -48,3 +51,21 @@ def test_the_spring_is_in_the_compared_model_and_not_in_the_improved_one(session
     improved = read_mechanical_model(tmp_path / "out" / "improved.toml")
     assert float((findings.improved.stiffness - improved.stiffness).max()) == SPRING
     assert any("spring of 137 N/m held the handle" in remark for remark in done.findings.remarks)
+
+
+def test_a_diagnosis_that_was_under_way_during_a_withdrawal_leaves_nothing(session, diagnosed, tmp_path):
+    data, one = tmp_path / "data", np.eye(3)
+    shutil.copytree(session, data / session.name)
+    write_mechanical_model(
+        tmp_path / "m.toml", MechanicalModel("handle", "acceleration", 0.3 * one, 8 * one, 20 * one, one, one)
+    )
+    findings = diagnosed.diagnosed(diagnosed.recorded(1), diagnosed.device(1))
+
+    def withdraw_meanwhile(recordings, model, settings, map_, progress):
+        SessionFolder(data / session.name).withdrawal.write_text("{}")
+        return findings
+
+    plan = DiagnosePlan((data / session.name,), tmp_path / "out", tmp_path / "m.toml")
+    with pytest.raises(StudyError, match="withdrew"):
+        diagnose_recordings(plan, lambda what, share: None, withdraw_meanwhile)
+    assert not (tmp_path / "out").exists()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from protocols.document.loading import load_protocol
+from study.errors import WrongUseError
 from study.store.formats.thresholds_file import read_thresholds
 from study.workflows.files.validate import validate_file
 from study.workflows.results.analysis_files import is_analysis_of, list_analysis_outputs
@@ -109,3 +110,12 @@ def test_the_report_of_an_earlier_analysis_goes_first(session, monkeypatch):
 
 def test_a_withdrawal_takes_the_detection_table_of_an_analysis_too(session):
     assert session / "analysis" / "detection.csv" in list_analysis_outputs(session / "analysis")
+
+
+def test_an_analysis_is_not_written_over_the_tables_of_a_session(session):
+    """Those of a whole study replaced thresholds.csv of the session, or removed its detection.csv."""
+    tables = {path.name: path.read_bytes() for path in session.glob("*.csv")}
+    with pytest.raises(WrongUseError, match="is the folder of a session"):
+        analyze_data(session, session)
+    assert {path.name: path.read_bytes() for path in session.glob("*.csv")} == tables
+    assert not (session / "anova.json").exists()

@@ -206,7 +206,7 @@ def test_a_finished_session_is_not_resumed(sitter):
 
 
 def test_a_log_without_an_opening_line_says_that_nothing_is_lost(sitter):
-    left = sitter.interrupted(after=1)
+    left = sitter.interrupted(after=0)
     left.folder.log.write_bytes(b'{"utc": "20')
     with pytest.raises(StudyError, match="never began.*holds no answers"):
         sitter.resumed(left.folder)

@@ -274,3 +274,15 @@ def test_a_torn_note_after_the_end_is_mended_and_the_seal_still_holds(session):
     log.write_bytes(log.read_bytes() + b'{"utc":"2026')
     remove_incomplete_line(log, read_log(log))
     assert len(unseen_by(session)) == 5
+
+
+@pytest.mark.parametrize("kept", ["recordings", SEAL_NAME, "session.json", "lines"])
+def test_a_log_whose_beginning_is_lost_is_never_said_to_hold_nothing(session, session_logs, kept):
+    log, events = session / "events.jsonl", session_logs.events_of(session / "events.jsonl")
+    for path in session.iterdir():
+        if path.name not in (kept, log.name):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    log.write_bytes(b"\n".join((*events[1:4], b"")) if kept == "lines" else b"")
+    with pytest.raises(StudyError, match="The beginning of this session's log is missing") as told:
+        fold_session(SessionFolder(session))
+    assert told.value.do_now == "Keep the folder as it is, and restore events.jsonl from a copy."

@@ -16,6 +16,8 @@ from study.session.facts.events import (
     SessionInterrupted,
     TrialPresented,
     TrialSpoiled,
+    encode_event,
+    parse_event,
 )
 from study.session.views.participant_views import Unanswered
 from study.store.sessions.archive import SessionFolder
@@ -100,6 +102,14 @@ def test_a_session_that_is_left_and_resumed_begins_it_anew(sitter, sound):
     assert log_of(conducted.folder)[-2:] == ["off", "left"] and not sound.playing
     again = sitter.resumed(conducted.folder)
     assert log_of(again.folder).count("on") == 2 and again.end_reason == ""
+
+
+def test_every_seed_that_a_protocol_accepts_can_be_logged():
+    noise = MaskingSettings(play=True, seed=2**32 - 1)
+    event = MaskingPlayed(
+        "2026-11-30T11:00:00Z", True, "Headphones", noise.level_db, noise.low_hz, noise.high_hz, noise.seed
+    )
+    assert parse_event(encode_event(event)) == event
 
 
 def test_noise_that_falls_silent_ends_the_sitting_before_the_next_trial_and_nothing_is_lost(sitter, sound):

@@ -153,3 +153,22 @@ def test_an_empty_note_is_none(whole):
     with pytest.raises(StudyError, match="not UTF-8"):
         take_note(whole, replace(NOTE, text=os.fsdecode(b"caf\xe9")), RealClock())
     assert whole.log.read_bytes() == before
+
+
+def test_a_note_that_the_session_did_not_hear_before_its_end_is_written_into_its_log(sitter, monkeypatch):
+    folder = sitter.whole().folder
+    RequestInbox(folder.path).send(replace(NOTE, text="an earlier one"))
+    session = Session(folder, hears=False)
+
+    class Clock(RealClock):
+        def sleep(self, seconds: float) -> None:
+            """The session ends while the note waits."""
+            if session is not None and not session._over.is_set():
+                session.__exit__()
+
+    monkeypatch.setattr("study.workflows.views.send_request.RECEIVE_TIMEOUT_S", 0.1)
+    session.__enter__()
+    assert take_note(folder, NOTE, Clock())
+    assert [event.text for event in read_log(folder.log).events[-2:]] == ["an earlier one", NOTE.text]
+    assert RequestInbox(folder.path).take() == ()
+    assert validate_file(folder.path).problems == ()

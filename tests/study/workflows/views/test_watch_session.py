@@ -6,15 +6,17 @@ from datetime import UTC, datetime
 
 import pytest
 
+from study.devices.clock import RealClock
 from study.errors import StudyError
 from study.session.watching.live_state import LiveState
-from study.session.watching.requests import StopAsked
+from study.session.watching.requests import NoteAsked, StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME, EventLog
 from study.store.sessions.live_file import write_live
 from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
+from study.workflows.views.take_note import take_note
 from study.workflows.views.watch_session import follow
 
 pytestmark = pytest.mark.real_time
@@ -173,3 +175,9 @@ def test_live_state_and_requests_do_not_disturb_what_is_validated(whole):
     assert validate_file(whole.path / "live.json").kind == "live state of a session"
     request = next((whole.path / "requests").iterdir())
     assert (validate_file(request).kind, validate_file(request).problems) == ("request to a running session", ())
+
+
+def test_control_characters_of_a_note_do_not_reach_the_terminal(whole):
+    take_note(whole, NoteAsked("experimenter", "numb\x1b[2J\rthumb", adverse=True), RealClock())
+    (note,) = follow(whole.path).look(now()).notes
+    assert note.text == "numb [2J thumb"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.errors import StudyError
+from study.errors import StudyError, UserInterruptError
 from study.session.facts.events import (
     AnswerGiven,
     NoteTaken,
@@ -15,6 +15,7 @@ from study.session.facts.events import (
 from study.session.views.form_views import FormKind
 from study.session.views.participant_views import AfterPause
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
@@ -160,3 +161,32 @@ def test_leaving_from_a_pause_can_be_resumed(plan, small_protocol, seat, person)
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
     end = conduct_new(plan(small_protocol), "simulated", seat)
     assert (end.end_reason, end.withdrawn) == ("the participant left", False)
+
+
+def test_a_note_is_not_lost_where_the_program_ends_before_it_was_logged(plan, small_protocol, seat, person, tmp_path):
+    folder = SessionFolder(tmp_path / "data" / "P01_001")
+
+    def rest(notice, sign_of_life):
+        RequestInbox(folder.path).send(NoteAsked("experimenter", "pale", adverse=True))
+        sign_of_life()
+        raise KeyboardInterrupt
+
+    person.rest = rest
+    with pytest.raises(UserInterruptError):
+        conduct_new(plan(small_protocol), "simulated", seat)
+    again = Person(seat.clock)
+    resumed = conduct_resumed(folder, "simulated", Participant(display=again, hand=again, clock=seat.clock))
+    assert [note.text for note in of(resumed, NoteTaken)] == ["pale"]
+    assert list((folder.path / "requests").iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), StudyError("The disk is full", "", "Free space.")])
+def test_a_note_is_in_the_log_however_the_sitting_ends(plan, small_protocol, seat, person, tmp_path, error):
+    def note_and_end(question):
+        seat.requests.send(NoteAsked("experimenter", "pain in a finger", adverse=True))
+        raise error
+
+    person.at_question = note_and_end
+    with pytest.raises(StudyError):
+        conduct_new(plan(small_protocol), "simulated", seat)
+    assert "pain in a finger" in SessionFolder(tmp_path / "data" / "P01_001").log.read_text()

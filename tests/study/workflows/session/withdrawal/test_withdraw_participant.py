@@ -1,7 +1,10 @@
 """Withdrawal erases this participant and nothing else."""
 
+import errno
 import json
+import os
 import shutil
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -11,8 +14,8 @@ from study.errors import StudyError
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.workflows.files.validate import validate_file
-from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
-from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files, write_analysis
+from study.workflows.session.withdraw_participant import list_remaining_copies, plan_withdrawal, withdraw
+from tests.study.workflows.session.withdrawal.data_folder import UTC, copy_session, erase, files, write_analysis
 
 PART = ".anova.json.0123abcd.part"
 
@@ -54,7 +57,9 @@ def test_a_folder_that_is_not_proved_to_be_the_participants_is_listed(data, else
     before = files(folder)
     done = CliRunner().invoke(app, ["withdraw", "P01_001", "--data", str(data), "--yes"])
     assert done.exit_code == 0, done.output
-    assert "Not to be erased: P01_003 holds no log that says it is a session of P01." in done.output
+    said = {"a log of another session": "holds a log of P01 under another name: it was copied or renamed."}
+    expected = said.get(kept, "holds no log that says it is a session of P01.")
+    assert f"Not to be erased: P01_003 {expected}" in done.output
     assert files(folder) == before
 
 
@@ -165,3 +170,57 @@ def test_a_log_of_another_in_a_folder_that_was_the_participants_is_not_erased(da
     erase(data)
     assert (data / "P01_002" / "events.jsonl").read_bytes() == (data / "P02_001" / "events.jsonl").read_bytes()
     assert (data / "P01_003" / "mine.txt").exists()
+
+
+def test_an_analysis_that_is_called_like_a_session_is_erased(data):
+    (data / "analysis").rename(data / "results_2026")
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    assert plan.derived_roots == ("results_2026",)
+    left = {"subject": "P01", "withdrawn_utc": UTC, "sessions": {}, "derived": plan.derived}
+    document = {"format": "hapteq-withdrawal", "version": 1, **left}
+    (data / "P01.withdrawal.json").write_text(json.dumps(document))
+    (data / "results_2026" / "thresholds.csv").unlink()
+    for figure in (data / "results_2026" / "figures").iterdir():
+        figure.unlink()
+    erase(data)
+    assert not (data / "results_2026").exists()
+
+
+def test_what_was_written_after_the_question_is_erased_too(data):
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    copy_session(data, "P01_003")
+    write_analysis(data / "late", "P02", "P01")
+    erased = withdraw(data, plan, UTC)
+    assert (erased.sessions, erased.derived_roots) == (("P01_001", "P01_002", "P01_003"), ("analysis", "late"))
+    assert not (data / "late").exists()
+    assert [path.name for path in (data / "P01_003").iterdir() if path.name != "session.lock"] == ["withdrawn.json"]
+
+
+def test_an_export_that_was_killed_and_an_analysis_of_an_export_are_named(data, tmp_path):
+    export, unfinished, report = tmp_path / "export", tmp_path / ".export.0123abcd.part", tmp_path / "report"
+    unfinished.mkdir()
+    (data / "written_elsewhere.txt").write_text(f"{export}\n")
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    assert list_remaining_copies(data, plan)[:-1] == (f"Written with --out, and not erased: {unfinished}",)
+    unfinished.rename(export)
+    write_analysis(report, "P01")
+    (export / "written_elsewhere.txt").write_text(f"{report}\n{export}\n")
+    named = list_remaining_copies(data, plan)[:-1]
+    assert named == tuple(f"Written with --out, and not erased: {path}" for path in (export, report))
+
+
+def test_a_folder_that_cannot_be_looked_into_does_not_keep_a_withdrawal_from_going_on(data, tmp_path, monkeypatch):
+    """Such as lost+found on a disk of its own, or an export that another account made."""
+    closed, iterdir, lstat = data / "lost+found", Path.iterdir, Path.lstat
+
+    def refuse(path):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+    closed.mkdir()
+    monkeypatch.setattr(Path, "iterdir", lambda path: refuse(path) if path == closed else iterdir(path))
+    monkeypatch.setattr(Path, "lstat", lambda path: refuse(path) if path.parent == tmp_path / "out" else lstat(path))
+    (data / "written_elsewhere.txt").write_text(f"{tmp_path / 'out' / 'a'}\n")
+    erase(data)
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    assert plan.doubtful == ("lost+found cannot be looked into: Permission denied.",)
+    assert list_remaining_copies(data, plan)[0] == f"Written with --out, and not erased: {tmp_path / 'out' / 'a'}"
