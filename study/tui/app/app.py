@@ -45,6 +45,9 @@ from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.themes import NEXT_THEME, register_themes
 from study.tui.watch.watch_controller import WatchController
 
+DIALOG_POLL_INTERVAL_S = 0.1
+"""Interval (s) at which screens that wait for the end of a dialog are shown. Chosen: not felt as a delay."""
+
 
 class HapteqApp(App[None]):
     """The application of `hapteq study` and `hapteq resume`; handlers `on_...` and `action_...` are called by textual.
@@ -94,7 +97,13 @@ class HapteqApp(App[None]):
             await self._begin_sitting(self._start_options.first_sitting)
         else:
             await self._archive.show_home()
+        self.set_interval(DIALOG_POLL_INTERVAL_S, self._release_held_messages)
         self.call_after_refresh(self._start_engine)
+
+    async def _release_held_messages(self) -> None:
+        """Let the sitting show what waits for the end of a dialog."""
+        if self._sitting is not None:
+            await self._sitting.release_held_messages()
 
     def _start_engine(self) -> None:
         """Start the engine and import further screens, after the first screen is drawn."""
@@ -167,7 +176,7 @@ class HapteqApp(App[None]):
             """Carry out the decision; nothing for None."""
             match decision:
                 case "resume":
-                    await self._begin_sitting(Resume(path, self._start_options.device, self._start_options.data))
+                    await self.on_resume_requested(home_messages.ResumeRequested(path))
                 case "look":
                     self._engine.send(ShowSession(path))
                 case "home":
@@ -265,7 +274,8 @@ class HapteqApp(App[None]):
     async def on_resume_requested(self, event: home_messages.ResumeRequested) -> None:
         if self._sitting is not None:
             return
-        await self._begin_sitting(Resume(event.path, self._start_options.device, self._start_options.data))
+        start = self._start_options
+        await self._begin_sitting(Resume(event.path, start.device, start.data, follows_log=True))
 
     async def on_home_requested(self) -> None:
         await self._archive.show_home()

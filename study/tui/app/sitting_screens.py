@@ -33,12 +33,15 @@ from study.tui.engine.from_engine import (
 from study.tui.engine.to_engine import Reply, ToEngine
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.screens.await_return import AwaitReturnScreen
+from study.tui.screens.confirm_view import ConfirmView
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen
 from study.tui.screens.form import FormScreen
 from study.tui.screens.goodbye import GoodbyeScreen
 from study.tui.screens.handle import HandleScreen
 from study.tui.screens.instructions import InstructionsScreen
+from study.tui.screens.note import NoteScreen
+from study.tui.screens.note_prompt import NotePrompt
 from study.tui.screens.pause import PauseScreen
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.practice_over import PracticeOverScreen
@@ -59,6 +62,9 @@ SCREENS: dict[DisplayCall, Callable[[Any, Words], Screen[Any]]] = {
 }
 """Screen for each request of the engine that needs only the content and the texts. `make_screen` makes the screens of
 the other requests, except that of a trial."""
+
+TEXT_DIALOGS = (NoteScreen, ConfirmView, NotePrompt)
+"""Dialogs of the experimenter that may be opened above any screen of a sitting, and into which text is typed."""
 
 
 def make_screen(request: ScreenRequest, keys: AnswerKeys, words: Words) -> Screen[Any]:
@@ -109,6 +115,7 @@ class SittingScreens:
         self._send = send
         self._keys = keys
         self._discard_earlier_keys = discard_earlier_keys
+        self._held_messages: list[FromEngine] = []
         self._pending_number = 0
         """Number of the request that waits for a reply; 0 where none does."""
         self._request_screen: Screen[Any] | None = None
@@ -116,7 +123,26 @@ class SittingScreens:
         self._preparing_screen: PreparingScreen | None = None
 
     async def handle_message(self, message: FromEngine) -> None:
-        """Handle one message of the engine; those that do not concern a sitting are ignored."""
+        """Handle one message of the engine; those that do not concern a sitting are ignored. While a person types into
+        a dialog, other screens wait (`release_held_messages`): the next characters must not be answers or commands."""
+        is_waiting = bool(self._held_messages) or self._is_dialog_open
+        if isinstance(message, ScreenRequest | CloseRequest | Feedback) and is_waiting:
+            self._held_messages.append(message)
+        else:
+            await self._perform(message)
+
+    async def release_held_messages(self) -> None:
+        """Handle the messages that were held back, once no dialog is open. Called at intervals."""
+        while self._held_messages and not self._is_dialog_open:
+            await self._perform(self._held_messages.pop(0))
+
+    @property
+    def _is_dialog_open(self) -> bool:
+        """Whether a dialog into which text is typed is on the screen, possibly below another one."""
+        return any(isinstance(screen, TEXT_DIALOGS) for screen in self._app.screen_stack)
+
+    async def _perform(self, message: FromEngine) -> None:
+        """Show what the message requests."""
         match message:
             case ScreenRequest():
                 await self._open_request_screen(message)

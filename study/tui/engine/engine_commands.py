@@ -16,12 +16,18 @@ from pathlib import Path
 from protocols.wording.words import Words
 from study.devices.clock import RealClock
 from study.devices.device import Device
-from study.devices.opening import calibrate_accelerometer, get_lab_file_path, save_accelerometer_calibration
+from study.devices.opening import (
+    REAL_DEVICES,
+    calibrate_accelerometer,
+    get_lab_file_path,
+    save_accelerometer_calibration,
+)
 from study.errors import StudyError, WrongUseError
 from study.local_clock import convert_to_machine_zone
+from study.session.facts.events import DeviceFacts
 from study.session.views.archive_views import HomeView
 from study.session.views.forms import make_words
-from study.session.views.resume_command import format_logged_resume_command
+from study.session.views.resume_command import find_device_option, format_logged_resume_command
 from study.store.disk.privacy import format_data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
@@ -142,10 +148,8 @@ class EngineCommands:
             analysis = write_missing_results(folder, folded_session)
             self._link.send(Finished(str(folder.path), folded_session.state.answers, _make_results_message(analysis)))
             return
-        words = make_words(folded_session.state.protocol)
-        self._conduct_sitting(
-            words, command.device, lambda participant: conduct_resumed(folder, command.device, participant)
-        )
+        words, device_name = make_words(folded_session.state.protocol), _choose_device(command, device)
+        self._conduct_sitting(words, device_name, lambda participant: conduct_resumed(folder, device_name, participant))
 
     def _conduct_sitting(
         self, words: Words, device_name: str, conduct: Callable[[Participant], ConductedSitting]
@@ -188,12 +192,11 @@ class EngineCommands:
 
     def _withdraw(self, folder: SessionFolder) -> None:
         """Erase the participant's sessions, and name copies that may exist elsewhere."""
-        data_folder, plan = folder.path.parent, plan_withdrawal(folder)
-        external_copies = list_remaining_copies(data_folder, plan)
-        withdraw(data_folder, plan, self._clock.utc())
-        for sentence in (*plan.doubtful, *external_copies):
+        data_folder = folder.path.parent
+        erased = withdraw(data_folder, plan_withdrawal(folder), self._clock.utc())
+        for sentence in (*erased.doubtful, *list_remaining_copies(data_folder, erased)):
             self._link.send(UserNotice(sentence))
-        self._link.send(Withdrawn(plan.sessions))
+        self._link.send(Withdrawn(erased.sessions))
 
     def _diagnose(self, command: Diagnose) -> None:
         """Diagnose recordings, with progress, and send the result."""
@@ -277,6 +280,13 @@ def _read_home_view(command: ShowHome) -> HomeView:
     known_qualities = dict(view.qualities)
     qualities = tuple((model, known_qualities.get(model) or describe_model_quality(model)) for model in models)
     return replace(view, protocols=protocols, devices=devices, models=models, qualities=qualities)
+
+
+def _choose_device(command: Resume, logged_device: DeviceFacts) -> str:
+    """Choose the name of the device on which a session is resumed. logged_device: that of the session's log."""
+    if command.follows_log and (command.device in REAL_DEVICES) == logged_device.simulated:
+        return find_device_option(logged_device.name, logged_device.simulated)
+    return command.device
 
 
 def _make_results_message(analysis: WrittenAnalysis) -> Results:

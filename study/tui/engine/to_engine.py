@@ -73,6 +73,9 @@ class Resume:
     device: str
     data: str
     """Path of the data folder."""
+    follows_log: bool = False
+    """Whether the device that the session's log names takes the place of a `device` of another kind (real or
+    simulated); otherwise that is an error."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.to_engine import ShowDiagnosis, ShowSession
 from study.tui.home_messages import CommandRequested
 from study.tui.screens.help import HelpScreen
+from study.tui.typed_paths import exists, expand_home, is_file, is_folder
 
 LOG_NAME, DIAGNOSIS_NAME = "events.jsonl", "diagnosis.json"
 """Names of the files to open, equal to `event_log.LOG_NAME` and `diagnosis_file.DIAGNOSIS_NAME`; this module imports no
@@ -36,7 +37,7 @@ class HapteqFiles(DirectoryTree):
     """Tree that shows only folders, session logs and documents of diagnoses, by name; hidden ones are left out."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
-        return [path for path in paths if not path.name.startswith(".") and (_is_openable(path) or path.is_dir())]
+        return [path for path in paths if not path.name.startswith(".") and (_is_openable(path) or is_folder(path))]
 
 
 def _is_openable(path: Path) -> bool:
@@ -54,7 +55,7 @@ class BrowseScreen(ModalScreen[None]):
         width: 90%; max-width: 100; height: 90%; border: round $primary; padding: 0 1; background: $surface;
     }
     BrowseScreen HapteqFiles { height: 1fr; background: $surface; }
-    BrowseScreen #message { height: 1; color: $foreground 65%; }
+    BrowseScreen #message { height: auto; min-height: 1; color: $foreground 65%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),
@@ -64,7 +65,7 @@ class BrowseScreen(ModalScreen[None]):
     def __init__(self, folder: str) -> None:
         """folder: root of the tree; the current folder if it is no folder."""
         super().__init__()
-        self._folder = Path(folder) if Path(folder).is_dir() else Path()
+        self._folder = Path(folder) if is_folder(Path(folder)) else Path()
 
     def compose(self) -> ComposeResult:
         with Vertical() as dialog:
@@ -81,14 +82,14 @@ class BrowseScreen(ModalScreen[None]):
     @on(Input.Submitted, "#path")
     def _go_to_path(self, event: Input.Submitted) -> None:
         """Open a typed session folder or file; make any other folder the root of the tree; report a missing path."""
-        path = Path(event.value).expanduser()
-        if path.is_dir() and (path / LOG_NAME).exists():
+        path = expand_home(event.value.strip())
+        if exists(path / LOG_NAME):
             self._open_path(path / LOG_NAME)
-        elif path.is_dir():
+        elif is_folder(path):
             tree = self.query_one(HapteqFiles)
             tree.path = path
             tree.focus()
-        elif path.is_file():
+        elif is_file(path):
             self._open_path(path)
         else:
             self._show_message(f"There is nothing at {path}.")

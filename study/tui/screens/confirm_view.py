@@ -42,7 +42,7 @@ class ConfirmView(ModalScreen[bool]):
     ConfirmView { align: center middle; }
     ConfirmView Card { border: round $warning; }
     ConfirmView Input { margin-top: 1; }
-    ConfirmView #message { height: 1; color: $text-error; }
+    ConfirmView #message { height: auto; min-height: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),
@@ -79,7 +79,10 @@ class ConfirmView(ModalScreen[bool]):
 
 
 def confirm_view(app: App[Any], session: str, on_confirmed: Callable[[], object]) -> None:
-    """Open the dialog. session: name to be typed. on_confirmed: called after the confirmation, not otherwise."""
+    """Open the dialog, unless it is open. session: name to be typed. on_confirmed: called after the confirmation, not
+    otherwise."""
+    if isinstance(app.screen, ConfirmView):
+        return
 
     def act_on_decision(confirmed: bool | None) -> None:
         if confirmed:

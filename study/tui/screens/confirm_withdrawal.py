@@ -27,7 +27,7 @@ class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
     ConfirmWithdrawal { align: center middle; }
     ConfirmWithdrawal Card { border: round $error; }
     ConfirmWithdrawal Input { margin-top: 1; }
-    ConfirmWithdrawal #message { height: 1; color: $text-error; }
+    ConfirmWithdrawal #message { height: auto; min-height: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Keep everything", key_display="Esc"),

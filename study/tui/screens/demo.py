@@ -32,10 +32,10 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
 
     PAGE = "help_demo"
     DEFAULT_CSS = """
-    DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
+    DemoScreen #title { height: auto; min-height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
     DemoScreen #steps { height: 1; margin: 0 1; text-align: center; }
     DemoScreen #answers { height: 1fr; margin: 0 1; }
-    DemoScreen #message { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    DemoScreen #message { height: auto; min-height: 1; margin: 0 1; text-align: center; text-style: bold; }
     DemoScreen #note { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
     """
     AUTO_FOCUS = ""

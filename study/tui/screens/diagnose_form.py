@@ -19,6 +19,7 @@ from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.to_engine import Diagnose
 from study.tui.home_messages import DiagnoseRequested
 from study.tui.screens.help import HelpScreen
+from study.tui.typed_paths import exists, expand_home, is_file
 
 HELP = """\
 # Diagnose
@@ -60,7 +61,7 @@ class DiagnoseForm(ModalScreen[None]):
     DiagnoseForm .field { height: auto; }
     DiagnoseForm Label { width: 13; }
     DiagnoseForm Input { width: 1fr; }
-    DiagnoseForm #message { height: 2; margin-top: 1; color: $text-error; }
+    DiagnoseForm #message { height: auto; min-height: 2; margin-top: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f5", "begin", "Diagnose", priority=True),
@@ -91,36 +92,28 @@ class DiagnoseForm(ModalScreen[None]):
     def action_begin(self) -> None:
         """Check the paths; post the request and close the form, or show the first problem and focus its field. The
         diagnosis itself checks that the folder of the results is new."""
-        paths_by_field: dict[str, tuple[str, ...]] = {}
+        paths_by_field: dict[str, tuple[Path, ...]] = {}
         for field in ("sources", "clean"):
             try:
-                paths_by_field[field] = tuple(
-                    str(Path(word).expanduser()) for word in shlex.split(self._read_field(field))
-                )
+                paths_by_field[field] = tuple(map(expand_home, shlex.split(self._read_field(field))))
             except ValueError:
                 self._show_message("A quotation mark is open.", field)
                 return
-        sources = paths_by_field["sources"]
+        sources, clean = (tuple(map(str, paths)) for paths in paths_by_field.values())
         model, out_folder = (
-            str(Path(text).expanduser()) if (text := self._read_field(name)) else "" for name in ("model", "out")
+            str(expand_home(text)) if (text := self._read_field(name)) else "" for name in ("model", "out")
         )
         missing_entry = next(
-            (
-                (field_name, path)
-                for field_name, paths in paths_by_field.items()
-                for path in paths
-                if not Path(path).exists()
-            ),
-            None,
+            ((field, path) for field, paths in paths_by_field.items() for path in paths if not exists(path)), None
         )
         if not sources:
             self._show_message("Name a recording, or the folder of a session.", "sources")
         elif missing_entry is not None:
             self._show_message(f"There is nothing at {missing_entry[1]}.", missing_entry[0])
-        elif model and not Path(model).is_file():
+        elif model and not is_file(Path(model)):
             self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:
-            self.app.post_message(DiagnoseRequested(Diagnose(sources, model, out_folder, paths_by_field["clean"])))
+            self.app.post_message(DiagnoseRequested(Diagnose(sources, model, out_folder, clean)))
             dismiss_screen(self, None)
 
     def action_help(self) -> None:

@@ -46,7 +46,7 @@ class DiagnosisScreen(Screen[None]):
 
     HELP = HELP
     CSS = """
-    DiagnosisScreen #head { height: 1; padding: 0 1; background: $primary-muted; }
+    DiagnosisScreen #head { height: auto; min-height: 1; padding: 0 1; background: $primary-muted; }
     DiagnosisScreen #page { height: 1fr; padding: 0 1; }
     DiagnosisScreen #halves { height: auto; }
     DiagnosisScreen .half { height: auto; }

@@ -37,7 +37,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 MAX_QUOTE_CHARACTERS = 48
 """Largest number of characters of a quoted question or answer in a message; longer texts are cut. Chosen: the message
-remains a single line."""
+remains short."""
 FOOTER_ENTRIES = (
     ("1", "choice", "1 2 …", "Choose"),
     ("left", "choice", "← →", "Move"),
@@ -60,10 +60,10 @@ class FormScreen(TranslatedScreen[FormReply]):
     PAGE = "help_form"
     DEFAULT_CSS = """
     FormScreen Container { height: 1fr; align-horizontal: center; }
-    FormScreen #top { height: 1; padding: 0 1; background: $panel; text-style: bold; }
+    FormScreen #top { height: auto; min-height: 1; padding: 0 1; background: $panel; text-style: bold; }
     FormScreen #introduction { margin: 1 0; }
     FormScreen #origin { color: $foreground 65%; margin-bottom: 1; }
-    FormScreen #message { height: 1; padding: 0 1; text-align: center; text-style: bold; }
+    FormScreen #message { height: auto; min-height: 1; padding: 0 1; text-align: center; text-style: bold; }
     FormScreen Button { margin: 0 0 1 2; }
     FormScreen Button.-at { text-style: bold reverse; }
     """

@@ -21,7 +21,7 @@ class HandleScreen(TranslatedScreen[Unanswered | None]):
 
     PAGE = "help_handle"
     DEFAULT_CSS = """
-    HandleScreen #title { height: 1; margin: 1 1 1 1; text-align: center; text-style: bold; }
+    HandleScreen #title { height: auto; min-height: 1; margin: 1 1 1 1; text-align: center; text-style: bold; }
     HandleScreen HandleTarget { margin: 0 1; }
     HandleScreen #sentence { height: 2; margin: 1 1 0 1; text-align: center; text-style: bold; }
     """

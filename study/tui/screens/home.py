@@ -96,7 +96,7 @@ class HomeScreen(Screen[None]):
 
     HELP = HELP
     CSS = """
-    HomeScreen #name { height: 1; padding: 0 1; background: $primary-muted; color: $foreground; }
+    HomeScreen #name { height: auto; min-height: 1; padding: 0 1; background: $primary-muted; color: $foreground; }
     HomeScreen #body { layout: vertical; height: 1fr; }
     HomeScreen #past { height: 1fr; border: round $primary; padding: 0 1; }
     HomeScreen #past:focus-within { border: round $accent; }

@@ -37,7 +37,7 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
     NoteScreen { align: center middle; }
     NoteScreen TextArea { height: 5; margin: 1 0; }
     NoteScreen Button { margin-top: 1; }
-    NoteScreen #message { height: 1; color: $text-warning; }
+    NoteScreen #message { height: auto; min-height: 1; color: $text-warning; }
     """
     AUTO_FOCUS = "TextArea"
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -96,4 +96,6 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
         self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def _refuse(self, sentence: str) -> None:
-        self.query_one("#message", LiteralText).update(sentence)
+        message = self.query_one("#message", LiteralText)
+        message.update(sentence)
+        self.call_after_refresh(message.scroll_visible, animate=False)  # its height is known then

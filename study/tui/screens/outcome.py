@@ -66,7 +66,7 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         border: heavy $error; padding: 1 2; background: $surface;
     }
     OutcomeScreen.-good > Vertical { border: round $primary; }
-    OutcomeScreen VerticalScroll { height: auto; max-height: 16; }
+    OutcomeScreen VerticalScroll { height: auto; max-height: 45vh; }
     OutcomeScreen #offered { margin-top: 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [

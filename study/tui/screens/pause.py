@@ -42,7 +42,7 @@ class PauseScreen(TranslatedScreen[AfterPause]):
     PauseScreen OptionList, PauseScreen OptionList:focus {
         height: auto; border: none; padding: 0; margin-top: 1; background: transparent;
     }
-    PauseScreen #message { height: 1; margin-top: 1; text-style: bold; }
+    PauseScreen #message { height: auto; min-height: 1; margin-top: 1; text-style: bold; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("n", "note(False)", "Note"),

@@ -26,7 +26,7 @@ class PlayingScreen(TranslatedScreen[Unanswered | None]):
 
     PAGE = "help_playing"
     DEFAULT_CSS = """
-    PlayingScreen #title { height: 1; margin: 2 1 0 1; text-align: center; text-style: bold; }
+    PlayingScreen #title { height: auto; min-height: 1; margin: 2 1 0 1; text-align: center; text-style: bold; }
     PlayingScreen #answers { height: 1fr; margin: 0 1; }
     PlayingScreen #message { height: 3; margin: 0 1; text-align: center; }
     """

@@ -4,6 +4,7 @@ The engine reads the sensor and computes the calibration (`study.devices.acceler
 its messages and sends the user's replies.
 """
 
+import re
 from typing import ClassVar
 
 from textual import on
@@ -41,6 +42,8 @@ FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
 DEFAULT_BAUD_RATE = 2_000_000
 """Rate of the serial line (bit/s) where the field is empty. Equal to the default of `baud` in
 `study.devices.force_dimension.lab`; the screens import no device modules."""
+BAUD_RATE_PATTERN = r"[1-9][0-9]{0,8}"
+"""Pattern of a baud rate: serial lines are slower than 1e9 bit/s, and the system refuses numbers from 2^31 on."""
 POSITION_COUNT = 6
 """Number of positions of the calibration: each of three axes up and down."""
 
@@ -123,8 +126,8 @@ class SensorScreen(Screen[None]):
             return
         if not port:
             self._show_field_problem("Name the port.", "port")
-        elif not baud.isascii() or not baud.isdigit() or int(baud) < 1:
-            self._show_field_problem("The baud rate is a whole number.", "baud")
+        elif re.fullmatch(BAUD_RATE_PATTERN, baud) is None:
+            self._show_field_problem("The baud rate is a whole number. It has at most 9 digits.", "baud")
         else:
             self._is_calibrating, self._table = True, ""
             self.query_one("#seen", Static).update("")

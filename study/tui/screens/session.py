@@ -57,7 +57,7 @@ class SessionScreen(Screen[None]):
 
     HELP = HELP
     CSS = """
-    SessionScreen #head { height: 1; padding: 0 1; background: $primary-muted; }
+    SessionScreen #head { height: auto; min-height: 1; padding: 0 1; background: $primary-muted; }
     SessionScreen TabbedContent { height: 1fr; }
     SessionScreen TabPane { padding: 0 1; height: 1fr; }
     SessionScreen TabPane > VerticalScroll { height: 1fr; }

@@ -51,9 +51,9 @@ class TrialScreen(TranslatedScreen[None]):
     PAGE = "help_trial"
     DEFAULT_CSS = """
     TrialScreen { layout: vertical; }
-    TrialScreen #asked { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
+    TrialScreen #asked { height: auto; min-height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
     TrialScreen #answers { height: 1fr; margin: 0 1; }
-    TrialScreen #message { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    TrialScreen #message { height: auto; min-height: 1; margin: 0 1; text-align: center; text-style: bold; }
     TrialScreen #trouble { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
     """
     AUTO_FOCUS = ""

@@ -8,7 +8,7 @@ classes: `said` where the line of keys shows a reply, `any` where there are alar
 """
 
 STYLE = """
-WatchScreen #standing, WatchScreen #guide { height: 1; padding: 0 1; }
+WatchScreen #standing, WatchScreen #guide { height: auto; min-height: 1; padding: 0 1; }
 WatchScreen #guide { color: $text-muted; }
 WatchScreen #guide.said { color: $text; text-style: bold; }
 WatchScreen #alarms { height: auto; max-height: 7; padding: 0 1; border: heavy $error; display: none; }

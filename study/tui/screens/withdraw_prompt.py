@@ -40,7 +40,7 @@ class WithdrawPrompt(ModalScreen[bool]):
         width: 70; max-width: 95%; height: auto; border: round $error; padding: 1 2; background: $surface;
     }
     WithdrawPrompt Input { margin-top: 1; }
-    WithdrawPrompt #message { height: 1; color: $text-error; }
+    WithdrawPrompt #message { height: auto; min-height: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Keep everything", key_display="Esc"),

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import ClassVar
 
 from textual.app import App
-from textual.binding import Binding, BindingType
+from textual.binding import Binding
 from textual.events import Event
 
 from study.session.watching.requests import Request
@@ -24,10 +23,9 @@ from study.tui.watch.watch_source import WatchSource
 
 
 class WatchApp(App[None]):
-    """Application that shows the experimenter's view and ends with it. The key t changes the theme."""
+    """Application that shows the experimenter's view and ends with it."""
 
     TITLE = "hapteq watch"
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]
 
     def __init__(
         self,

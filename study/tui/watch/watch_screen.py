@@ -116,6 +116,7 @@ class WatchScreen(Screen[None]):
         Binding("a", "acknowledge", "Seen"),
         Binding("d", "details", "Details"),
         Binding("f1,question_mark", "help", "Help", key_display="F1"),
+        Binding("t", "app.next_theme", "Theme", show=False),
         Binding("q", "leave", "Leave"),
     ]
     view: reactive[WatchView | None] = reactive(None)
@@ -295,6 +296,4 @@ class WatchScreen(Screen[None]):
         self._update_guide(sentence, reply=True)
 
     def _update_guide(self, sentence: str, reply: bool) -> None:
-        guide = self.query_one("#guide", Static)
-        guide.set_class(reply, "said")
-        guide.update(sentence)
+        self.query_one("#guide", Static).set_class(reply, "said").update(sentence)

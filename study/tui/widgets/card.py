@@ -5,13 +5,13 @@ from textual.containers import Vertical, VerticalScroll
 
 
 class Card(Vertical):
-    """Framed box with a title, as high as its content and at most as its container. CSS classes of its widgets:
-    `strong` (bold), `gap` (an empty line above)."""
+    """Framed box with a title, as high as its content and at most as its container; then it scrolls. CSS classes of
+    its widgets: `strong` (bold), `gap` (an empty line above)."""
 
     DEFAULT_CSS = """
     Card {
         width: 74; max-width: 95%; height: auto; max-height: 100%; border: round $primary; padding: 1 2;
-        background: $surface;
+        background: $surface; overflow-y: auto; scrollbar-size-vertical: 1;
     }
     Card > .strong { text-style: bold; }
     Card > .gap { margin-top: 1; }

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from study.session.facts.events import DeviceFacts
 from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD, SCREEN_UNRESPONSIVE
 from study.session.views.participant_views import Answered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.log_lock import is_log_locked
+from study.tui.engine.engine_commands import _choose_device
 from study.tui.engine.from_engine import (
     CloseRequest,
     DisplayCall,
@@ -98,8 +100,21 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     assert failure.error.exit_code == 130
     assert is_log_locked(session / "events.jsonl") is False
     begun.send(Reply(trial.number, Answered(1, time.monotonic())))
-    begun.send(Resume("P01_001", "simulated", order.data))
+    begun.send(Resume("P01_001", "omega3", order.data, follows_log=True))
     assert begun.wait_for(asks(DisplayCall.WELCOME)).content.resumed_after == 2
+
+
+@pytest.mark.parametrize(
+    ("requested", "logged", "opened"),
+    [
+        ("simulated", DeviceFacts("omega.3", simulated=False, sample_rate_hz=1000.0), "omega3"),
+        ("omega3", DeviceFacts("simulated omega.3", simulated=True, sample_rate_hz=1000.0), "simulated"),
+        ("calibrated:a.h5", DeviceFacts("simulated omega.3", simulated=True, sample_rate_hz=1000.0), "calibrated:a.h5"),
+    ],
+)
+def test_a_session_is_resumed_from_the_list_on_a_device_of_its_kind(requested, logged, opened):
+    assert _choose_device(Resume("P01_001", requested, "data", follows_log=True), logged) == opened
+    assert _choose_device(Resume("P01_001", requested, "data"), logged) == requested
 
 
 @pytest.mark.slow

@@ -27,8 +27,10 @@ def test_a_session_that_a_person_takes_now_is_shown_after_its_name_was_typed(on_
 
     async def story(sight):
         archive = ArchiveScreens(sight.app, lambda _: None, StartOptions("data", "simulated"))
-        await archive.handle_message(SessionContent(view))
+        for _ in range(2):  # Enter was pressed twice
+            await archive.handle_message(SessionContent(view))
         await sight.pilot.pause()
+        assert [type(screen) for screen in sight.app.screen_stack].count(ConfirmView) == int(asks_first)
         assert isinstance(sight.app.screen, ConfirmView) is asks_first
         if asks_first:
             await sight.press(*"P01_002", "enter")

@@ -63,6 +63,10 @@ def test_wrong_ones_are_reported(on_screen, folder, clean, said):
         ("nowhere.h5", "", "There is nothing at nowhere.h5."),
         ("'open", "", "A quotation mark is open."),
         ("{0}/two.h5", "{0}", "There is no file"),
+        ("~no_such_user/rec.h5", "", "There is nothing at ~no_such_user/rec.h5."),
+        ("x" * 300, "", "There is nothing at xxx"),
+        ("{0}/two.h5", "~no_such_user/model.toml", "There is no file ~no_such_user/model.toml."),
+        ("{0}/two.h5", "x" * 300, "There is no file xxx"),
     ],
 )
 def test_what_is_wrong_is_reported_before_anything_begins(on_screen, folder, sources, model, said):

@@ -200,6 +200,14 @@ def test_it_stands_any_size_and_theme(on_screen, home, size, theme):
     on_screen(HomeScreen(home), story, size, theme)
 
 
+def test_a_long_path_of_the_data_folder_is_shown_to_its_end(on_screen, home):
+    async def story(sight):
+        assert "/home/lab/studies/pilot with older participants/data 2026" in sight.words
+
+    path = "/home/lab/studies/pilot with older participants/data 2026"
+    on_screen(HomeScreen(replace(home, data=path)), story)
+
+
 @pytest.mark.slow
 def test_help_is_one_key_away_also_while_typing(on_screen, home):
     async def story(sight):

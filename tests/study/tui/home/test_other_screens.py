@@ -23,6 +23,15 @@ def test_a_diagnosis_looks_like_this(on_screen, diagnosis, looks_like, size):
     on_screen(DiagnosisScreen(diagnosis), story, size)
 
 
+def test_a_long_path_of_a_diagnosis_is_shown_to_its_end(on_screen, diagnosis):
+    path = "/home/lab/studies/pilot with older participants/data 2026/diagnosis of friday/diagnosis.json"
+
+    async def story(sight):
+        assert path in sight.words
+
+    on_screen(DiagnosisScreen(replace(diagnosis, path=path)), story)
+
+
 @pytest.mark.slow
 def test_a_diagnosis_can_be_scrolled_to_what_remains(on_screen, diagnosis):
     async def story(sight):
@@ -103,12 +112,13 @@ def test_a_diagnosis_is_picked_with_the_keyboard(on_screen, folder):
 
 @pytest.mark.parametrize("what", ["P01_001", "P01_001/events.jsonl"])
 def test_a_session_is_opened_by_its_folder_or_its_log(on_screen, folder, what):
-    asked, _ = browse(on_screen, folder, "enter", typed=folder / what)
+    asked, _ = browse(on_screen, folder, "enter", typed=f" {folder / what} ")
     assert asked == [("ShowSession", str(folder / "P01_001"))]
 
 
-def test_a_path_that_is_not_there_is_reported(on_screen, folder):
-    asked, (_, text) = browse(on_screen, folder, "enter", typed=folder / "nowhere")
+@pytest.mark.parametrize("typed", ["nowhere", "/" + "x" * 300, "~no_such_user/data"])
+def test_a_path_that_is_not_there_is_reported(on_screen, folder, typed):
+    asked, (_, text) = browse(on_screen, folder, "enter", typed=typed)
     assert asked == []
     assert "There is nothing at" in text
 

@@ -58,7 +58,12 @@ def test_a_person_is_led_through_six_positions(on_screen):
 
 @pytest.mark.parametrize(
     ("keys", "said"),
-    [(("f5",), "Name the port."), ((*PORT, "tab", "f", "a", "s", "t", "f5"), "The baud rate is a whole number.")],
+    [
+        (("f5",), "Name the port."),
+        ((*PORT, "tab", *"fast", "f5"), "The baud rate is a whole number."),
+        ((*PORT, "tab", "0", "f5"), "The baud rate is a whole number."),
+        ((*PORT, "tab", *"2147483648", "f5"), "It has at most 9 digits."),
+    ],
 )
 def test_what_cannot_be_meant_is_refused(on_screen, keys, said):
     story, seen = story_of(keys)

@@ -70,6 +70,12 @@ def test_what_is_missing_is_named_and_gets_the_focus(filled):
     assert reply == FormReply({"s1": "yes", "s2": "no", "s3": "no"})
 
 
+def test_many_changed_answers_do_not_hide_how_they_are_confirmed(filled):
+    form = Form(FormKind.EXCLUSION, "T", "", tuple(FormField(f"k{i}", f"Question {i}?", YES_NO) for i in range(4)))
+    keys = [*["1", "enter"] * 4, *["up"] * 4, *["2", "enter"] * 4, "enter"]
+    assert "4 is “no”. If that is right, go to Continue once more." in filled(form, *keys)[1]
+
+
 @pytest.mark.slow
 def test_two_and_more_gaps_are_counted(filled):
     assert "2 more are open." in filled(THREE, "down", "down", "down", "enter")[1]

@@ -19,6 +19,8 @@ from study.session.views.participant_views import (
     RestNotice,
     Welcome,
 )
+from study.tui.app.outcomes import make_failure_outcome
+from study.tui.engine.from_engine import ErrorText, Failed
 from study.tui.keys.answer_keys import parse_keys
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.demo import DemoScreen
@@ -26,6 +28,7 @@ from study.tui.screens.device_check import DeviceCheckScreen
 from study.tui.screens.goodbye import GoodbyeScreen
 from study.tui.screens.handle import HandleScreen
 from study.tui.screens.instructions import InstructionsScreen
+from study.tui.screens.outcome import OutcomeScreen
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.practice_over import PracticeOverScreen
 from study.tui.screens.rest import RestScreen
@@ -99,6 +102,17 @@ def test_the_end_says_what_is_saved_and_why_it_ended(read):
     assert "1 answer is on the disk." in read(GoodbyeScreen(Goodbye(True, 1)))[1]
     words = read(GoodbyeScreen(Goodbye(False, 7, "the device is gone")))[1]
     assert "The session stops here: the device is gone." in words and "7 answers are on the disk." in words
+
+
+def test_the_end_can_be_read_and_left_in_a_small_window(on_stage):
+    error = ErrorText("Interrupted", "It ended. " * 30, "Saved. " * 30, "Do this. " * 30 + "Last.", 1)
+
+    async def story(stage):
+        assert "Q Leave" in stage.words
+        await stage.press("end")
+        assert "Last." in stage.words
+
+    on_stage(OutcomeScreen(make_failure_outcome(Failed(error, "/data/P01_001"), at_home=False)), story, (60, 20))
 
 
 def test_a_void_trial_is_explained(read):

@@ -232,6 +232,18 @@ def test_help_is_in_the_language_too(on_stage, code):
     on_stage(HelpScreen(screen.HELP, Words(table)), story)
 
 
+@pytest.mark.parametrize("size", [(80, 24), (60, 20)])
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_why_a_note_is_refused_is_shown_to_its_last_word(on_stage, code, size):
+    words = Words(table_of(code))
+
+    async def story(stage):
+        await stage.press("ctrl+s")
+        await stage.reads(words["note_empty"])
+
+    on_stage(NoteScreen(adverse=True, words=words), story, size)
+
+
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_the_word_that_confirms_a_withdrawal_is_that_of_the_language(on_stage, code):
     word = table_of(code)["withdraw_word"]

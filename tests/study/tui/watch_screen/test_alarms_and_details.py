@@ -1,6 +1,7 @@
 """The screen of one who watches: alarms, details, help, and leaving."""
 
 import asyncio
+import re
 from dataclasses import replace
 
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from study.session.watching.watch_view import (
     OpenTrial,
 )
+from study.tui.screens.watch_help import HELP
 from study.tui.watch.watch_app import WatchApp
-from study.tui.watch.watch_screen import BELL_INTERVAL_S, STALE_AFTER_S
+from study.tui.watch.watch_screen import BELL_INTERVAL_S, STALE_AFTER_S, WatchScreen
 from tests.study.tui.watch_screen.watched import ALARM, LIVE, Source, view
 
 
@@ -90,6 +92,19 @@ def test_help_is_about_this_screen_and_stop_is_in_it(seated):
         assert "The force is off at once" in seat.text
         await seat.press("escape")
         assert "Last trials" in seat.text
+
+    seated(story)
+
+
+def test_the_screen_has_every_key_that_its_help_names(seated):
+    """Not only in the application of its own: the view opens in that of the participant, too."""
+    named = {key.lower() if len(key) > 1 else key for key in re.findall(r"\*\*(F?\w)\*\*", HELP)}
+    assert named
+    assert named <= {key for binding in WatchScreen.BINDINGS for key in binding.key.split(",")}
+
+    async def story(seat):
+        await seat.press("t")
+        assert seat.app.theme == "hapteq-light"
 
     seated(story)
 

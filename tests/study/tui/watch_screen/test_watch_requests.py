@@ -61,11 +61,12 @@ def test_a_stop_that_is_not_heard_in_a_pause_is_an_alarm_too(seated):
 
 def test_a_stop_that_cannot_be_sent_says_what_to_do(seated):
     def refuse(_request):
-        raise StudyError("t", "The disk is full.", "Switch the device off.")
+        raise StudyError("t", f"A stop could not be put into {'/data' * 20}.", "Switch the device off.")
 
     async def story(seat):
         await seat.press("S")
-        assert "NOT sent: The disk is full. Switch the device off." in seat.lines[1]
+        assert "NOT sent: A stop could not be put into" in seat.lines[1]
+        assert "Switch the device off." in seat.text
 
     assert seated(story, ask=refuse).bells
 

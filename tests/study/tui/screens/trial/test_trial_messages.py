@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase
+from protocols.wording.words import Words
 from study.session.views.participant_views import Answered, Progress, Question, Task
 from study.tui.screens.trial import TrialScreen
 from study.tui.trial_replies import PAUSE, TIME_OVER
@@ -127,6 +128,12 @@ def test_what_a_participant_must_not_know_changes_no_cell(on_stage, hidden, task
 
     on_stage(screen, story)
     assert seen[0] == seen[1]
+
+
+def test_a_message_is_shown_to_its_last_word(asked):
+    words = {"no_repeats": "Es geht nicht noch einmal." * 3, "press": "Drücken Sie {keys}."}
+    _, shown = asked("r", question=replace(QUESTION, repeats_left=0), screen=TrialScreen(words=Words(words)))
+    assert "Drücken Sie 1 or 2." in shown
 
 
 def test_feedback_of_practice_is_not_read_in_a_run_that_counts(on_stage):
