@@ -33,5 +33,7 @@ Source = Annotated[
 ]
 Frequency = Annotated[float, Field(ge=0.5, le=500.0)]
 """Frequency of a recording's excitation (Hz): up to the Nyquist frequency at a sample rate of 1 kHz."""
+SineFrequency = Annotated[float, Field(ge=0.5, le=500.0), AfterValidator(_require_whole_tenths)]
+"""Frequency of a recorded sinusoid (Hz), whose evaluated part holds whole periods."""
 StimulusFrequency = Annotated[float, Field(ge=0.5, le=250.0), AfterValidator(_require_whole_tenths)]
 """Frequency of a trial's stimulus (Hz): up to 250 Hz, so that a period has at least four samples at 1 kHz."""

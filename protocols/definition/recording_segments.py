@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
-from protocols.definition.field_types import Frequency
+from protocols.definition.field_types import Frequency, SineFrequency
 from protocols.definition.problem import Problem, refuse
 from protocols.definition.staircase_rule import STRICT
 
@@ -46,7 +46,8 @@ class SineSegment:
 
     kind: Annotated[Literal["sine"], Field(description="Sinusoids, one after another.")]
     frequencies_hz: Annotated[
-        tuple[Frequency, ...], Field(min_length=1, max_length=100, description="Frequencies, played in this order.")
+        tuple[SineFrequency, ...],
+        Field(min_length=1, max_length=100, description="Frequencies, played in this order."),
     ]
     amplitude_n: Amplitude
     along: AxisName

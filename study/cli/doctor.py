@@ -18,6 +18,7 @@ import typer
 from study.cli.motion_notice import announce_motion, require_confirmation
 from study.cli.results import JsonOption
 from study.cli.session_options import DataOption, DeviceOption, HandsOffOption
+from study.errors import WrongUseError
 
 if TYPE_CHECKING:
     from study.session.views.participant_views import DeviceFinding
@@ -29,6 +30,20 @@ NAME_COLUMN_WIDTH = 17
 CALIBRATION_TIMEOUT_S = 60.0
 """Longest wait (s) until the handle is in its calibration position. Chosen: a minute suffices to move it by hand."""
 
+
+def _check_operator(operator: str | None) -> str | None:
+    """Return the operator's name unchanged (typer callback). Raises WrongUseError for a blank one, as from an empty
+    variable of a script: an acceptance is signed."""
+    if operator is not None and not operator.strip():
+        raise WrongUseError(
+            "The acceptance needs a name",
+            "--accept is followed by an empty text.",
+            "Give the name of the person who checked the device, such as --accept 'Ada Lovelace'.",
+            saved="Nothing moved.",
+        )
+    return operator
+
+
 TimingOption = Annotated[
     float, typer.Option(min=0, max=500, help="How long the 1 kHz loop is timed, with zero force; 0: not at all.")
 ]
@@ -39,6 +54,7 @@ AcceptOption = Annotated[
     str | None,
     typer.Option(
         metavar="OPERATOR",
+        callback=_check_operator,
         help="With no hand on the handle: record how it answers now, prove with 0.5 N that it lets go, and unlock it "
         "for hands.",
     ),

@@ -56,6 +56,12 @@ proportional to the mass that the device reports."""
 MAX_FORCE_DROP_S = 1.0
 """Longest accepted time (s) after the last command until the hardware itself drops the force. Chosen."""
 
+SETTINGS_REMEDY = (
+    "Correct the [safety] and [spring] sections of the protocol; slew_n_per_s follows from its largest force, highest "
+    "frequency and shortest fade."
+)
+"""Remedy for settings of a protocol that are refused."""
+
 FADE_SHAPES = ("raised_cosine", "linear")
 """Shapes of a stimulus's fades that the control tick implements."""
 
@@ -63,7 +69,7 @@ FADE_SHAPES = ("raised_cosine", "linear")
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
     """Check settings and device before the safety layer uses them. The bounds of spring (10 Hz) and damper (20 N s/m)
     are those of `protocols.definition.apparatus.SpringSettings`. Raises `DeviceError` for a limit outside its bounds or
-    not finite, and for a device that reports an implausible rate or mass."""
+    not finite, a place outside the workspace, and for a device that reports an implausible rate or mass."""
     _check_info(info)
     limits = settings.limits
     setting_values = {name: getattr(limits, name) for name in MAX_SETTINGS if name != "keep_s"} | {
@@ -78,8 +84,13 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
         )
     _check_within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, allows_zero=True)
     _check_within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, allows_zero=True)
-    if not all(math.isfinite(component) for component in settings.place_m):
-        raise _make_settings_error(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
+    workspace_m = limits.plausibility.workspace_m
+    if not math.hypot(*settings.place_m) <= workspace_m:  # NaN is refused too
+        raise _make_settings_error(
+            f"place_m is {settings.place_m}; it must lie within {workspace_m:g} m of the origin, the workspace_m of "
+            "the protocol. Beyond it the spring would pull the handle out of the workspace.",
+            "Give a place in metres that lies in the workspace.",
+        )
 
 
 def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: DeviceSettings) -> None:
@@ -187,13 +198,9 @@ def _check_within(name: str, value: float, max_value: float, *, allows_zero: boo
         raise _make_settings_error(f"{name} is {value:g}; it must be {allowed_text} and at most {max_value:g}.")
 
 
-def _make_settings_error(problem_sentence: str) -> DeviceError:
-    """Make the error for settings that are refused. problem_sentence: with a full stop."""
-    return DeviceError(
-        "The device was not opened: its limits are not safe",
-        problem_sentence,
-        "Correct the [safety] and [spring] sections of the protocol.",
-    )
+def _make_settings_error(problem: str, remedy: str = SETTINGS_REMEDY) -> DeviceError:
+    """Make the error for settings that are refused. problem, remedy: sentences."""
+    return DeviceError("The device was not opened: its limits are not safe", problem, remedy)
 
 
 def _make_refusal_error(reason: str) -> DeviceError:

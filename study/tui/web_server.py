@@ -18,11 +18,16 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 
 from aiohttp import web
 from rich.console import Console
-from textual_serve.server import Server
+from textual_serve.app_service import AppService
+from textual_serve.server import Server, to_int
 
 RELOAD_TIMEOUT_S = 10.0
 """Longest time (s) for which a reloaded page waits until the application of the previous page has ended. Chosen: longer
 than the end of an application usually takes; after it, another window is assumed to be open."""
+
+HEARTBEAT_S = 4.0
+"""Time (s) after which a silent browser is asked for a sign of life; half of it later it counts as gone, which ends the
+application and its force. Chosen: longer than a network or a busy computer stalls."""
 
 LOCAL_HOST_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """Names by which a browser may address this machine."""
@@ -72,9 +77,38 @@ class ScreenServer(Server):
         except TimeoutError:
             raise web.HTTPConflict(text="The study is open in another window.") from None
         try:
-            return await super().handle_websocket(request)
+            return await self._run_application(request)
         finally:
             self._window_lock.release()
+
+    async def _run_application(self, request: web.Request) -> web.WebSocketResponse:
+        """Run the application until it or the connection ends, as `Server.handle_websocket` does, whose heartbeat of
+        15 s would leave a force on for 23 s after the browser's machine fell silent."""
+        websocket = web.WebSocketResponse(heartbeat=HEARTBEAT_S)
+        await websocket.prepare(request)
+
+        async def close_connection() -> None:
+            """Close the connection, when the application ends."""
+            await websocket.close()
+
+        application = AppService(
+            self.command,
+            write_bytes=websocket.send_bytes,
+            write_str=websocket.send_str,
+            close=close_connection,
+            download_manager=self.download_manager,
+            debug=self.debug,
+        )
+        try:
+            await application.start(
+                to_int(request.query.get("width", ""), 80), to_int(request.query.get("height", ""), 24)
+            )
+            await self._process_messages(websocket, application)
+        except Exception:
+            logging.getLogger(__name__).exception("The connection of the page failed")
+        finally:
+            await application.stop()
+        return websocket
 
     async def handle_download(self, request: web.Request) -> web.StreamResponse:
         """Send a file to the first request only: two requests would each receive a part of it. Raises HTTPConflict for

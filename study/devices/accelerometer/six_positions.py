@@ -4,6 +4,7 @@ The calibration itself (least squares under gravity) is in `calibration`; the re
 the laboratory's settings file.
 """
 
+import json
 import time
 from collections.abc import Callable
 
@@ -69,7 +70,7 @@ def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> s
             "[accelerometer]",
             f"# Noise {noise} m/s2, cross-axis {calibration.cross_axis:.1%}, positions fit to "
             f"{calibration.residual_g:.3f} g.",
-            f'port = "{path}"',
+            f"port = {json.dumps(path, ensure_ascii=False)}",  # a JSON string is one of TOML, too
             f"baud = {baud}",
             f"bias = {_format_toml_numbers(calibration.bias)}",
             f"sensitivity = [{sensitivity_rows}]",

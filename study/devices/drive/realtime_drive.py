@@ -208,7 +208,8 @@ class RealtimeDrive:
 
     def run_due_ticks(self, now_s: float) -> None:
         """Run the ticks that are due at now_s; while nothing moves, take a requested reading instead. After a gap
-        without control longer than LONGEST_GAP_S (suspended process or computer), drop the force at once."""
+        without control longer than LONGEST_GAP_S (a suspended process; not a suspended computer, whose clock stands
+        still), drop the force at once."""
         with self._lock:
             if not self._governor.moving:
                 self._wake_event.clear()

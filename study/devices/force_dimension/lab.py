@@ -5,13 +5,15 @@ Read at every opening of a real device; `hapteq doctor` writes the result of a s
 described in docs/hardware.md.
 """
 
+import json
 import os
 import re
 import tomllib
 from pathlib import Path
+from typing import Self
 
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 from pydantic.dataclasses import dataclass
 
 from equalizer.signals.listed_problems import format_validation_problems
@@ -48,6 +50,17 @@ class SensorSettings:
     """Lowest and highest raw value; a sample at or beyond either counts as clipped."""
     baud: int = Field(default=2_000_000, gt=0)
     """Rate of the serial line, bit/s; not used by a data-acquisition device."""
+
+    @model_validator(mode="after")
+    def _require_usable_values(self) -> Self:
+        """Raise ValueError for a sensitivity that gives no acceleration, and a range in which every sample clips."""
+        if np.linalg.matrix_rank(np.array(self.sensitivity)) < 3:
+            raise ValueError(
+                "sensitivity has a row or column that follows from the others: no acceleration can be told"
+            )
+        if not self.raw_range[0] < self.raw_range[1]:
+            raise ValueError("raw_range must be the lowest and then the highest raw value")
+        return self
 
     def open_sensor(self) -> Accelerometer:
         """Open the sensor and take its present reading as zero; the handle must be at rest. Raises `DeviceError`."""
@@ -94,11 +107,18 @@ def read_lab_settings() -> LabSettings:
     except (OSError, UnicodeDecodeError) as error:
         raise _make_lab_file_error(path, str(error)) from error
     try:
-        return TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise _make_lab_file_error(path, str(error)) from error
+        return _parse_settings(text)
     except ValidationError as error:
         raise _make_lab_file_error(path, "; ".join(format_validation_problems(error.errors()))) from error
+    except (ValueError, RecursionError) as error:
+        raise _make_lab_file_error(path, str(error)) from error
+
+
+def _parse_settings(text: str) -> LabSettings:
+    """Parse the text of the settings file. Numbers must be numbers, not text or truth values. Raises ValidationError,
+    and ValueError or RecursionError for a text that is not TOML."""
+    # Validated as JSON, like a protocol (`protocols.document.loading`): strict, and yet a list may stand for a tuple.
+    return TypeAdapter(LabSettings).validate_json(json.dumps(tomllib.loads(text), default=str), strict=True)
 
 
 def write_sensor_table(sensor_table: str) -> Path:
@@ -110,7 +130,7 @@ def write_sensor_table(sensor_table: str) -> Path:
     try:
         previous_text = path.read_text("utf-8") if path.exists() else ""
         text = _replace_sensor_table(previous_text, sensor_table)
-        TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
+        _parse_settings(text)
         path.parent.mkdir(parents=True, exist_ok=True)
         new_path = path.with_name(f"{path.name}.new")
         new_path.write_text(text, "utf-8")
@@ -127,13 +147,19 @@ def write_sensor_table(sensor_table: str) -> Path:
 
 
 def _replace_sensor_table(text: str, sensor_table: str) -> str:
-    """Return the text of the file without its [accelerometer] table (up to the next header), the new one appended."""
-    lines, kept_lines, in_sensor_table = text.splitlines(), [], False
-    for line in lines:
+    """Return the text of the file without its [accelerometer] table (up to the next header and the comments above
+    that), the new one appended."""
+    kept_lines: list[str] = []
+    comment_lines: list[str] = []
+    in_sensor_table = False
+    for line in text.splitlines():
         if TABLE_HEADER.fullmatch(line):
             in_sensor_table = line.split("#")[0].strip() == "[accelerometer]"
+            kept_lines += comment_lines
         if not in_sensor_table:
             kept_lines.append(line)
+        is_comment = not line.strip() or line.lstrip().startswith("#")
+        comment_lines = [*comment_lines, line] if in_sensor_table and is_comment else []
     other_text = "\n".join(kept_lines).rstrip()
     return f"{other_text}\n\n{sensor_table.rstrip()}\n" if other_text else f"{sensor_table.rstrip()}\n"
 

@@ -142,8 +142,8 @@ def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float
 @njit_inline
 def _reenable_forces(calls: Addresses, cells: FloatArray) -> int:
     """Enable forces after a pause longer than the watchdog's timeout. Returns an error code where the forces are off
-    for another cause, a force acted, a call failed or the driver is closed; a pause after a zero (nothing was played,
-    or the computer slept) is no error."""
+    for another cause, a force acted, a call failed or the driver is closed; a pause after a zero (nothing was played)
+    is no error. A suspended computer's clock shows no pause: the status check then finds the forces off."""
     code = check_force_on(calls, cells)
     if code >= 0:
         return code

@@ -20,6 +20,7 @@ from study.session.facts.fact_types import (
     Magnitude,
     RecordingPath,
     Seconds,
+    Seed,
     Sha256,
     UtcTime,
 )
@@ -182,7 +183,7 @@ class MaskingPlayed:
     """Lower end of the band of the noise."""
     high_hz: FrequencyHz
     """Upper end of the band of the noise."""
-    seed: Count
+    seed: Seed
     """Seed of the noise, which makes it reproducible."""
     trouble: str = ""
     """Why the noise stopped, where it was not stopped on purpose; empty otherwise."""

@@ -19,6 +19,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from protocols.definition.apparatus import TestDirections
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
+from study.errors import WrongUseError
 from study.session.stimulus.stimulus import compute_direction_vector, count_loop_samples
 
 
@@ -55,20 +56,38 @@ class RecordingPiece:
 
 def make_pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[RecordingPiece, ...]:
     """Make all pieces in the order of the protocol's segments, the whole sequence as often as the protocol repeats it.
-    sample_rate_hz: sample rate of the device."""
+    sample_rate_hz: sample rate of the device. Raises WrongUseError for a segment that cannot be made at this rate."""
     sequence: list[RecordingPiece] = []
     for number, segment in enumerate(protocol.segments, start=1):
-        match segment:
-            case SineSegment():
-                sequence += [
-                    _make_sine_piece(protocol, number, segment, frequency_hz, sample_rate_hz)
-                    for frequency_hz in segment.frequencies_hz
-                ]
-            case SweepSegment():
-                sequence.append(_make_sweep_piece(protocol, number, segment, sample_rate_hz))
-            case MultisineSegment():
-                sequence += _make_multisine_pieces(protocol, number, segment, sample_rate_hz)
+        try:
+            sequence += _make_segment_pieces(protocol, number, segment, sample_rate_hz)
+        except ValueError as error:
+            raise WrongUseError(
+                "This protocol cannot be recorded",
+                f"segments[{number}] of '{protocol.name}' at {sample_rate_hz:g} samples per second: {error}.",
+                "Change its frequencies or its duration, or take a device of a higher rate.",
+                saved="Nothing moved.",
+            ) from error
     return tuple(sequence) * protocol.repeats
+
+
+def _make_segment_pieces(
+    protocol: RecordingProtocol,
+    number: int,
+    segment: SineSegment | SweepSegment | MultisineSegment,
+    sample_rate_hz: float,
+) -> list[RecordingPiece]:
+    """Make the pieces of a segment, each played once. Raises ValueError where it cannot be made at this rate."""
+    match segment:
+        case SineSegment():
+            return [
+                _make_sine_piece(protocol, number, segment, frequency_hz, sample_rate_hz)
+                for frequency_hz in segment.frequencies_hz
+            ]
+        case SweepSegment():
+            return [_make_sweep_piece(protocol, number, segment, sample_rate_hz)]
+        case MultisineSegment():
+            return _make_multisine_pieces(protocol, number, segment, sample_rate_hz)
 
 
 def make_unit_vector(directions: TestDirections, axis_name: str) -> FloatArray:
@@ -83,7 +102,10 @@ def _make_sine_piece(
     protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, sample_rate_hz: float
 ) -> RecordingPiece:
     """Make the piece of a sinusoid. The evaluated part is a whole number, at least one, of loops: the shortest whole
-    periods that are a whole number of samples (`count_loop_samples`). Settling and fades lie outside."""
+    periods that are a whole number of samples (`count_loop_samples`). Settling and fades lie outside. Raises ValueError
+    from half the sample rate on, where the samples of a sinusoid are all zero."""
+    if 2 * frequency_hz >= sample_rate_hz:
+        raise ValueError(f"a sinusoid needs a frequency below half the rate, not {frequency_hz:g} Hz")
     period_samples = count_loop_samples(frequency_hz, sample_rate_hz)
     fade_samples = round(protocol.fade_s * sample_rate_hz)
     settle_samples = max(fade_samples, round(segment.settle_s * sample_rate_hz))

@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import contextlib
 import hashlib
 import os
 import re
@@ -18,7 +19,7 @@ pytest.importorskip("textual_serve")
 
 from aiohttp import ClientSession, WSServerHandshakeError
 
-from study.tui.web_server import list_origins
+from study.tui.web_server import HEARTBEAT_S, list_origins
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -262,6 +263,23 @@ def test_a_second_window_is_refused_while_the_first_is_open(server):
         return refused.value.status
 
     assert in_browser(server, visit) == 409
+
+
+def test_a_browser_that_falls_silent_counts_as_gone_within_seconds(server):
+    """As on a machine that sleeps, or behind a pulled cable: its connection is not closed."""
+    origin = f"http://localhost:{server[0]}"
+
+    async def visit(session, url):
+        async with session.ws_connect(f"{url}/ws", origin=origin, autoping=False) as first:
+            await first.receive(timeout=30)
+            silent_since_s, gone_after_s = time.monotonic(), None
+            while gone_after_s is None and time.monotonic() < silent_since_s + 60:
+                with contextlib.suppress(WSServerHandshakeError):  # refused while the first counts as open
+                    async with session.ws_connect(f"{url}/ws", origin=origin):
+                        gone_after_s = time.monotonic() - silent_since_s
+        return gone_after_s
+
+    assert in_browser(server, visit) < 3 * HEARTBEAT_S
 
 
 def test_our_page_has_the_names_that_a_browser_gives_it():

@@ -104,6 +104,18 @@ def test_a_place_that_is_not_finite_is_refused_by_name():
         open_device("simulated", replace(SETTINGS, place_m=(0.0, math.nan, 0.0)), VirtualClock(), seed=1)
 
 
+@pytest.mark.parametrize("place_m", [(20.0, 0.0, 0.0), (0.1, 0.1, 0.0), (math.inf, 0.0, 0.0), (0.0, math.nan, 0.0)])
+def test_a_place_outside_the_workspace_as_in_millimetres_is_refused_by_every_device(rigs, place_m):
+    """Its spring would hold the handle at the end of its travel."""
+    with pytest.raises(DeviceError, match=r"place_m is .*within 0\.12 m of the origin.*in metres"):
+        SafeDevice(rigs.ScriptedRig(), replace(rigs.SETTINGS, place_m=place_m), VirtualClock())
+
+
+def test_a_slew_rate_that_is_refused_names_what_it_follows_from():
+    with pytest.raises(DeviceError, match=r"slew_n_per_s is 200000; .*shortest fade"):
+        open_device("simulated", limited(slew_n_per_s=2e5), VirtualClock(), seed=1)
+
+
 STRONG = replace(limited(stimulus_cap_n=8.0, total_cap_n=12.0), hand_on_handle=False)
 
 

@@ -57,6 +57,13 @@ def test_a_new_calibration_takes_the_place_of_the_old_one_alone(file):
     assert not file.with_name("device.toml.new").exists()
 
 
+def test_comments_above_the_next_table_are_not_those_of_the_old_calibration(file):
+    file.parent.mkdir()
+    file.write_text(OLD.replace("bias =", "# of May\nbias =").replace("[pulse]", "# The line of the EEG:\n[pulse]"))
+    write_sensor_table(TABLE)
+    assert "\n# The line of the EEG:\n[pulse]\n" in file.read_text() and "of May" not in file.read_text()
+
+
 def test_nothing_changes_where_the_file_cannot_be_used_or_the_table_is_none(file):
     file.parent.mkdir()
     file.write_text("effector_mass_kg = ")
@@ -78,3 +85,32 @@ def test_all_that_is_wrong_in_the_file_is_told_at_once(file):
 def test_a_range_at_the_ends_of_16_bits_is_written_as_whole_numbers():
     wide = Calibration(IDEAL.bias, 10 * IDEAL.sensitivity, IDEAL.noise_mps2, 0.0)
     assert "raw_range = [0, 65535]" in format_calibration_toml(wide, "COM3", 9600)
+
+
+SENSOR = OLD[OLD.index("[accelerometer]") : OLD.index("[pulse]")]
+UNUSABLE = {
+    "effector_mass_kg: Input should be a valid number": "effector_mass_kg = true",
+    "effective_mass_kg: Input should be a valid number": 'effective_mass_kg = "0.28"',
+    "effective_mass_kg: Input should be a valid .*number": "effective_mass_kg = 2026-11-30",
+    "effective_mass_kg: Input should be a finite number": "effective_mass_kg = nan",
+    "Exceeds the limit": f"effective_mass_kg = {'9' * 5000}",
+    "recursion": f"effective_mass_kg = {'[' * 5000}{']' * 5000}",
+    "accelerometer.baud: Input should be a valid integer": f"{SENSOR}baud = true",
+    "sensitivity has a row or column that follows": SENSOR.replace("[6.0, 1.0, 598.0]", "[1214.0, 6.0, -10.0]"),
+    "raw_range must be the lowest": SENSOR.replace("[13800, 51200]", "[51200, 13800]"),
+}
+
+
+@pytest.mark.parametrize("why", UNUSABLE)
+def test_a_value_that_is_no_number_or_gives_no_acceleration_is_refused_by_name(file, why):
+    file.parent.mkdir()
+    file.write_text(UNUSABLE[why])
+    with pytest.raises(DeviceError, match=f"settings of the device cannot be used.*{why}"):
+        read_lab_settings()
+
+
+@pytest.mark.parametrize("port", [r"\\.\COM10", 'serial "left"', "/dev/serial/by-id/Gerät-1"])
+def test_a_port_of_any_name_is_written_so_that_it_is_read_again(file, port):
+    write_sensor_table(format_calibration_toml(IDEAL, port, 115_200))
+    lab = read_lab_settings()
+    assert lab.accelerometer is not None and lab.accelerometer.port == port

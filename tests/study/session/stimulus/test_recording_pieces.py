@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
+from study.errors import WrongUseError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, make_recording_limits
 from study.session.stimulus.recording_pieces import make_pieces
 
@@ -46,6 +47,26 @@ def test_the_last_sweep_periods_are_alike():
     plan = make_pieces(protocol(SweepSegment("sweep", 1.0, 400.0, 1.0, "y", duration_s=2.0, periods=3)), RATE_HZ)
     wave = plan[0].commands.samples[500:-500, 1]
     assert wave[2000:4000] == pytest.approx(wave[4000:6000])
+
+
+UNPLAYABLE = {
+    "below half the rate, not 500 Hz": SineSegment("sine", (25.0, 500.0), 1.0, "x", duration_s=0.1),
+    "holds less than a cycle": SweepSegment("sweep", 1.0, 500.0, 1.0, "x", duration_s=0.0124542),
+    "has no line from 499.5 to 500 Hz": MultisineSegment("multisine", 499.5, 500.0, 1.0, "x", 1.0, odd_only=False),
+    "has no odd line from 390 to 410 Hz": MultisineSegment("multisine", 390.0, 410.0, 1.0, "x", 0.0025),
+}
+
+
+@pytest.mark.parametrize("why", UNPLAYABLE)
+def test_a_segment_without_a_force_at_this_rate_is_refused_by_its_number(why):
+    playable = SineSegment("sine", (25.0,), 1.0, "x", duration_s=0.2)
+    with pytest.raises(WrongUseError, match=rf"segments\[2\] of 'p' at 1000 samples.*{why}.*Nothing moved"):
+        make_pieces(protocol(playable, UNPLAYABLE[why]), RATE_HZ)
+
+
+def test_a_sinusoid_whose_period_would_not_be_one_is_refused():
+    with pytest.raises(ValueError, match="whole tenths of a hertz, so that whole periods can be looped"):
+        SineSegment("sine", (5.03,), 1.0, "x", duration_s=1.0)
 
 
 def test_repeats_play_the_list_again():

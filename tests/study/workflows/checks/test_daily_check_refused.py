@@ -186,3 +186,10 @@ def test_a_result_with_a_wrong_type_is_refused_with_the_key(tmp_path, key, value
     with pytest.raises(UnusableFileError) as refused:
         read_daily_check(path)
     assert refused.value.problems[0].startswith(key)
+
+
+@pytest.mark.parametrize("name", ["", "  "])
+def test_an_acceptance_without_a_name_is_refused_before_anything_is_examined(monkeypatch, capsys, name):
+    monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, **__: pytest.fail("it was examined"))
+    assert main(["doctor", "--device", "omega3", "--hands-off", "--accept", name]) == 2
+    assert "The acceptance needs a name" in capsys.readouterr().err
